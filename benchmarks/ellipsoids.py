@@ -78,7 +78,7 @@ def main():
     for make in (bearing, converter):
         plant, vertices, E, (Q, R), setup = make()
         K = gain(np.array(plant.A, dtype=float), np.array(plant.B, dtype=float), float(setup["step"]), Q, R)
-        found = qd.guarantee(plant, gains=K, **setup)
+        found = qd.guarantee(plant, gains=K, **setup).proof
         for (name, row), bound in zip(plant.outputs.items(), found.claims.outputs, strict=True):
             other = ellipsoid_peak(vertices, E, K, np.array(row, dtype=float))
             print(f"{make.__name__:10} {name:12} small gain {float(bound):.4g}, ellipsoid {other:.4g}", flush=True)

@@ -29,7 +29,7 @@ from quakedesign.lyapunov import Loop
 from quakedesign.lyapunov.maps.gain_map import Screener, Sheet, axis
 from quakedesign.lyapunov.maps.sweep import ACCURACY, Sweep
 from quakedesign.lyapunov.search.certify import closed_loop, largest_lipschitz
-from quakedesign.lyapunov.search.search import balance, family_of, finished
+from quakedesign.lyapunov.search.lyapunov_search import balance, family_of, finished
 from quakedesign.sos.solve.joint import JointProgram, Proposal
 from quakedesign.sos.solve.moment import settings
 

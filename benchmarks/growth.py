@@ -19,7 +19,7 @@ from quakedesign.guarantees.exact.norms import _norms
 from quakedesign.laws import family
 from quakedesign.loop import Actuator, Diffusion
 from quakedesign.lyapunov.maps.gain_map import gain_map
-from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.simulation.campaign import campaign_problem, run_campaign
 from quakedesign.synthesis.sliding_mode_design import sliding_mode_loop
 

@@ -453,18 +453,18 @@ BUDGETS = {
     "symbolic": 3139,
     "sos": 6328,
     "laws": 3105,
-    "loop": 4219,
+    "loop": 4188,
     "plant": 1446,
-    "guarantees": 13212,
+    "guarantees": 13234,
     "lyapunov": 6957,
     "linear": 2390,
     "synthesis": 1941,
     "rocq": 843,
-    "simulation": 9740,
+    "simulation": 9748,
     "identification": 4051,
     "studies": 4126,
     "report": 4097,
-    "cli": 3508,
+    "cli": 3509,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

@@ -12,7 +12,7 @@ from quakedesign.cli.app import app
 from quakedesign.report.summary import LEGEND
 from quakedesign.simulation import Metrics
 from quakedesign.simulation.recorder import ActuatorMetrics
-from quakedesign.studies.facts import box_sentence
+from quakedesign.studies.fault_facts import box_sentence
 
 ROOT = Path(__file__).parent.parent
 DOCUMENTS = ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "proofs/FORMAT.md")

@@ -17,7 +17,7 @@ from quakedesign.text import counted
 if TYPE_CHECKING:
     from quakedesign.cli.options import LawOptions
     from quakedesign.fault import BlockChain
-    from quakedesign.studies.chains import ChainRun, SlidingChainRun
+    from quakedesign.studies.several_blocks import ChainRun, SlidingChainRun
 
 
 def several_blocks(
@@ -64,7 +64,7 @@ def chain_at_step(chain: "BlockChain", setup: LoopSetup) -> "BlockChain":
 
 def _scope(proof: Any, chain: "BlockChain") -> list[str]:
     """What a statement about blocks depends on, and what its words mean."""
-    from quakedesign.studies.chains import farthest_balance
+    from quakedesign.studies.several_blocks import farthest_balance
 
     meant = "the load of a pressure is the pressure that balances the blocks on the reference"
     if chain.ages:
@@ -102,7 +102,7 @@ def _lines(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | N
 
 def show_chain(chain: "BlockChain", output: Output) -> int:
     """The command `fault`."""
-    from quakedesign.studies.chains import chain_dict, chain_lines
+    from quakedesign.studies.several_blocks import chain_dict, chain_lines
 
     output.show(chain_dict(chain), chain_lines(chain))
     return 0
@@ -163,7 +163,7 @@ def guarantee_chain(
             result.save(out)
     unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not proof.proved else []
     written = None if out is None or not proof.proved else str(out)
-    from quakedesign.studies.chains import ChainRun
+    from quakedesign.studies.several_blocks import ChainRun
 
     one = None if sliding is not None else ChainRun(chain=chain, controller=law, proof=proof, run=None)
     output.show({**_values(proof, chain, one), "certificate": written}, [*_lines(proof, chain, one), *unwritten])
@@ -175,7 +175,7 @@ _HEADS = ("law", "proved", "", "in the run", "", "pressure", "")
 
 def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any], output: Output) -> int:
     """The command `compare`: laws whose wells know all measurements, or their own alone."""
-    from quakedesign.studies.chains import run_of_chain, run_sliding_chain
+    from quakedesign.studies.several_blocks import run_of_chain, run_sliding_chain
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
     require_loads(chain, sliding)
@@ -227,9 +227,9 @@ def export_chain(
     chain: "BlockChain", law: "LawOptions", fmu: bool, out: Path | None, force: bool, output: Output
 ) -> int:
     """The command `export`: the law that is designed, or that of a certificate, where something is proved of it."""
-    from quakedesign.report.plain import export_lines
+    from quakedesign.report.plain_text import export_lines
     from quakedesign.simulation.export import FILES, block_step, require_free, write_step
-    from quakedesign.studies.chains import chain_law
+    from quakedesign.studies.several_blocks import chain_law
 
     if chain.ages and law.certificate is None:
         raise ParameterError(
@@ -258,7 +258,7 @@ def run_chain(
 ) -> int:
     """The commands `design` and `simulate`: a law, its proof, a run and, with a folder, files and a figure."""
     from quakedesign.report.folder import prepare
-    from quakedesign.studies.chains import run_of_chain, run_sliding_chain
+    from quakedesign.studies.several_blocks import run_of_chain, run_sliding_chain
 
     if out is not None:
         prepare(out, force=force)

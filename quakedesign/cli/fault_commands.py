@@ -25,7 +25,7 @@ def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> in
     options, name = dict(locals()), fault
     from quakedesign.cli.block_commands import several_blocks, show_chain
     from quakedesign.fault import load_fault
-    from quakedesign.studies.facts import fault_dict, fault_sentences
+    from quakedesign.studies.fault_facts import fault_dict, fault_sentences
 
     if (chain := several_blocks(name, globals()["fault"], options, box=box)) is not None:
         return show_chain(chain, output)
@@ -105,7 +105,7 @@ def scale(
     clock
         Time scale from operation-time or natural-period; by default the one on which both faults agree.
     """
-    from quakedesign.report.plain import scale_lines
+    from quakedesign.report.plain_text import scale_lines
     from quakedesign.studies.scaling import scale_answer
 
     clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}

@@ -112,7 +112,7 @@ def guarantee(
     options = dict(locals())
     from quakedesign.cli.block_commands import guarantee_chain, require_loads, several_blocks
     from quakedesign.fault import load_fault, with_accepted_fit
-    from quakedesign.studies.facts import box_sentences
+    from quakedesign.studies.fault_facts import box_sentences
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
@@ -164,7 +164,7 @@ def _first(fault: Any, result: Any) -> Iterator[str]:
     from textwrap import wrap
 
     from quakedesign.report.summary import guaranteed_sentence
-    from quakedesign.simulation.natural import natural_peak
+    from quakedesign.simulation.earthquake import natural_peak
 
     try:
         peak = natural_peak(fault)

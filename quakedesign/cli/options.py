@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from quakedesign.loop.sensing import Sensor
     from quakedesign.simulation import Load
     from quakedesign.simulation.trajectory import Trajectory
-    from quakedesign.studies.runs import Choice
+    from quakedesign.studies.single_runs import Choice
 
 
 # ----------------------------------------------------------------------
@@ -261,10 +261,11 @@ class LawOptions:
     ) -> "Choice | None":
         """Controller for a fault and what is certified of it; None where none is asked for.
 
-        A designed one is for a T_s [s], the fault's unless given, and a path, see `quakedesign.studies.runs.choice`.
+        A designed one is for a T_s [s], the fault's unless given, and a path, see
+        `quakedesign.studies.single_runs.choice`.
         """
         from quakedesign.laws import SampledLaw
-        from quakedesign.studies.runs import Choice, certified_choice, optional_choice
+        from quakedesign.studies.single_runs import Choice, certified_choice, optional_choice
 
         entries = {"scale": self.scale, "feedforward": self.feedforward}
         if self.law is not None:
@@ -572,7 +573,7 @@ class SensorOptions(EstimateOptions):
     def build(self, step: float, seed: int = 0) -> "Sensor":
         """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
         from quakedesign.loop.sensing import Measurement
-        from quakedesign.studies.runs import sensor
+        from quakedesign.studies.single_runs import sensor
 
         return sensor(
             step,
@@ -600,7 +601,7 @@ def surroundings(
     Stages for which a law of samples is designed, with the substeps that they need, and the noise of its certificate
     stand where none is given.
     """
-    from quakedesign.simulation.run import own_path
+    from quakedesign.simulation.run_settings import own_path
 
     chain, seen = actuator.build(step, seed), sensors.build(step, seed)
     if chosen is None:
@@ -686,7 +687,7 @@ def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
 def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int:
     """Run a fault whose friction has a state as `simulate` was asked to, and print what it comes to."""
     from quakedesign.report.sentences import sliding_run_lines, state_run_lines
-    from quakedesign.studies.runs import run_sliding, run_state
+    from quakedesign.studies.single_runs import run_sliding, run_state
 
     single, changed = _single(options), changed_options(command, options)
     run: Trajectory
@@ -755,7 +756,7 @@ class SpreadOptions:
         def sliding(fault: "Fault") -> tuple["Choice | None", dict[str, Any]]:
             from quakedesign.exact import rational
             from quakedesign.plant import slow_sliding_plant
-            from quakedesign.studies.runs import Choice
+            from quakedesign.studies.single_runs import Choice
             from quakedesign.synthesis import design
 
             period = {} if self.stress_period is None else {"stress_period": self.stress_period}

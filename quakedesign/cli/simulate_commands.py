@@ -91,7 +91,7 @@ def simulate(
     from quakedesign.fault import load_fault
     from quakedesign.report.sentences import exceeded_line, proved_line
     from quakedesign.simulation import Load
-    from quakedesign.studies.runs import run_single
+    from quakedesign.studies.single_runs import run_single
 
     accepted = ("duration", "out", "controller", "certificate", "plant", "drift", "stress", "stress_period", "state")
     if (blocks := several_blocks(fault, simulate, options, accepted)) is not None:
@@ -185,7 +185,7 @@ def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
 
 
 def _values(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
-    from quakedesign.simulation.natural import waiting
+    from quakedesign.simulation.earthquake import waiting
     from quakedesign.studies.comparison import shortfall
 
     metrics, energy = trajectory.metrics.to_dict(), trajectory.energy
@@ -253,8 +253,8 @@ def sampling(
     from quakedesign.fault import load_fault
     from quakedesign.report.folder import prepare
     from quakedesign.report.sampling_table import print_sampling, write_sampling
-    from quakedesign.studies.runs import CONTINUOUS, DESIGNED, choice
     from quakedesign.studies.sampling import sampling_report
+    from quakedesign.studies.single_runs import CONTINUOUS, DESIGNED, choice
     from quakedesign.synthesis import design
 
     loaded = load_fault(fault)
@@ -310,7 +310,7 @@ def export(
     options = dict(locals())
     from quakedesign.cli.block_commands import export_chain, several_blocks
     from quakedesign.fault import load_fault
-    from quakedesign.report.plain import export_lines
+    from quakedesign.report.plain_text import export_lines
     from quakedesign.studies.exporting import export_result
 
     if (
@@ -406,7 +406,7 @@ def campaign(
     from quakedesign.fault import load_fault
     from quakedesign.report.drawing import figure_bytes
     from quakedesign.simulation.campaign import campaign_problem, run_campaign
-    from quakedesign.simulation.run import sampled_scheme
+    from quakedesign.simulation.run_settings import sampled_scheme
 
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")

@@ -8,10 +8,10 @@ from typing import Any
 from quakedesign.errors import CertificateError
 from quakedesign.exact import Bound, LowerBound
 from quakedesign.guarantees.exact.guarantee_files import save_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof
+from quakedesign.guarantees.exact.plant_proof import PlantProof
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.search.compensated_search import Compensation
+from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.lyapunov.exact.claim import Verdict
 
 

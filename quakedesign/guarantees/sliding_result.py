@@ -14,11 +14,10 @@ from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
 from quakedesign.guarantees.exact.limit_theorems import SlidingPush, longest_diffusion
-from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.statement import SlidingProof
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
+from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.result import Guarantee
-from quakedesign.guarantees.search.adversary import WorstCase, worst_sliding
 from quakedesign.guarantees.search.lqg import sliding_model
 from quakedesign.guarantees.search.sliding_design import (
     LOG_RATES,
@@ -34,6 +33,7 @@ from quakedesign.guarantees.search.sliding_design import (
     what_would_do,
     with_noise,
 )
+from quakedesign.guarantees.search.worst_case import WorstCase, worst_sliding
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.plant.of_fault import slow_sliding_plant
 from quakedesign.plant.sliding_plant import SlidingPlant

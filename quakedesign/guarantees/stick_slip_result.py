@@ -10,11 +10,11 @@ from quakedesign.exact import LowerBound, rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.limit_theorems import smallest_stick_slip_rate
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 from quakedesign.guarantees.result import Guarantee
-from quakedesign.guarantees.search.adversary import WorstCase
 from quakedesign.guarantees.search.compensated_search import Compensation, design_sticking
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
+from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.laws import SlidingMode
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant.of_fault import uncertain_plant

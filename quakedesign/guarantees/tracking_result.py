@@ -10,12 +10,12 @@ from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, s
 from quakedesign.fault import Fault
 from quakedesign.guarantees.exact.limit_theorems import SmallestPeak, smallest_peak
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
+from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
 from quakedesign.guarantees.result import Guarantee
-from quakedesign.guarantees.search.adversary import WorstCase, worst_tracking
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
 from quakedesign.guarantees.search.lqg import measured_by
+from quakedesign.guarantees.search.worst_case import WorstCase, worst_tracking
 from quakedesign.laws import LinearLaw, RestLimit
 from quakedesign.laws.sampled_controller import growth_at_rest, warning_at_rest
 from quakedesign.loop.loop_setup import MEASURED

@@ -38,7 +38,7 @@ from quakedesign.linear.linear_problem import (
     total,
 )
 from quakedesign.lyapunov.exact.fault_bounds import Sectors
-from quakedesign.lyapunov.search.search import quadratic_terms
+from quakedesign.lyapunov.search.lyapunov_search import quadratic_terms
 from quakedesign.symbolic.terms import Term
 
 # ----------------------------------------------------------------------

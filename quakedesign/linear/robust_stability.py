@@ -21,7 +21,7 @@ from quakedesign.linear.linear_problem import FeedbackLoop, Polytope, Vertex, mo
 from quakedesign.lyapunov import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.lyapunov.exact.fault_bounds import Sectors, plant_ranges, sectors
 from quakedesign.lyapunov.exact.obligations import Obligation, claimed, different
-from quakedesign.lyapunov.search.search import below, finish, quadratic_margin, quadratic_terms
+from quakedesign.lyapunov.search.lyapunov_search import below, finish, quadratic_margin, quadratic_terms
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.solve.conic import solve

@@ -6,6 +6,8 @@ from .actuators.sampled_stages import Delay as Delay
 from .actuators.sampled_stages import Quantisation as Quantisation
 from .actuators.sampled_stages import RateLimit as RateLimit
 from .actuators.sampled_stages import Saturation as Saturation
+from .diffusion_layer import Layer as Layer
+from .diffusion_layer import with_response_area as with_response_area
 from .error_loop import SHORTEST as SHORTEST
 from .error_loop import ContinuousLaw as ContinuousLaw
 from .error_loop import SlidingModel as SlidingModel
@@ -16,8 +18,6 @@ from .error_loop import exact_integrals as exact_integrals
 from .error_loop import held_loop as held_loop
 from .error_loop import sliding_loop as sliding_loop
 from .error_loop import starts as starts
-from .layer import Layer as Layer
-from .layer import with_response_area as with_response_area
 from .periodic import Fading as Fading
 from .periodic import Instants as Instants
 from .periodic import PeriodicLoop as PeriodicLoop

@@ -20,10 +20,10 @@ from quakedesign.laws.sampled_law import (
     Row,
     require_sizes,
     steady_states,
-    unit_row,
 )
-from quakedesign.loop.layer import MODES, Layer
+from quakedesign.loop.diffusion_layer import MODES, Layer
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
+from quakedesign.loop.signals import Interconnection, Signal
 
 # ----------------------------------------------------------------------
 # Sampled linear law on a fault: sample, zero-order hold, delay, lag, and diffusion between well and fault.
@@ -34,6 +34,7 @@ BENT = tuple(
     Fraction(v, 128) for v in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)
 )  # as a lag and the modes of a layer do
 HALVES = tuple(Fraction(v, 2) for v in (0, 1, 2))
+_ONE = Fraction(1)
 
 
 def held_loop(
@@ -93,53 +94,28 @@ def held_loop(
     ParameterError
         For a law that leaves an error under a constant p*, or times that are negative or too long.
     """
-    watched = instants is not None
-    path = _Path(own=len(law.states), step=step, delay=delay, lag=lag, diffusion=diffusion, watched=watched)
-    sample, arrival = _events(law, authority, path)
-    n = path.size
-    slope = Fraction(0) if law.root is None else law.root.middle / step
-    jump = tuple((row[0] - slope * row[n], *row[1:n]) for row in sample)
-    sampled = {} if law.root is None else {"root": tuple(row[n] for row in sample)}
-    moving = {"reference": _reference_drift(law, path)} if law.of_reference else {}
-    if law.of_reference:
-        sampled["reference_rate"] = tuple(row[n + 1] for row in sample)
-    for k, name in enumerate(NOISES):
-        if name in noisy:
-            sampled[name] = tuple(row[k] - (i == k) for i, row in enumerate(jump))
-    ends, past_ends = (BENT, HALVES) if diffusion else (BENT if lag else EVEN, EVEN)
-    maps = [(jump, path.part or step), *([(arrival, step - path.part)] if path.part else [])]
-    left_out, fading = _left_out(path)
-    push = _push(path)
-    valve_output = {"asked": _unit(n, path.valve)} if lag or diffusion else {}
-    loop = PeriodicLoop(
-        states=("e1", "e2", *law.states, *(f"waiting{i}" for i in range(path.waiting)), "valve", *path.behind),
-        flow=_flow(path, push, model, model.gain / authority),
-        segments=tuple(Segment(jump=j, duration=time, ends=ends, past_ends=past_ends) for j, time in maps),
-        inputs={"acceleration": _unit(n, 1), "drift": _drift(law, authority, path), **moving},
-        outputs={"slip_error": _unit(n, 0), "slip_rate_error": _unit(n, 1), "push": push, **left_out, **valve_output},
-        sampled=sampled,
-        fading=fading,
+    gain, outputs = model.gain / authority, {"slip_error": "e1", "slip_rate_error": "e2", "push": "push"}
+    outputs |= ({"left_out": "left_out"} if diffusion else {}) | ({"asked": "valve"} if lag or diffusion else {})
+    system, loop = _connected(
+        law,
+        authority,
+        _Times(step=step, delay=delay, lag=lag, diffusion=diffusion, watched=instants is not None),
+        rates={"e1": {"e2": _ONE}, "e2": {"e1": model.slip, "e2": -model.rate, "push": gain}},
+        signals={},
+        inputs={"acceleration": {"e2": _ONE}, "drift": {}},
+        outputs=outputs if instants is None else {**outputs, "stepped": "stepped"},
+        of_left_out={"e2": _ONE},
+        noisy=noisy,
     )
-    return loop if instants is None else _off_schedule(loop, instants, path)
-
-
-def _off_schedule(loop: PeriodicLoop, instants: Instants, path: "_Path") -> PeriodicLoop:
-    """Loop whose last state is the last step of the valve, with the inputs of early and late pressures."""
-    instants.require_within(path.step, path.part)
-    n, pushed, off = path.size, loop.flow[1][path.valve], instants.arrived
-    outputs, pulses, at_once = {**loop.outputs, "stepped": _unit(n, n - 1)}, {}, dict[tuple[str, str], Fraction]()
-    if off or instants.ramp:
-        place, size = (path.valve + 1, 1 / path.lag) if path.lag else (1, pushed)
-        pulses["late"] = Pulse(
-            entry=tuple(size * v for v in _unit(n, place)),
-            first=int(path.part > 0),
-            early=off,
-            late=off + instants.ramp,
-            before=off,
-            after=off + instants.ramp / 2,
-        )
-        at_once["asked" if path.lag else "push", "drift"] = off + instants.ramp
-    return replace(loop, outputs=outputs, pulses=pulses, at_once=at_once)
+    if instants is None:
+        return loop
+    part, off, after = delay % step, instants.arrived, instants.arrived + instants.ramp
+    instants.require_within(step, part)
+    if not after:
+        return loop
+    entry = system.column({"behind": 1 / lag} if lag else {"e2": gain})
+    late = Pulse(entry=entry, first=int(part > 0), early=off, late=after, before=off, after=off + instants.ramp / 2)
+    return replace(loop, pulses={"late": late}, at_once={("asked" if lag else "push", "drift"): after})
 
 
 def starts(
@@ -152,21 +128,20 @@ def starts(
     """
     made = list(zip(*law.first, strict=True)) or [(Fraction(0),) * len(law.states)] * 2
     rest = [Fraction(0)] * (size - 2 - len(law.states))
-    columns = [(error, [*_unit(2, k), *made[k], *rest]) for k, error in enumerate(errors)]
+    columns = [(error, [Fraction(k == 0), Fraction(k == 1), *made[k], *rest]) for k, error in enumerate(errors)]
     columns += [(off, [Fraction(0), Fraction(0), *made[k], *rest]) for k, off in enumerate(noise)]
     return tuple(tuple(bound * v for v in column) for bound, column in columns if bound and any(column))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Path:
-    """Path of the pressure from a law with a number of states to the fault, with the indices of its states."""
+class _Times:
+    """Times of the path of the pressure [s], and whether the last step of the valve is needed."""
 
-    own: int
     step: Fraction
     delay: Fraction
     lag: Fraction
     diffusion: Fraction
-    watched: bool
+    watched: bool = False
 
     def __post_init__(self) -> None:
         step, delay, lag, diffusion = self.step, self.delay, self.lag, self.diffusion
@@ -192,128 +167,90 @@ class _Path:
                 f"L^2/D = {shortly(diffusion)} s with one of them. Omit diffusion, or jitter, averaging and rate limit."
             )
 
-    @property
-    def part(self) -> Fraction:
-        """Time from a sample to the arrival of a pressure [s]; 0 if it arrives with a sample."""
-        return self.delay % self.step
 
-    @property
-    def waiting(self) -> int:
-        """Number of pressures in the delay line."""
-        return int(self.delay // self.step) + (1 if self.part else 0)
+def _connected(
+    law: LinearLaw,
+    authority: Fraction,
+    times: _Times,
+    *,
+    rates: dict[str, Signal],
+    signals: dict[str, Signal],
+    inputs: dict[str, Signal],
+    outputs: dict[str, str],
+    of_left_out: Signal,
+    noisy: Collection[str],
+) -> tuple[Interconnection, PeriodicLoop]:
+    """Loop of a law, the path of its pressure, and a plant with the states e1 and e2 that ``push`` acts on.
 
-    @property
-    def valve(self) -> int:
-        """Index of the pressure at the valve."""
-        return 2 + self.own + self.waiting
-
-    @property
-    def behind(self) -> tuple[str, ...]:
-        """States behind the valve: the well, the modes of a layer, and the last step of the valve if needed."""
-        layer = [f"layer{i}" for i in range(MODES)] * (self.diffusion > 0)
-        stepped = self.watched or (self.diffusion > 0 and not self.lag)
-        return (*["behind"] * (self.lag > 0), *layer, *["stepped"] * stepped)
-
-    @property
-    def size(self) -> int:
-        """Number of states."""
-        return self.valve + 1 + len(self.behind)
-
-    @property
-    def modes(self) -> dict[int, int]:
-        """Indices of the modes of the layer, with their numbers."""
-        first = self.valve + (2 if self.lag else 1)
-        return {first + i: i for i in range(MODES if self.diffusion else 0)}
-
-
-def _unit(n: int, place: int) -> Row:
-    return tuple(Fraction(i == place) for i in range(n))
-
-
-def _drift(law: LinearLaw, authority: Fraction, path: _Path) -> Row:
-    """Effect of a change of p* on the states, which are relative to those at which the law commands p*."""
+    `rates` and `signals` are those of the plant, `of_left_out` is the input of what the modes of a layer leave out; the
+    ``drift`` is added to the inputs.
+    """
+    step, lag, layer, part = times.step, times.lag, Layer(time=times.diffusion), times.delay % times.step
+    # the law
+    own, measured = tuple(f"law {i}" for i in range(len(law.states))), ("slip", "slip_rate", "implicit")
+    made = zip((*law.measured, law.feedback), (*law.update, law.output), strict=True)
+    *updates, output = (dict(zip((*measured[: len(fed)], *own), (*fed, *now), strict=True)) for fed, now in made)
+    for signal, (_, moved) in zip((*updates, output), law.of_reference, strict=False):
+        signal["reference_rate"] = moved
+    # the path: delay line, valve, well, layer, and the last step of the valve
+    line = tuple(f"waiting{i}" for i in range(int(times.delay // step) + (part > 0)))
+    well: Signal = {"behind": 1 / lag} if lag else {}
+    modes = {f"layer{i}": i for i in range(MODES if times.diffusion else 0)}
+    stepped = times.watched or (modes and not lag)
+    pressures = (*line, "valve", *well, *modes, *["stepped"] * bool(stepped))
+    system = Interconnection(
+        ("e1", "e2", *own, *pressures),
+        {
+            "slip": {"e1": _ONE, "slip_noise": _ONE},
+            "slip_rate": {"e2": _ONE, "rate_noise": _ONE},
+            "implicit": {} if law.root is None else {"slip": -law.root.middle / step, "root": _ONE},
+            "asked": {name: authority * v for name, v in output.items()},
+            "push": {"valve": _ONE}
+            | ({"behind": _ONE} if lag else {})
+            | {name: layer.share(n) for name, n in modes.items()},
+            **signals,
+        },
+    )
+    sample = dict(zip((*own, *line), (*updates, *({name: _ONE} for name in ("asked", *line))), strict=False))
+    newest = ("asked", *line)[-1]
+    arrival = {"valve": {newest: _ONE}, "stepped": {newest: _ONE, "valve": -_ONE}}
+    arrival |= {name: {name: _ONE, newest: -_ONE, "valve": _ONE} for name in well or modes}
+    events = [(sample, part), (arrival, step - part)] if part else [(sample | arrival, step)]
+    flow = {**rates, "behind": {name: -v for name, v in well.items()}}
+    flow |= {name: {name: -layer.rate(n), **well} for name, n in modes.items()}
+    # states are relative to those at which the law commands p*, at the reference
     still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
-    steady = steady_states(still, law.output, (Fraction(0),) * path.own, Fraction(1))
-    zero, pressures = Fraction(0), [Fraction(-1)] * (path.waiting + 1)
-    return (zero, zero, *(-v / authority for v in steady), *pressures, *[zero] * len(path.behind))
-
-
-def _reference_drift(law: LinearLaw, path: _Path) -> Row:
-    """Effect of a change of r on the states, which are relative to those at which the law commands p* at r."""
-    still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
-    rates = tuple(-row[0] for row in law.of_reference[:-1])
-    moved = steady_states(still, law.output, rates, -law.of_reference[-1][0])
-    zero = Fraction(0)
-    return (zero, zero, *(-v for v in moved), *[zero] * (path.size - 2 - path.own))
-
-
-def _push(path: _Path) -> Row:
-    """Pressure in the fault as a row of the states."""
-    push = [Fraction(i == path.valve or (i == path.valve + 1 and path.lag > 0)) for i in range(path.size)]
-    for place, number in path.modes.items():
-        push[place] = Layer(time=path.diffusion).share(number)
-    return tuple(push)
-
-
-def _flow(path: _Path, push: Row, model: NominalModel, gain: Fraction) -> Matrix:
-    rows = [[Fraction(0)] * path.size for _ in range(path.size)]
-    rows[0][1] = Fraction(1)
-    rows[1] = [gain * v for v in push]
-    rows[1][:2] = model.slip, -model.rate
-    well = path.valve + 1
-    if path.lag:
-        rows[well][well] = -1 / path.lag
-    for place, number in path.modes.items():
-        rows[place][place] = -Layer(time=path.diffusion).rate(number)
-        if path.lag:
-            rows[place][well] = 1 / path.lag
-    return tuple(map(tuple, rows))
-
-
-def _left_out(path: _Path) -> tuple[dict[str, Row], dict[str, Fading]]:
-    """Output that bounds the truncation error of the modes of a layer, and its decay after a step of the well."""
-    if not path.diffusion:
-        return {}, {}
-    n, layer = path.size, Layer(time=path.diffusion)
-    if path.lag:
-        size = layer.left_out_in_all / path.lag
-        return {"left_out": tuple(size * v for v in _unit(n, path.valve + 1))}, {}
-    height, rate, floor = layer.left_out(path.step)
-    most, first = height + floor, int(path.part > 0)
-    fading = Fading(entry=_unit(n, 1), first=first, height=height / most, rate=rate, floor=floor / most)
-    return {"left_out": tuple(most * v for v in _unit(n, n - 1))}, {"left_out": fading}
-
-
-def _events(law: LinearLaw, authority: Fraction, path: _Path) -> tuple[Matrix, Matrix]:
-    """Jump of a sample, with further columns for w and r′, and of a pressure that arrives between samples, if any."""
-    n, valve, first, zero = path.size, path.valve, 2 + path.own, Fraction(0)
-    jump = [list(_unit(n + 2, i)) for i in range(n)]
-    commanded = [zero] * (n + 2)
-    commanded[0], commanded[1] = (authority * v for v in law.feedback[:2])
-    commanded[n] = authority * sum(law.feedback[2:], zero)
-    *moved, commanded[n + 1] = [row[1] for row in law.of_reference] or [zero] * (path.own + 1)
-    commanded[n + 1] *= authority
-    for i, fed, update, r_rate in zip(range(2, first), law.measured, law.update, moved, strict=True):
-        jump[i] = [*fed[:2], *update, *[zero] * (n - first), sum(fed[2:], zero), r_rate]
-        commanded[i] = authority * law.output[i - 2]
-    line = [*range(first, valve), *([] if path.part else [valve])]
-    for place, before in zip(reversed(line), [*reversed(line[:-1]), None], strict=True):
-        jump[place] = commanded if before is None else list(_unit(n + 2, before))
-    arrival = [list(_unit(n, valve - 1 if i == valve else i)) for i in range(n)]
-    if path.part:
-        return tuple(map(tuple, jump)), _stepped(arrival, path)
-    return _stepped(jump, path), ()
-
-
-def _stepped(jump: list[list[Fraction]], path: _Path) -> Matrix:
-    """Leave the states behind the valve unchanged while its pressure jumps, and store its step."""
-    step = [v - (j == path.valve) for j, v in enumerate(jump[path.valve])]
-    for place, name in enumerate(path.behind, path.valve + 1):
-        if name == "stepped":
-            jump[place] = step
-        elif name == "behind" or not path.lag:
-            jump[place] = [v - w for v, w in zip(jump[place], step, strict=True)]
-    return tuple(map(tuple, jump))
+    steady = steady_states(still, law.output, (Fraction(0),) * len(own), _ONE)
+    drift = {name: -v / authority for name, v in zip(own, steady, strict=True)}
+    inputs = {**inputs, "drift": drift | dict.fromkeys((*line, "valve"), -_ONE)}
+    if law.of_reference:
+        *turned, fed = (-row[0] for row in law.of_reference)
+        steady = steady_states(still, law.output, tuple(turned), fed)
+        inputs.setdefault("reference", {name: -v for name, v in zip(own, steady, strict=True)})
+    sampled = (*["root"] * (law.root is not None), *["reference_rate"] * bool(law.of_reference))
+    left_out, fading = dict[str, Signal](), dict[str, Fading]()
+    if modes and lag:
+        left_out["left_out"] = {"behind": layer.left_out_in_all / lag}
+    elif modes:
+        height, rate, floor = layer.left_out(step)
+        most, entry = height + floor, system.column(of_left_out)
+        left_out["left_out"] = {"stepped": most}
+        fading["left_out"] = Fading(
+            entry=entry, first=int(part > 0), height=height / most, rate=rate, floor=floor / most
+        )
+    ends, past_ends = (BENT, HALVES) if modes else (BENT if lag else EVEN, EVEN)
+    jumps = ((system.jump(changed), time) for changed, time in events)
+    return system, PeriodicLoop(
+        states=("e1", "e2", *law.states, *pressures),
+        flow=system.flow(flow),
+        segments=tuple(Segment(jump=jump, duration=time, ends=ends, past_ends=past_ends) for jump, time in jumps),
+        inputs={name: system.column(entries) for name, entries in inputs.items()},
+        outputs={name: system.row(left_out.get(signal, {signal: _ONE})) for name, signal in outputs.items()},
+        sampled={
+            name: system.entry(events[0][0], name) for name in (*sampled, *(name for name in NOISES if name in noisy))
+        },
+        fading=fading,
+    )
 
 
 # ----------------------------------------------------------------------
@@ -406,31 +343,28 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
     ParameterError
         For a law that leaves an error under a constant p*, or that feeds the reference forward without two integrals.
     """
-    zero, one, n = Fraction(0), Fraction(1), 2 + len(law.states)
-    push = tuple(authority * v for v in (*law.feedback, *law.output))
-    plant = (model.slip, -model.rate, *[zero] * len(law.states))
-    pushed = tuple(v + model.gain / authority * p for v, p in zip(plant, push, strict=True))
-    own = tuple((*fed, *rates) for fed, rates in zip(law.measured, law.rates, strict=True))
-    still = (zero,) * len(law.states)
-    steady = steady_states(law.rates, law.output, still, one)
+    still = (Fraction(0),) * len(law.states)
+    steady = steady_states(law.rates, law.output, still, _ONE)
+    own = tuple(f"law {i}" for i in range(len(law.states)))
+    made = (law.feedback, *law.measured), (law.output, *law.rates)
+    push, *moved = (dict(zip(("e1", "e2", *own), (*fed, *row), strict=True)) for fed, row in zip(*made, strict=True))
+    system = Interconnection(("e1", "e2", *own), {"push": {name: authority * v for name, v in push.items()}})
+    plant = {"e1": model.slip, "e2": -model.rate, "push": model.gain / authority}
     inputs = {
-        "acceleration": tuple(Fraction(i == 1) for i in range(n)),
-        "drift": (zero, zero, *(-v / authority for v in steady)),
+        "acceleration": {"e2": _ONE},
+        "drift": {name: -v / authority for name, v in zip(own, steady, strict=True)},
     }
     for name, fed in zip(("reference_acceleration", "reference_jerk"), law.of_reference, strict=True):
         if fed:
-            moving = steady_states(law.rates, law.output, steady, zero)
-            inputs[name] = (zero, zero, *(fed * v for v in moving))
+            moving = steady_states(law.rates, law.output, steady, Fraction(0))
+            inputs[name] = {state: fed * v for state, v in zip(own, moving, strict=True)}
+    outputs = {"slip_error": "e1", "slip_rate_error": "e2", "push": "push"}
     return PeriodicLoop(
         states=("e1", "e2", *law.states),
-        flow=((zero, one, *[zero] * len(law.states)), pushed, *own),
+        flow=system.flow({"e1": {"e2": _ONE}, "e2": plant, **dict(zip(own, moved, strict=True))}),
         segments=(),
-        inputs=inputs,
-        outputs={
-            "slip_error": tuple(Fraction(i == 0) for i in range(n)),
-            "slip_rate_error": tuple(Fraction(i == 1) for i in range(n)),
-            "push": push,
-        },
+        inputs={name: system.column(entries) for name, entries in inputs.items()},
+        outputs={name: system.row({signal: _ONE}) for name, signal in outputs.items()},
     )
 
 
@@ -438,7 +372,6 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
 # Sampled linear law about slow sliding of a fault with rate-and-state friction, without inertia.
 
 StateLaw = Literal["ageing", "slip"]
-_ONE = Fraction(1)
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -514,44 +447,32 @@ def sliding_loop(
     ParameterError
         As `held_loop`.
     """
-    plain = NominalModel(slip=Fraction(0), rate=Fraction(0), gain=_ONE)
-    loop = held_loop(law, plain, _ONE, step, delay=delay, lag=lag, diffusion=diffusion, noisy=noisy)
-    size = len(loop.states)
-    push = loop.outputs["push"]
-    y = [model.coefficient * v / model.strength for v in push]
-    y[0] -= model.stiffness / model.strength
-    y[1] -= model.weakening / model.strength
-    z = unit_row(size, {1: _ONE})
-    ageing = tuple(model.evolution_slope * a + model.state_slope * b for a, b in zip(y, z, strict=True))
-    moving = model.rate * model.slope
-    flow = (tuple(moving * v for v in y), tuple(-model.state_rate * v for v in ageing), *loop.flow[2:])
-    aged = model.state_rate * model.evolution_slope
-    by_stress = unit_row(size, {0: moving / model.strength, 1: -aged / model.strength})
-    by_rate = {0: model.rate} | ({1: -model.state_rate} if model.state_law == "ageing" else {})
-    by_pressure = tuple(model.coefficient * v for v in by_stress)
-    left_out = {"left_out": row} if (row := loop.outputs.get("left_out")) else {}
-    return replace(
-        loop,
-        flow=flow,
+    moving, aged = model.rate * model.slope, model.state_rate * model.evolution_slope
+    stress = {"e1": moving / model.strength, "e2": -aged / model.strength}
+    balance = {"push": model.coefficient, "e1": -model.stiffness, "e2": -model.weakening}
+    names = ("log_rate", "ageing", "strength", "push")
+    outputs = {"slip_error": "e1", "log_rate": "log_rate", "log_state": "e2", **{name: name for name in names[1:]}}
+    return _connected(
+        law,
+        _ONE,
+        _Times(step=step, delay=delay, lag=lag, diffusion=diffusion),
+        rates={"e1": {"log_rate": moving}, "e2": {"ageing": -model.state_rate}},
+        signals={
+            "log_rate": {name: v / model.strength for name, v in balance.items()},
+            "ageing": {"log_rate": model.evolution_slope, "e2": model.state_slope},
+            "strength": {"log_rate": model.direct, "e2": model.evolution},
+        },
         inputs={
-            "stress": by_stress,
-            "rate": unit_row(size, by_rate),
-            "state": unit_row(size, {1: -model.state_rate}),
-            "drift": loop.inputs["drift"],
-            "reference": unit_row(size, {0: -model.rate}),
+            "stress": stress,
+            "rate": {"e1": model.rate} | ({"e2": -model.state_rate} if model.state_law == "ageing" else {}),
+            "state": {"e2": -model.state_rate},
+            "drift": {},
+            "reference": {"e1": -model.rate},
         },
-        outputs={
-            "slip_error": unit_row(size, {0: _ONE}),
-            "log_rate": tuple(y),
-            "log_state": z,
-            "ageing": ageing,
-            "strength": tuple(model.direct * a + model.evolution * b for a, b in zip(y, z, strict=True)),
-            "push": push,
-            "asked": loop.outputs.get("asked", push),
-            **left_out,
-        },
-        fading={name: replace(fading, entry=by_pressure) for name, fading in loop.fading.items()},
-    )
+        outputs={**outputs, "asked": "valve"} | ({"left_out": "left_out"} if diffusion else {}),
+        of_left_out={name: model.coefficient * v for name, v in stress.items()},
+        noisy=noisy,
+    )[1]
 
 
 def at_once(model: SlidingModel) -> dict[tuple[str, str], Fraction]:

@@ -15,4 +15,4 @@ from .gains.synthesise import synthesise as synthesise
 from .maps.gain_map import gain_map as gain_map
 from .search.certify import certify as certify
 from .search.certify import largest_lipschitz as largest_lipschitz
-from .search.settling import settling as settling
+from .search.settling_time import settling as settling

@@ -1,8 +1,8 @@
+from .fault_plant import FaultPlant as FaultPlant
 from .of_fault import plant_like as plant_like
 from .of_fault import slow_sliding_plant as slow_sliding_plant
 from .of_fault import static_friction as static_friction
 from .of_fault import uncertain_plant as uncertain_plant
-from .ranges import FaultPlant as FaultPlant
 from .sliding_plant import WHOLE as WHOLE
 from .sliding_plant import Cuts as Cuts
 from .sliding_plant import SlidingPlant as SlidingPlant

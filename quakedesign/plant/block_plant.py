@@ -37,9 +37,9 @@ from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import BlockChain, Fault
 from quakedesign.fault.block_chain import add_springs
 from quakedesign.fault.units import exact_value
+from quakedesign.plant.fault_plant import FaultPlant, Range
 from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.plant_values import MOST, Matrix, Row, unit
-from quakedesign.plant.ranges import FaultPlant, Range
 from quakedesign.text import counted
 
 _STEEP = Fraction(10**9)  # of friction that may have any coefficient at once

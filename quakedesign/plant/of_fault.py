@@ -9,7 +9,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import fraction_of, rational
 from quakedesign.fault import Fault, SlidingReference
 from quakedesign.loop import StateLaw
-from quakedesign.plant.ranges import FaultPlant, Friction
+from quakedesign.plant.fault_plant import FaultPlant, Friction
 from quakedesign.plant.sliding_plant import AXES, SlidingPlant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 

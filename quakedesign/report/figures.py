@@ -30,7 +30,7 @@ from quakedesign.report.drawing import (
     style,
     with_diverged,
 )
-from quakedesign.studies.facts import Plane, StabilityRegions, stability_regions
+from quakedesign.studies.fault_facts import Plane, StabilityRegions, stability_regions
 from quakedesign.text import quantity
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from quakedesign.report.drawing import DEFAULT, drawn_once, figure_bytes, write_
 from quakedesign.report.page import CAPTIONS, page_html, reproduction, versions
 from quakedesign.report.paper_figures import PAPER
 from quakedesign.report.tables import csv_text
-from quakedesign.studies.facts import fault_dict
+from quakedesign.studies.fault_facts import fault_dict
 from quakedesign.studies.paper import printed, table
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational
 from quakedesign.files import whole_folder
 from quakedesign.guarantees import SlidingProof
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.report.drawing import NATURAL, figure, finish, write_figures, write_results
 from quakedesign.studies import Limits
 from quakedesign.studies.performance_limits import SlidingLimits

@@ -40,7 +40,7 @@ from quakedesign.report.sentences import (
 )
 from quakedesign.report.summary import SUMMARY_COLUMNS, summary, summary_cells
 from quakedesign.report.tables import COLUMNS, rows
-from quakedesign.studies.facts import fault_sentences, law_latex, plant_latex, stick_slip_latex
+from quakedesign.studies.fault_facts import fault_sentences, law_latex, plant_latex, stick_slip_latex
 from quakedesign.text import quantity, visible
 
 if TYPE_CHECKING:

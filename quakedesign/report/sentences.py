@@ -20,8 +20,8 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.premises import Premise, Variant
 from quakedesign.simulation import Trajectory
-from quakedesign.simulation.natural import waiting
-from quakedesign.simulation.run import STICK_SLIP
+from quakedesign.simulation.earthquake import waiting
+from quakedesign.simulation.run_settings import STICK_SLIP
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, Entry, pressure_extremes, shortfall
 from quakedesign.synthesis import Design
 from quakedesign.text import lasting, quantity

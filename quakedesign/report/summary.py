@@ -11,7 +11,7 @@ from quakedesign.exact import Bound, UpperBound
 from quakedesign.fault.fault_toml import beyond_rates, mean_rate
 from quakedesign.report.sentences import cycle_sentences, grade, left_out_lines
 from quakedesign.studies.comparison import pressure_extremes
-from quakedesign.studies.facts import box_sentences
+from quakedesign.studies.fault_facts import box_sentences
 from quakedesign.text import PREFIXES, plain, power_of, quantity
 
 if TYPE_CHECKING:

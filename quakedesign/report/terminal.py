@@ -22,7 +22,7 @@ from quakedesign.report.sentences import (
 )
 from quakedesign.report.summary import summary, summary_lines
 from quakedesign.report.tables import COLUMNS, rows
-from quakedesign.studies.facts import fault_sentences
+from quakedesign.studies.fault_facts import fault_sentences
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault

@@ -11,7 +11,7 @@ from flint import ctx
 
 from quakedesign.errors import UnsupportedError
 from quakedesign.exact import fraction_of
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import (
     BALLS,
     BITS,

@@ -8,7 +8,7 @@ from typing import Any, cast
 from quakedesign.errors import OutputError, UnsupportedError
 from quakedesign.files import made_folder, sole_writer, write_whole
 from quakedesign.guarantees.exact.guarantee_files import read_guarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 from quakedesign.lyapunov.exact.certificate_files import (
     ATTRACTION,
     POLYNOMIAL,

@@ -7,7 +7,7 @@ from .coupled_sliders import CoupledSliders as CoupledSliders
 from .coupled_sliders import natural_cycles as natural_cycles
 from .coupled_sliders import simulate_held_blocks as simulate_held_blocks
 from .coupled_sliders import simulate_sliders as simulate_sliders
-from .cycle import StateTrajectory as StateTrajectory
+from .earthquake import natural_earthquake as natural_earthquake
 from .export import ControllerStep as ControllerStep
 from .export import block_step as block_step
 from .export import controller_step as controller_step
@@ -25,9 +25,9 @@ from .interop import loop_transfer as loop_transfer
 from .interop import to_casadi as to_casadi
 from .interop import to_iosystem as to_iosystem
 from .interop import to_statespace as to_statespace
-from .natural import natural_earthquake as natural_earthquake
 from .recorder import ActuatorMetrics as ActuatorMetrics
 from .recorder import Metrics as Metrics
+from .seismic_cycle import StateTrajectory as StateTrajectory
 from .sensitivity import Study as Study
 from .sensitivity import accuracy as accuracy
 from .sensitivity import gain_sensitivity as gain_sensitivity

@@ -27,7 +27,7 @@ from quakedesign.fault.model import magnitude, require_positive
 from quakedesign.plant.block_plant import measured_by
 from quakedesign.simulation.block_run import MPA
 from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
-from quakedesign.simulation.smooth import Ramp, SmoothProblem
+from quakedesign.simulation.smooth_integration import Ramp, SmoothProblem
 from quakedesign.simulation.state_plant import TIDE, slip
 from quakedesign.simulation.stick_slip import direct_strength
 from quakedesign.symbolic.casadi_printer import to_casadi

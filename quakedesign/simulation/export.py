@@ -30,7 +30,7 @@ from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.compiled import c_file, compiler, expanded, shared_library
 from quakedesign.simulation.coupled_sliders import planned_per_slip
 from quakedesign.simulation.integrators import integrator
-from quakedesign.simulation.run import library_versions
+from quakedesign.simulation.run_settings import library_versions
 
 # ----------------------------------------------------------------------
 # A sampled step of a controller, and the text of its C files.

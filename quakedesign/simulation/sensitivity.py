@@ -13,7 +13,7 @@ from quakedesign.fault import Fault
 from quakedesign.laws import Controller
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.closed_loop import Variation
-from quakedesign.simulation.run import PRINTED
+from quakedesign.simulation.run_settings import PRINTED
 from quakedesign.simulation.simulate import simulate
 
 if TYPE_CHECKING:

@@ -15,10 +15,18 @@ from quakedesign.loop import Actuator, Scheme
 from quakedesign.loop.schemes import own_way
 from quakedesign.loop.sensing import Sensor, Transducer
 from quakedesign.simulation.closed_loop import Load, Variation
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator, require_tolerance
-from quakedesign.simulation.natural import natural_peak
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import RunSetting, by_no_clock, loop_class, own_path, run, run_adaptive, sampled_scheme
+from quakedesign.simulation.run_settings import (
+    RunSetting,
+    by_no_clock,
+    loop_class,
+    own_path,
+    run,
+    run_adaptive,
+    sampled_scheme,
+)
 from quakedesign.simulation.slow_sliding import PLANTS, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.stick_slip import disturbed, simulate_state

@@ -19,7 +19,7 @@ from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.sensing import Transducer
 from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
 from quakedesign.simulation.recorder import NEVER, metrics
-from quakedesign.simulation.run import RunSetting, library_versions
+from quakedesign.simulation.run_settings import RunSetting, library_versions
 from quakedesign.simulation.state_plant import Instruments, PressurePath, SlidingVariation, SpringSlider, Tide
 from quakedesign.simulation.stick_slip import dynamic_rate
 from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion, signal

@@ -16,11 +16,11 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.fault.model import require_positive
 from quakedesign.simulation.closed_loop import EnergyBudget
-from quakedesign.simulation.cycle import StateTrajectory
 from quakedesign.simulation.inputs import PressureCourse
 from quakedesign.simulation.recorder import Metrics
-from quakedesign.simulation.run import library_versions
-from quakedesign.simulation.smooth import Ramp, SmoothProblem, SmoothSolution
+from quakedesign.simulation.run_settings import library_versions
+from quakedesign.simulation.seismic_cycle import StateTrajectory
+from quakedesign.simulation.smooth_integration import Ramp, SmoothProblem, SmoothSolution
 from quakedesign.simulation.state_plant import SpringSlider
 from quakedesign.symbolic import derive
 

@@ -1,11 +1,11 @@
+from .block_adequacy import one_block as one_block
 from .block_limits import ChainLimits as ChainLimits
 from .block_limits import chain_limits as chain_limits
-from .blocks import one_block as one_block
 from .comparison import Entry as Entry
 from .paper import FrontPoint as FrontPoint
 from .paper import objective_front as objective_front
 from .performance_limits import Limit as Limit
 from .performance_limits import Limits as Limits
 from .performance_limits import limits as limits
-from .runs import natural_run as natural_run
 from .scaling import scale_answer as scale_answer
+from .single_runs import natural_run as natural_run

@@ -25,8 +25,8 @@ from quakedesign.lyapunov.search.certify import (
     proof,
 )
 from quakedesign.lyapunov.search.infeasibility import dual
-from quakedesign.lyapunov.search.search import candidate_degrees, refute
-from quakedesign.lyapunov.search.settling import Settling, fastest_settling
+from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees, refute
+from quakedesign.lyapunov.search.settling_time import Settling, fastest_settling
 from quakedesign.simulation import Trajectory, simulate
 from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.synthesis import Design

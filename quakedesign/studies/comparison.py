@@ -36,7 +36,7 @@ from quakedesign.parallel import Background, in_background
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.integrators import amplification
 from quakedesign.studies.certified import certified_bound, largest_sampling_time, on_trajectory
-from quakedesign.studies.runs import designed_run, natural_run
+from quakedesign.studies.single_runs import designed_run, natural_run
 from quakedesign.synthesis import Design, assess, designable, left_out
 from quakedesign.synthesis import design as synthesise
 

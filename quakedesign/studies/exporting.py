@@ -10,8 +10,8 @@ from quakedesign.loop.sensing import OutputFeedback
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.simulation import export_controller
 from quakedesign.simulation.export import FILES
-from quakedesign.simulation.run import sampled_scheme
-from quakedesign.studies.runs import differentiator_premise, sensor
+from quakedesign.simulation.run_settings import sampled_scheme
+from quakedesign.studies.single_runs import differentiator_premise, sensor
 
 
 def export_result(

@@ -32,12 +32,12 @@ from quakedesign.guarantees.exact.limit_theorems import (
     smallest_stick_slip_rate,
     smallest_withdrawal,
 )
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model
 from quakedesign.guarantees.sliding_result import guarantee_sliding
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Quantity
 from quakedesign.plant import FaultPlant, uncertain_plant
-from quakedesign.simulation.natural import natural_peak
+from quakedesign.simulation.earthquake import natural_peak
 
 # ----------------------------------------------------------------------
 # Limits of every controller as values, each beside what a designed one is proved to do.

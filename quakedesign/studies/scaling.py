@@ -9,7 +9,7 @@ from quakedesign.fault import Fault, load_fault
 from quakedesign.fault.similarity import TOLERANCE, GroupComparison, Radical, Scales, similarity
 from quakedesign.laws import Controller, control_law
 from quakedesign.laws import published as published_controllers
-from quakedesign.laws.dimensions import (
+from quakedesign.laws.gain_scaling import (
     UNROUNDED,
     CarriedGains,
     Form,
@@ -20,7 +20,7 @@ from quakedesign.laws.dimensions import (
     printed_gains,
 )
 from quakedesign.lyapunov.exact.fault_bounds import least_authority
-from quakedesign.studies.runs import choice
+from quakedesign.studies.single_runs import choice
 
 SCALED = {
     "slip": ("λ_δ", "slip_m"),

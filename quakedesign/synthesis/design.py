@@ -24,7 +24,7 @@ from quakedesign.guarantees import (
     StickSlipProof,
     TrackingProof,
 )
-from quakedesign.guarantees.search.defaults import REACH
+from quakedesign.guarantees.search.default_designs import REACH
 from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.laws import Controller, control_law, control_laws
 from quakedesign.laws.feed_forward import NONE, feed_forward

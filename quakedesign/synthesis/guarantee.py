@@ -22,7 +22,7 @@ from quakedesign.guarantees import (
     TrackingProof,
 )
 from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.search.linear_design import nearest_setup
 from quakedesign.guarantees.search.sliding_block_design import sliding_block_guarantee

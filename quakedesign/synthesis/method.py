@@ -27,8 +27,8 @@ from quakedesign.guarantees import (
     TrackingProof,
     best_guarantee,
 )
-from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.search.estimate import spectral_radius
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
+from quakedesign.guarantees.search.float_bounds import spectral_radius
 from quakedesign.guarantees.tracking_result import FACTOR, given_law_with_worst_case
 from quakedesign.laws import Controller, LinearLaw, SampledController, Signals, SlidingMode, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
@@ -40,7 +40,7 @@ from quakedesign.lyapunov import Certificate, Verdict, decided_once
 from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import sectors
 from quakedesign.lyapunov.exact.premises import Premise, Variant, linear_premises
-from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.plant import FaultPlant, uncertain_plant
 
 # ----------------------------------------------------------------------

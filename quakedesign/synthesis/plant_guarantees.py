@@ -7,8 +7,8 @@ import numpy as np
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational, shortly
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.plant_proof import PlantProof
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.search.block_design import block_law
 from quakedesign.guarantees.search.plant_search import escaping, plant_guarantee

@@ -19,7 +19,7 @@ from quakedesign.lyapunov.exact.fault_bounds import coefficient_range, least_aut
 from quakedesign.lyapunov.gains.path_following import look, scaled_norm, short, with_gains
 from quakedesign.lyapunov.gains.synthesise import ComparedGains, Synthesis, SynthesisProblem, question, synthesise
 from quakedesign.lyapunov.search.certify import Number
-from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.simulation import Metrics, simulate
 from quakedesign.synthesis.sliding_mode_design import required_lipschitz, smallest_root
 

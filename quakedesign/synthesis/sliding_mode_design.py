@@ -19,9 +19,9 @@ from quakedesign.guarantees import (
     sampled_sliding_mode,
     with_worst_case,
 )
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import GUARANTEED, design_sticking
-from quakedesign.guarantees.search.defaults import deadbeat, sliding_mode
+from quakedesign.guarantees.search.default_designs import deadbeat, sliding_mode
 from quakedesign.guarantees.search.linear_design import longest_step, nearest_setup
 from quakedesign.laws import BaseGains, Controller, SlidingMode
 from quakedesign.laws.feed_forward import NONE, FeedForward
@@ -30,7 +30,7 @@ from quakedesign.lyapunov import Certificate, Loop, loop_of
 from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.fault_bounds import Errors, coefficient_range, largest_matched_rate, least_authority
 from quakedesign.lyapunov.exact.premises import Premise, Variant, feedforward_variants, sliding_mode_premises
-from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
 from quakedesign.synthesis.state_feedback import may_stick, sticking_options

@@ -22,7 +22,7 @@ from quakedesign.guarantees import (
     with_worst_case,
 )
 from quakedesign.guarantees.exact.limit_theorems import hopeless
-from quakedesign.guarantees.exact.loop import ExactSetup, SampledLoop
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup, SampledLoop
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
@@ -40,7 +40,7 @@ from quakedesign.loop.loop_setup import MEASURED, LoopSetup
 from quakedesign.loop.sensing.differentiator import by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.fault_bounds import sectors
-from quakedesign.lyapunov.search.search import claims_of, find_certificate, finish, quadratic_margin
+from quakedesign.lyapunov.search.lyapunov_search import claims_of, find_certificate, finish, quadratic_margin
 from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, SlowSlidingDesign, Wanted, method_of
 from quakedesign.text import quantity

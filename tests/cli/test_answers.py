@@ -121,7 +121,7 @@ def test_a_fault_whose_earthquake_cannot_be_computed_has_its_guarantee_without(p
     def drowned(_):
         raise SimulationError("is unstable, but its simulation does not move")
 
-    monkeypatch.setattr("quakedesign.simulation.natural.natural_peak", drowned)
+    monkeypatch.setattr("quakedesign.simulation.earthquake.natural_peak", drowned)
     code, out, _ = prove([proof(True)], "real-fault")
     assert (code, out.splitlines()[0]) == (0, "real-fault: guaranteed: claim beside None m/s.")
 
@@ -286,7 +286,7 @@ def test_a_run_is_told_with_all_that_is_known_of_it(monkeypatch, full):
         events={"stick": 0.1},
         provenance={"scheme": "explicit"},
     )
-    monkeypatch.setattr("quakedesign.simulation.natural.waiting", lambda *_: named("waiting") if full else None)
+    monkeypatch.setattr("quakedesign.simulation.earthquake.waiting", lambda *_: named("waiting") if full else None)
     monkeypatch.setattr("quakedesign.studies.comparison.shortfall", lambda *_: "a shortfall")
     assert simulate_commands._values(run, None, [named("premise")]) == {
         "outcome": {"name": "outcome"},

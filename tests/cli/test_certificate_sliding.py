@@ -17,8 +17,8 @@ from quakedesign.loop.sensing import Transducer
 from quakedesign.lyapunov import Verdict
 from quakedesign.simulation.slow_sliding import simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, SlidingVariation, Tide
-from quakedesign.studies import runs as state_runs
-from quakedesign.studies.runs import run_sliding
+from quakedesign.studies import single_runs as state_runs
+from quakedesign.studies.single_runs import run_sliding
 
 FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-patch.json"
 CRUSTAL = qd.load_fault("crustal-patch")

@@ -21,6 +21,7 @@ from quakedesign.fault import load_fault
 from quakedesign.fault.fault_toml import source_text as load_text
 from quakedesign.guarantees import NoProof, SampledLoop, TrackingGuarantee, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.loop.loop_setup import LoopSetup
@@ -115,7 +116,9 @@ def test_given_gains_for_people(call):
 def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
     """A design one period late with larger gains, run on a fault at rest whatever it asks for: its own recursion."""
     fault, late = load_fault("real-fault"), F("0.184")
-    law = family_of(uncertain_plant(fault), late, "slip-and-rate", {"delay": late}).law(np.array((0.6, 1.0, 0.1)))
+    law = family_of(uncertain_plant(fault), late, "slip-and-rate", ExactSetup(delay=late)).law(
+        np.array((0.6, 1.0, 0.1))
+    )
     found = TrackingGuarantee(
         fault=fault, proof=guarantee(uncertain_plant(fault), SampledLoop(law=law, step=late, delay=late))
     )

@@ -13,7 +13,7 @@ from quakedesign.fault import friction_law, load_fault
 from quakedesign.fault.fault_toml import fault_toml
 from quakedesign.guarantees import NoProof, SampledLoop, SlidingClaims, SlidingProof, sliding_result
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
 from quakedesign.laws import LinearLaw
 from quakedesign.loop.loop_setup import Pump

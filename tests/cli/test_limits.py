@@ -11,7 +11,7 @@ from quakedesign.cli import main
 from quakedesign.fault import fault_toml, load_fault
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.studies import performance_limits as impossible_and_proved

@@ -102,7 +102,7 @@ def test_friction_with_a_state_has_no_other_plant_and_nothing_is_done(capsys, tm
     ],
 )
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(capsys, tmp_path, monkeypatch, arguments):
-    search = "quakedesign.lyapunov.search.search"
+    search = "quakedesign.lyapunov.search.lyapunov_search"
     for module in ("quakedesign.simulation.simulate", search, "quakedesign.lyapunov.maps.gain_map"):
         __import__(module)
     monkeypatch.setattr(f"{search}.find_certificate", lambda *_, **__: pytest.fail("searched"))

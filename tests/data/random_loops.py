@@ -8,6 +8,7 @@ from scipy.linalg import LinAlgError
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import SampledLoop, SlowGain
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import summed_integrals
 from quakedesign.plant import FaultPlant, uncertain_plant
@@ -68,7 +69,7 @@ def random_loop(number: int) -> tuple[FaultPlant, SampledLoop, SlowGain | None] 
             gains = shares / period ** np.array([2, 1, 3, 2]) / float(task.model.gain)
             law = summed_integrals(tuple(map(short, gains)), step)
         else:
-            family = family_of(task, step, measured, around)
+            family = family_of(task, step, measured, ExactSetup(**around))
             start = np.array(family.starts[random.integers(0, len(family.starts))])
             law = family.law(start + 0.1 * np.abs(start) * random.normal(size=len(start)))
     except LinAlgError:  # of a Riccati equation

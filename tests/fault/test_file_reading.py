@@ -297,7 +297,7 @@ def test_a_preset_is_found_again_by_its_nearest_name():
 @pytest.mark.parametrize(("target", "said"), [("785 mm", ""), ("1569 mm", "2 times the rest slip")])
 def test_a_target_beyond_the_rest_slip_is_said(target, said):
     # the preset comes to rest at 784.6 mm; its target is the paper's rounded 785 mm
-    from quakedesign.studies.facts import fault_sentences
+    from quakedesign.studies.fault_facts import fault_sentences
 
     told = " ".join(fault_sentences(parse_fault(edited("785 mm", target), "own.toml")))
     assert "the uncontrolled earthquake slips 0.7846 m (next rest slip)" in told

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.fault.model import magnitude as magnitude_of
-from quakedesign.studies.facts import fault_dict, fault_sentences
+from quakedesign.studies.fault_facts import fault_dict, fault_sentences
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 PLANT = ("density", "shear_modulus", "length", "damping", "effective_normal_stress")

@@ -10,8 +10,8 @@ import quakedesign as qd
 from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import NoProof, PlantGuarantee, TrackingProof
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof
-from quakedesign.guarantees.search.adversary import WorstCase
+from quakedesign.guarantees.exact.plant_proof import PlantProof
+from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.guarantees.stick_slip_result import StickSlipGuarantee
 from quakedesign.guarantees.tracking_result import TrackingGuarantee

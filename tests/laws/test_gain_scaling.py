@@ -16,7 +16,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.fault.similarity import Scales, radical, scaled_fault, similarity
 from quakedesign.laws import Controller, Signals, SlidingMode, control_laws, published
-from quakedesign.laws.dimensions import UNROUNDED, agrees, carry, exact, law_dimensions, printed_gains
+from quakedesign.laws.gain_scaling import UNROUNDED, agrees, carry, exact, law_dimensions, printed_gains
 from quakedesign.symbolic import SignedPower
 
 LAB, REAL = load_fault("lab-fault"), load_fault("real-fault")

@@ -14,7 +14,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import SampledLoop, guarantee
-from quakedesign.guarantees.search.adversary import _Limit, _searched, worst_tracking
+from quakedesign.guarantees.search.worst_case import _Limit, _searched, worst_tracking
 from quakedesign.laws import (
     ErrorModel,
     RestLimit,
@@ -25,7 +25,7 @@ from quakedesign.laws import (
     summed_integrals,
 )
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag
-from quakedesign.loop.layer import Layer
+from quakedesign.loop.diffusion_layer import Layer
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Variation, to_iosystem

@@ -15,7 +15,7 @@ from quakedesign.linear.riccati import riccati_design
 from quakedesign.linear.robust_stability import finished_exactly, robust_stability, sector_loop
 from quakedesign.linear.verdict import judge
 from quakedesign.lyapunov import Verdict
-from quakedesign.sos.exact import work
+from quakedesign.sos.exact import work_budget as work
 
 REAL = qd.load_fault("real-fault")
 

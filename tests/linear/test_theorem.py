@@ -14,7 +14,7 @@ from quakedesign.laws import control_law
 from quakedesign.linear import linear_problem as m
 from quakedesign.linear.linear_problem import decreases
 from quakedesign.lyapunov import Verdict, loop_of
-from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 
 EXAMPLES = {6: printed_bound_example(), 7: printed_row_example()}
 

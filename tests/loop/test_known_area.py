@@ -10,7 +10,7 @@ from scipy.special import erfc
 
 from quakedesign.laws import LinearLaw, NominalModel
 from quakedesign.loop import Layer, held_loop, with_response_area
-from quakedesign.loop.layer import MODES
+from quakedesign.loop.diffusion_layer import MODES
 
 TIME, STEP, AUTHORITY, GAIN = F(3, 2), F(1, 5), F(2), F(6, 5)
 LAYER = Layer(time=TIME)

@@ -11,7 +11,7 @@ from scipy.special import erfc
 from quakedesign.errors import ParameterError
 from quakedesign.laws import LinearLaw, NominalModel, summed_integrals
 from quakedesign.loop import Diffusion, Fading, Layer, held_loop
-from quakedesign.loop.layer import MODES
+from quakedesign.loop.diffusion_layer import MODES
 
 TIME = F(3, 2)
 LAYER = Layer(time=TIME)

@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.cli.options import SetupOptions
 from quakedesign.errors import ParameterError, UnitError
-from quakedesign.guarantees.exact.loop import ExactSetup, SampledLoop
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup, SampledLoop
 from quakedesign.laws import summed_integrals
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Pump, quantities
 

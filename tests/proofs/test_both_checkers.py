@@ -13,7 +13,8 @@ from quakedesign.lyapunov.exact import certificate as checking
 from quakedesign.lyapunov.exact import certificate_files as term_files
 from quakedesign.lyapunov.exact.certificate_files import read_json
 from quakedesign.sos.exact import polynomial_files as files
-from quakedesign.sos.exact import reduction, strict, work
+from quakedesign.sos.exact import reduction, strict
+from quakedesign.sos.exact import work_budget as work
 from quakedesign.sos.exact.polynomial_files import load
 from quakedesign.sos.exact.proofs import SumOfSquares, holds
 

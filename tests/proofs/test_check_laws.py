@@ -11,7 +11,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.lyapunov import certificate_text, load_certificate
-from quakedesign.lyapunov.search.search import balance, with_largest_decay
+from quakedesign.lyapunov.search.lyapunov_search import balance, with_largest_decay
 
 PATH = Path(__file__).parents[2] / "proofs" / "check.py"
 SPECIFICATION = importlib.util.spec_from_file_location("laws_check", PATH)

@@ -14,7 +14,7 @@ from quakedesign.guarantees import SampledLoop, SlowGain, TrackingProof, guarant
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.small_gain import grown
-from quakedesign.guarantees.search.estimate import gains_of
+from quakedesign.guarantees.search.float_bounds import gains_of
 from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant

@@ -6,7 +6,7 @@ from random import Random
 
 import numpy as np
 import pytest
-from flint import arb, ctx
+from flint import arb_mat, ctx
 from mpmath import mp
 from scipy.linalg import expm
 from standalone_guarantee import checker
@@ -564,7 +564,7 @@ def test_sums_that_bound_themselves_are_solved_for():
     """x = 10 + x/2 and y = 6 + x/4 + y/4096: 20 and 11·4096/4095."""
     left = [[F(1, 2), F(0)], [F(1, 4), F(1, 4096)]]
     theirs = checker.whole_sums(checker.Fixed([[int(v * UNIT) for v in row] for row in left]), [10 << 50, 6 << 50], 0)
-    ours = package._whole(ball_matrices.matrix(left), [arb(10), arb(6)]).entries()
+    ours = package._whole(ball_matrices.matrix(left), arb_mat([[10], [6]])).entries()
     found = [[F(v, 1 << 50) for (v,) in theirs.rows], [ball_matrices.upper(v) for v in ours]]
     for slow, quick in found:
         assert 20 <= slow < 20 + F(1, 1 << 27)
@@ -585,7 +585,7 @@ def test_sums_that_grow_beyond_themselves_are_refused(left, words):
     with pytest.raises(checker.Refused, match=words):
         checker.whole_sums(checker.Fixed([[v * UNIT for v in row] for row in left]), [1, 1], 0)
     with pytest.raises(ParameterError, match="not seen to be in 4096 periods"):
-        package._whole(ball_matrices.matrix(left), [arb(1), arb(1)])
+        package._whole(ball_matrices.matrix(left), arb_mat([[1], [1]]))
 
 
 @pytest.mark.parametrize("mode", [1, 2])

@@ -16,14 +16,14 @@ from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import Bounds, Claims, ContinuousProof, SampledLoop, TrackingProof
 from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.loop import channels_of
+from quakedesign.guarantees.exact.sampled_loop import channels_of
 from quakedesign.guarantees.exact.small_gain import bounds_from, certified_bounds
 from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, Power
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, Segment, exact_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.plant import FaultPlant
-from quakedesign.plant import ranges as package_task
-from quakedesign.plant.ranges import Friction
+from quakedesign.plant import fault_plant as package_task
+from quakedesign.plant.fault_plant import Friction
 
 SHAPES = [(0, 0, 3, -2), (0, 0, 0, 10, -15, 6), (0, 0, 0, 4, -3), (0, 0, 6, -8, 3)]
 OUTPUTS = ("slip_error", "slip_rate_error", "push")

@@ -9,7 +9,7 @@ from standalone_guarantee import CHECK, PATH, checker
 
 from quakedesign.errors import CertificateError
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, read_guarantee
-from quakedesign.plant import ranges as package_task
+from quakedesign.plant import fault_plant as package_task
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 HELD = {

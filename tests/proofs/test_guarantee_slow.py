@@ -16,7 +16,7 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, SampledLoop, SlowGain, TrackingProof, guarantee
-from quakedesign.guarantees.exact import statement
+from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import Bounds, grown, slow_gains
 from quakedesign.laws import ErrorModel, NominalModel, disturbance_estimate

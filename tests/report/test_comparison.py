@@ -38,7 +38,7 @@ def comparison(kept):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("quakedesign.studies.comparison.assess", undecided)  # verdicts on them are another test's
         for name in ("longest_step", "longest_delay"):  # and so is how far other designs go
-            patch.setattr(f"quakedesign.guarantees.search.defaults.{name}", lambda *_, **__: None)
+            patch.setattr(f"quakedesign.guarantees.search.default_designs.{name}", lambda *_, **__: None)
         yield qd.compare(fault, [qd.design(fault, "elqr")])
 
 

@@ -24,7 +24,7 @@ from quakedesign.report import page
 from quakedesign.report.drawing import FORMATS, figure, figure_bytes, inline_svg
 from quakedesign.report.page import ASKED, CAPTIONS, mathml, parameter_rows, reproduction, typeset, unit_html
 from quakedesign.report.paper_figures import PAPER
-from quakedesign.studies.facts import law_latex, plant_latex
+from quakedesign.studies.fault_facts import law_latex, plant_latex
 
 FAULT = qd.load_fault("real-fault")
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -179,7 +179,7 @@ def test_a_report_says_how_it_is_made_again(monkeypatch):
 
 
 def test_numbers_of_many_digits_become_decimals_and_no_others():
-    from quakedesign.studies.facts import _written
+    from quakedesign.studies.fault_facts import _written
 
     x = sp.Symbol("x", real=True)
     assert _written(sp.Rational(1, 3) * x) == r"\frac{x}{3}"

@@ -20,7 +20,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.report.figures import cycle, errors, overviews, slow_sliding
 from quakedesign.report.folder import write_folder
@@ -36,7 +36,7 @@ from quakedesign.report.summary import summary
 from quakedesign.report.terminal import print_comparison
 from quakedesign.simulation import simulate_state
 from quakedesign.studies import comparison as compared_in
-from quakedesign.studies import runs as state_runs
+from quakedesign.studies import single_runs as state_runs
 from quakedesign.synthesis import design, designable, left_out, state_feedback
 
 PROOF = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-patch.json"

@@ -9,7 +9,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.exact import UpperBound
-from quakedesign.guarantees.search.adversary import WorstCase
+from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.report.summary import Row, Summary, summary, summary_lines
 from quakedesign.simulation import Metrics
 from quakedesign.text import plain, power_of, quantity

@@ -22,7 +22,7 @@ STRESS = np.array([50e6, 45e6, 50e6])
 
 @cache
 def proved():
-    found = qd.guarantee(CHAIN)
+    found = qd.guarantee(CHAIN).proof
     assert found.proved
     return found
 

@@ -77,8 +77,8 @@ def test_a_held_pressure_relieves_friction_of_its_share():
     from quakedesign.loop import simulation_scheme
     from quakedesign.simulation import integrator
     from quakedesign.simulation.recorder import Recorder
-    from quakedesign.simulation.run import RunSetting as Setting
-    from quakedesign.simulation.run import loop_class, run
+    from quakedesign.simulation.run_settings import RunSetting as Setting
+    from quakedesign.simulation.run_settings import loop_class, run
     from quakedesign.simulation.trajectory import OutcomeCriterion
 
     pressure, half = 2e6, math.pi / FREQUENCY

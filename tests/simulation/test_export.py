@@ -41,7 +41,7 @@ from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import simulate
 from quakedesign.simulation.export import FILES, _comment, _remarks, _sizes, controller_step, export_controller
-from quakedesign.studies.runs import certified_choice
+from quakedesign.studies.single_runs import certified_choice
 
 LAB = load_fault("lab-fault")
 PUBLISHED = published("lab-fault")

@@ -9,7 +9,7 @@ from quakedesign import cache
 from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.simulation import compiled as backend
-from quakedesign.simulation import run as running
+from quakedesign.simulation import run_settings as running
 from quakedesign.simulation import simulate
 from quakedesign.simulation import stepping as kept_runs
 

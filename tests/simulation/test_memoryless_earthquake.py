@@ -6,8 +6,8 @@ from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.simulation import natural as memoryless_earthquake
 from quakedesign.simulation import natural_earthquake
+from quakedesign.simulation import natural_earthquake as memoryless_earthquake
 
 REAL = load_fault("real-fault")
 

@@ -13,10 +13,10 @@ from quakedesign.fault import Disturbance, load_fault
 from quakedesign.laws import LinearLaw, SampledController, control_law, published
 from quakedesign.report.sentences import outcome_sentence
 from quakedesign.simulation import Outcome, OutcomeCriterion, natural_earthquake, simulate
-from quakedesign.simulation import natural as memoryless_earthquake
+from quakedesign.simulation import natural_earthquake as memoryless_earthquake
 from quakedesign.simulation.campaign import SampleResult, campaign_problem
 from quakedesign.simulation.campaign.campaign_result import Campaign
-from quakedesign.simulation.natural import natural_peak
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.trajectory import KINDS
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from quakedesign.simulation.smooth import Ramp, SmoothProblem
+from quakedesign.simulation.smooth_integration import Ramp, SmoothProblem
 
 FAST = 1e-5
 

@@ -11,7 +11,7 @@ from quakedesign.simulation import integrator
 from quakedesign.simulation.closed_loop import WORKS, Meter, Variation
 from quakedesign.simulation.compiled import _source, expanded, verbatim
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import _step, loop_class
+from quakedesign.simulation.run_settings import _step, loop_class
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]

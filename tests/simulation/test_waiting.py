@@ -8,7 +8,7 @@ import pytest
 from quakedesign.fault import Disturbance, load_fault
 from quakedesign.report.sentences import run_sentences
 from quakedesign.simulation import simulate
-from quakedesign.simulation.natural import waiting
+from quakedesign.simulation.earthquake import waiting
 
 REAL = load_fault("real-fault")
 QUIET = REAL.with_disturbance(Disturbance())

@@ -16,15 +16,15 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees import NoProof, PlantGuarantee
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.simulation.coupled_sliders import BlockEvent
-from quakedesign.simulation.natural import natural_peak
-from quakedesign.studies import chains
+from quakedesign.simulation.earthquake import natural_peak
+from quakedesign.studies import several_blocks as chains
 
 PATH = Path(__file__).parents[1] / "data" / "three_blocks.toml"
 CHAIN = qd.load_chain(PATH)
@@ -84,7 +84,7 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
         def to_dict(self):
             return {"notes": list(self.notes)}
 
-    for place in ("synthesis", "studies.chains"):
+    for place in ("synthesis", "studies.several_blocks"):
         monkeypatch.setattr(f"quakedesign.{place}.guarantee", lambda *_, **__: SimpleNamespace(proof=Proved()))
     assert run("guarantee", PATH) == 0
     told = " ".join(capsys.readouterr().out.split())

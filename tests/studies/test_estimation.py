@@ -10,8 +10,8 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.loop.sensing import Measurement, joint_condition
 from quakedesign.loop.sensing.measurement import EXACT
-from quakedesign.studies import runs
-from quakedesign.studies.runs import differentiator_premise, largest_acceleration, sensor
+from quakedesign.studies import single_runs as runs
+from quakedesign.studies.single_runs import differentiator_premise, largest_acceleration, sensor
 
 LAB = load_fault("lab-fault")
 LAW = published("lab-fault")["cta"]

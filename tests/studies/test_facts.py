@@ -10,7 +10,7 @@ from thinned import few
 
 from quakedesign.fault import UncertaintyBox, load_fault
 from quakedesign.guarantees import load_guarantee
-from quakedesign.studies.facts import box_sentence, fault_sentences, stick_slip_latex
+from quakedesign.studies.fault_facts import box_sentence, fault_sentences, stick_slip_latex
 
 CERTIFICATES = Path(__file__).parents[2] / "proofs" / "certificates"
 REAL, PATCH = load_fault("real-fault"), load_fault("crustal-patch")

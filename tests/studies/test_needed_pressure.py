@@ -14,7 +14,7 @@ from quakedesign.loop import Actuator, Saturation
 from quakedesign.report.sentences import run_sentences
 from quakedesign.simulation import simulate
 from quakedesign.studies.comparison import needed_pressure, shortfall, ways
-from quakedesign.studies.facts import fault_dict, fault_sentences
+from quakedesign.studies.fault_facts import fault_dict, fault_sentences
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 UNDERSAMPLED = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")

@@ -17,7 +17,7 @@ from quakedesign.laws import summed_integrals
 from quakedesign.plant import uncertain_plant
 from quakedesign.report.limits_table import limits_figure, limits_lines
 from quakedesign.studies import limits as study
-from quakedesign.studies.facts import beyond_control
+from quakedesign.studies.fault_facts import beyond_control
 
 REAL = qd.load_fault("real-fault")
 LAW = summed_integrals((F(1), F(1), F(1), F(1)), F(1))

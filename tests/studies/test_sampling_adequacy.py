@@ -9,7 +9,7 @@ import pytest
 from thinned import few
 
 from quakedesign.fault import Disturbance, friction_law, load_fault
-from quakedesign.studies.facts import fault_sentences, sampling_adequacy, sampling_sentence
+from quakedesign.studies.fault_facts import fault_sentences, sampling_adequacy, sampling_sentence
 
 REAL, LAB = load_fault("real-fault"), load_fault("lab-fault")
 UNDERSAMPLED = load_fault(Path(__file__).parent.parent / "data" / "undersampled_fault.toml")

@@ -16,8 +16,8 @@ from quakedesign.loop import Actuator, Lag, simulation_scheme
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing import Measurement
 from quakedesign.simulation import Load, simulate
-from quakedesign.studies import runs as single
-from quakedesign.studies.runs import Choice, choice, run_single, sensor
+from quakedesign.studies import single_runs as single
+from quakedesign.studies.single_runs import Choice, choice, run_single, sensor
 
 LAB = load_fault("lab-fault")
 USUAL = {"step": None, "scheme": "continuous", "method": "dormand-prince", "plant": None, "substeps": 1}
@@ -51,7 +51,7 @@ def test_an_unknown_feed_forward_is_refused():
 def test_designed_gains_are_those_of_the_design(monkeypatch):
     from types import SimpleNamespace
 
-    from quakedesign.studies import runs as single
+    from quakedesign.studies import single_runs as single
 
     law = choice(LAB, "cta", BASE).controller
     for found in (law, None):
@@ -110,7 +110,7 @@ def test_without_a_certificate_the_premise_on_the_run_says_so():
 
 def test_a_certified_bound_goes_with_the_scale(monkeypatch):
     """λ multiplies what is certified for λ = 1."""
-    from quakedesign.studies import runs as single
+    from quakedesign.studies import single_runs as single
 
     law = choice(LAB, "cta", BASE).controller
     monkeypatch.setattr(single, "design", lambda fault, name, **_: law)

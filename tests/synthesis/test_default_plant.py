@@ -11,7 +11,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.guarantees import NoProof, StickSlipGuarantee, TrackingGuarantee, guarantee_of, load_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import compensated_search as COMPENSATED
 from quakedesign.guarantees.search.compensated_search import recovered, sorted_terms, sticking_loop
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip

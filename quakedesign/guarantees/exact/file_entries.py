@@ -10,7 +10,7 @@ from msgspec import Meta
 from msgspec.structs import astuple
 
 from quakedesign.laws.implicit_root import MOST_TERMS, ImplicitRoot, Power
-from quakedesign.plant.ranges import FaultPlant, Friction
+from quakedesign.plant.fault_plant import FaultPlant, Friction
 from quakedesign.sos.exact.strict import Entries, Name, made
 
 Pair = tuple[Fraction, Fraction]

@@ -30,11 +30,12 @@ from quakedesign.guarantees.exact.file_entries import (
     task_entries,
 )
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, require_fit
-from quakedesign.guarantees.exact.loop import SampledLoop
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof, plant_entries, read_plant_guarantee
+from quakedesign.guarantees.exact.plant_proof import PlantProof, plant_entries, read_plant_guarantee
+from quakedesign.guarantees.exact.sampled_loop import SampledLoop
+from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
-from quakedesign.guarantees.exact.statement import Claims, ContinuousProof, SlidingProof, TrackingProof
+from quakedesign.guarantees.exact.tracking_proof import Claims, ContinuousProof, TrackingProof
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import ContinuousLaw, StateLaw
 from quakedesign.loop.loop_setup import Pump
@@ -51,7 +52,7 @@ from quakedesign.sos.exact.strict import Entries, headed, made, need, parse, rea
 from quakedesign.text import shown
 
 if TYPE_CHECKING:
-    from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+    from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 
 Claim = Union[TrackingProof, ContinuousProof, SlidingProof, "StickSlipProof"]
 """What files about a fault claim."""

@@ -21,10 +21,10 @@ take for every row g at every end of a piece. For c = h_l·B on [T_s, T_m], and 
 most the larger of its ends and that. Integrals are trapezoidal sums, as in `norms`.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import pairwise
 from typing import Any
 
@@ -33,12 +33,12 @@ from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
-from quakedesign.guarantees.exact.loop import Channel, SampledLoop, channels_of
-from quakedesign.guarantees.exact.norms import absolute, ball, column, majorant, matrix, upper
+from quakedesign.guarantees.exact.norms import BALLS, Arithmetic, absolute, ball, beside, column, matrix, upper
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import Channel, SampledLoop, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds, unshifted
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 _BITS, _ZERO = 128, Fraction(0)
 SOONEST = 4  # pieces of the shortest interval, for integrals
@@ -157,15 +157,51 @@ def reached_bounds(task: FaultPlant, held: SampledLoop, reach: InvariantPolytope
 
 
 @dataclass(frozen=True)
-class _SampleMap:
-    """Map from sample to sample: A, B, C, H, output rows, and inputs with their bounds."""
+class BetweenSamples:
+    """Rows of the state and the inputs that flow (columns), from one sample to the next."""
 
+    by: Arithmetic
     flow: Any
+    inputs: Any
+    known: dict[Any, tuple[Any, Any]] = field(default_factory=dict)
+
+    def along(
+        self, rows: Any, ends: Sequence[Any], first: int, largest: Any, bounds: Iterable[Any]
+    ) -> Iterator[tuple[Any, Any, Any]]:
+        """At the ends from the first on: rows, what bounded inputs add, and how far the next piece may be above both.
+
+        `largest` is the largest state right after a sample, entry by entry; no piece follows the last end.
+        """
+        by, area, sizes = self.by, rows * (self.flow * 0) * largest, self.by.absolute(self.inputs)
+        for i, piece in enumerate(b - a for a, b in pairwise(ends)):
+            step, within = self._step(piece)
+            h, following, bent = by.number(piece), rows * step, by.absolute(rows * self.flow * self.flow) * within
+            if i >= first:
+                slope = by.scaled(by.absolute(rows * self.flow) * within * sizes, bounds)
+                yield rows, area, by.sums(by.beside([bent * largest, slope])) * h**2 / 8
+            heights = by.modulus(rows * self.inputs) + by.modulus(following * self.inputs)
+            area = area + by.sums(by.scaled(heights * h / 2 + bent * sizes * h**3 / 12, bounds))
+            rows = following
+        yield rows, area, area * 0
+
+    def _step(self, piece: Any) -> tuple[Any, Any]:
+        """e^{Ah} and an upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h."""
+        if piece not in self.known:
+            h = self.by.number(piece)
+            self.known[piece] = (self.flow * h).exp(), self.by.absolute((self.by.majorant(self.flow) * h).exp())
+        return self.known[piece]
+
+
+@dataclass(frozen=True)
+class _SampleMap:
+    """From one sample to the next: B, C, H, output rows, what flows, and what a sample adds, with their bounds."""
+
+    between: BetweenSamples
     seen: Any
     lift: Any
     facets: fmpq_mat
     rows: Any
-    inputs: list[tuple[Any, Any]]
+    bounds: list[Any]
     sampled: list[tuple[Any, Any]]
 
     @classmethod
@@ -174,12 +210,12 @@ class _SampleMap:
         seen, lift = reduced(loop.segments[0].jump)
         bounds = {channel.name: ball(bound) for channel, bound in zip(channels, reach.inputs, strict=True)}
         return cls(
-            flow=matrix(loop.flow),
+            between=BetweenSamples(BALLS, matrix(loop.flow), beside([column(v) for v in loop.inputs.values()])),
             seen=arb_mat(seen),
             lift=arb_mat(lift),
             facets=_exact(reach.facets),
             rows=matrix(tuple(loop.outputs.values())),
-            inputs=[(column(entry), bounds[name]) for name, entry in loop.inputs.items()],
+            bounds=[bounds[name] for name in loop.inputs],
             sampled=[(column(entry), bounds[name]) for name, entry in loop.sampled.items()],
         )
 
@@ -202,57 +238,27 @@ class _SampleMap:
 
     def _largest(self, row: Any, ends: list[Fraction], bases: tuple[Basis, ...]) -> Any:
         """Bound of |c·x(θ)| at every θ from the end on for which there is the first of the bases."""
-        first, area, largest, heights = len(ends) - len(bases), arb(0), arb(0), list[Any]()
-        for i, piece in enumerate(b - a for a, b in pairwise(ends)):
-            step, within = self._step(piece)
-            h, following, bent = ball(piece), row * step, absolute(row * self.flow * self.flow) * within
-            if i >= first:
-                heights.append(self._height(row, bases[i - first]) + area)
-            area += self._area(row, following, bent, h)
-            if i >= first:
-                last = self._height(following, bases[i + 1 - first]) + area
-                largest = largest.max(heights[-1].max(last) + self._bend(row, within, bent) * h**2 / 8)
-            row = following
-        return largest.abs_upper()
+        places = self.between.along(row, ends, len(ends) - len(bases), self._largest_state, self.bounds)
+        pieces = [
+            (self._height(now, basis) + area[0, 0], more[0, 0])
+            for (now, area, more), basis in zip(places, bases, strict=True)
+        ]
+        peaks = (a.max(b) + more for (a, more), (b, _) in pairwise(pieces))
+        return reduce(arb.max, peaks, arb(0)).abs_upper()
 
     def _height(self, row: Any, basis: Basis) -> Any:
         """Bound of |c·x| right after a sample."""
         size = _sum(absolute(row * self.lift * arb_mat(self._inverse(basis))))
         return sum((abs((row * entry)[0, 0]) * bound for entry, bound in self.sampled), size)
 
-    def _area(self, row: Any, following: Any, bent: Any, h: Any) -> Any:
-        """Bound of what the inputs of one piece bring."""
-        total = arb(0)
-        for entry, bound in self.inputs:
-            ends = abs((row * entry)[0, 0]) + abs((following * entry)[0, 0])
-            total += (ends * h / 2 + (bent * absolute(entry))[0, 0] * h**3 / 12) * bound
-        return total
-
-    def _bend(self, row: Any, within: Any, bent: Any) -> Any:
-        """Bound of the second derivative of f: state term, and slope of the input integrand."""
-        slope = absolute(row * self.flow) * within
-        total = (bent * self._largest_state)[0, 0]
-        return sum(((slope * absolute(entry))[0, 0] * bound for entry, bound in self.inputs), total)
-
     @cached_property
     def _largest_state(self) -> Any:
         """Right after a sample, entry by entry."""
         frame = absolute(arb_mat(self._inverse(tuple(range(self.facets.ncols())))))
-        total = absolute(self.lift) * arb_mat([[_sum(arb_mat([row]))] for row in frame.tolist()])
+        total = absolute(self.lift) * BALLS.sums(frame)
         for entry, bound in self.sampled:
             total += absolute(entry) * bound
         return total
-
-    @cached_property
-    def _steps(self) -> dict[Fraction, tuple[Any, Any]]:
-        return {}
-
-    def _step(self, piece: Fraction) -> tuple[Any, Any]:
-        """e^{Ah} and an upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h."""
-        if piece not in self._steps:
-            h = ball(piece)
-            self._steps[piece] = (self.flow * h).exp(), absolute((majorant(self.flow) * h).exp())
-        return self._steps[piece]
 
     def _inverse(self, basis: Basis) -> fmpq_mat:
         try:

@@ -19,7 +19,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, end_of
 from quakedesign.guarantees.exact.norms import ball, upper
 from quakedesign.loop import SlidingModel
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 # ----------------------------------------------------------------------
 # Performance limits of every controller for the linearised fault in slow sliding: two theorems, in ball arithmetic.

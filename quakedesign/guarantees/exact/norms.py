@@ -1,12 +1,13 @@
 """Upper bounds of L1 norms and free responses of periodic and continuous linear loops.
 
-All computation is in ball arithmetic, from rational matrices to rational upper bounds. Each chapter
-states and proves its bound: continuous loops, one segment of a periodic loop, separation of the slowest
-mode, free response, and periodic loops.
+A bound is computed in ball arithmetic, from rational matrices to rational numbers. Each chapter states and
+proves its bound: continuous loops, one segment of a periodic loop, separation of the slowest mode, free
+response, and periodic loops. The algorithms for periodic loops serve estimates of a search too, which hand
+in other numbers (`Arithmetic`).
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache, reduce
@@ -67,28 +68,103 @@ def upper(value: Any) -> Fraction:
     return end_of(value.upper())
 
 
+def above(parts: list[Any]) -> Any:
+    """Matrices one above the other."""
+    return arb_mat([row for part in parts for row in part.tolist()])
+
+
+def modulus(matrix: Any) -> Any:
+    """Absolute values, as balls."""
+    return arb_mat([[abs(v) for v in row] for row in matrix.tolist()])
+
+
+def larger(one: Any, other: Any) -> Any:
+    """The larger entries of two matrices."""
+    return arb_mat(one.nrows(), one.ncols(), [*map(arb.max, one.entries(), other.entries())])
+
+
+def row_sums(matrix: Any) -> Any:
+    """Sums of the absolute values of every row, in a column."""
+    return arb_mat([[sum(map(abs, row), arb(0))] for row in matrix.tolist()])
+
+
+def scaled(matrix: Any, weights: Iterable[Any]) -> Any:
+    """Columns times numbers."""
+    return arb_mat([[*map(mul, row, weights)] for row in matrix.tolist()])
+
+
+def grouped(matrix: Any, weights: list[Any]) -> Any:
+    """Weighted sums of groups of columns, as many as there are weights."""
+    rows, count = matrix.tolist(), len(weights)
+    groups = [[row[i : i + count] for i in range(0, len(row), count)] for row in rows]
+    return arb_mat([[sum(map(mul, group, weights), arb(0)) for group in line] for line in groups])
+
+
+def not_above(one: Any, other: Any) -> bool:
+    """Whether no entry is larger; those of `other` are bounds, not negative."""
+    return all(a == 0 or a <= b for a, b in zip(one.entries(), other.entries(), strict=True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlowestMode:
+    """Slowest mode of a loop by an estimate: left and right eigenvector, and what is left of it after 2^doublings."""
+
+    doublings: int
+    seen: Any
+    along: Any
+    left: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arithmetic:
+    """Numbers and matrices of an algorithm: balls, which prove, unless others are given, which estimate.
+
+    In both, `*` is the product of matrices, and matrices have the methods `exp`, `nrows` and `ncols` of `arb_mat`. An
+    estimate has no remainders and is given the slowest mode of Ψ.
+    """
+
+    slowest: Callable[[Any], SlowestMode] | None = None
+    number: Callable[[Fraction], Any] = ball
+    matrix: Callable[[tuple[tuple[Fraction, ...], ...]], Any] = matrix
+    column: Callable[[tuple[Fraction, ...]], Any] = column
+    identity: Callable[[int], Any] = identity
+    pieces: Callable[[Segment, bool], tuple[Any, ...]] = lambda segment, past: segment.pieces(past=past)
+    beside: Callable[[list[Any]], Any] = beside
+    above: Callable[[list[Any]], Any] = above
+    part: Callable[[Any, int, int], Any] = lambda whole, first, end: arb_mat(whole.tolist()[first:end])  # rows
+    majorant: Callable[[Any], Any] = majorant
+    absolute: Callable[[Any], Any] = absolute
+    modulus: Callable[[Any], Any] = modulus
+    larger: Callable[[Any, Any], Any] = larger
+    scaled: Callable[[Any, Any], Any] = scaled
+    sums: Callable[[Any], Any] = row_sums
+    grouped: Callable[[Any, list[Any]], Any] = grouped
+    highest: Callable[[Any], Any] = lambda whole: arb_mat([[reduce(arb.max, row)] for row in whole.tolist()])
+
+    @property
+    def proves(self) -> bool:
+        """Whether remainders are counted."""
+        return self.slowest is None
+
+
+BALLS = Arithmetic()
+
+
 # ----------------------------------------------------------------------
 # L1 norms of a loop in continuous time: how large an output can get under an input that is bounded by 1.
 #
-# **Statement.** Let x′ = Ax + b·w, x(0) = 0, and w be measurable with |w| ≤ W on [0, t]. Then |cx(t)| ≤ g·W with the
-# g
+# **Statement.** Let x′ = Ax + b·w, x(0) = 0, and w be measurable with |w| ≤ W on [0, t]. Then |cx(t)| ≤ g·W with the g
 # that `flow_norms` returns.
 #
 # **Proof.** |cx(t)| ≤ W·∫₀^∞|ce^{Aσ}b|dσ. Time is cut into stretches of 64 equal pieces, those of every stretch twice
-# as
-# long as those of the one before, so that fast and slow modes cost the same.
+# as long as those of the one before, so that fast and slow modes cost the same.
 #
-# - *A piece of length h from α on.* y(σ) = ce^{Aσ}b is within (σ − α)(α + h − σ)/2·max|y″| of its chord, so its part
-#   of
+# - *A piece of length h from α on.* y(σ) = ce^{Aσ}b is within (σ − α)(α + h − σ)/2·max|y″| of its chord, so its part of
 #   the integral is at most h(|y(α)| + |y(α + h)|)/2 + h³/12·max|y″|, and |y″| ≤ |c|·V·|A²e^{Aα}b| for every V ≥
-#   |e^{Aδ}|,
-#   0 ≤ δ ≤ h, entry by entry. V = e^{Mh} for the first pieces, M = |A| off the diagonal and max(A, 0) on it; if V
-#   serves
-#   h, then max(V, |e^{Ah}|V) serves 2h.
-# - *The rest.* Let S be the sums up to T for c and every unit column e_j in place of b, and S|e^{AT}| ≤ q·S with q <
-#   1.
-#   Sums over later spans of T are at most q·S, q²·S …, so ∫₀^∞|ce^{Aσ}e_j|dσ ≤ S_j/(1 − q), and what is left out for
-#   b
+#   |e^{Aδ}|, 0 ≤ δ ≤ h, entry by entry. V = e^{Mh} for the first pieces, M = |A| off the diagonal and max(A, 0) on it;
+#   if V serves h, then max(V, |e^{Ah}|V) serves 2h.
+# - *The rest.* Let S be the sums up to T for c and every unit column e_j in place of b, and S|e^{AT}| ≤ q·S with q < 1.
+#   Sums over later spans of T are at most q·S, q²·S …, so ∫₀^∞|ce^{Aσ}e_j|dσ ≤ S_j/(1 − q), and what is left out for b
 #   is at most S|e^{AT}b|/(1 − q). ∎
 
 _BITS = 256
@@ -142,7 +218,7 @@ def _sums(flow: Any, rows: Any, state: Any) -> tuple[Any, Any]:
             return sums, state
         if not all(v < _HUGE for v in absolute(state).entries()):
             break
-        within = _larger(within, absolute(step) * within)
+        within = larger(within, absolute(step) * within)
         step, piece = step * step, 2 * piece
     raise ParameterError(
         "the nominal loop must be stable. Received a loop whose stability is not proved. Change the gains."
@@ -153,37 +229,36 @@ def _columns(whole: Any, first: int, end: int) -> Any:
     return arb_mat([row[first:end] for row in whole.tolist()])
 
 
-def _larger(one: Any, other: Any) -> Any:
-    pairs = zip(one.entries(), other.entries(), strict=True)
-    return arb_mat(one.nrows(), one.ncols(), [a.max(b) for a, b in pairs])
-
-
 # ----------------------------------------------------------------------
-# What an input of size 1 does over one segment of a periodic loop, in balls; the arguments are those of `norms`.
+# What an input of size 1 does over one segment of a periodic loop; the arguments are those of `norms`.
 
 Weights = tuple[tuple[Any, Any], ...]
 _ZERO = Fraction(0)
 
 
 @dataclass(frozen=True)
-class SegmentFlow:
-    """One segment: A, J, and h, e^{Ah} and an upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h, for every piece."""
+class _SegmentFlow:
+    """One segment: A, J, and h and e^{Ah} for every piece."""
 
+    by: Arithmetic
     flow: Any
     jump: Any
     lengths: tuple[Fraction, ...]
     pieces: tuple[Any, ...]
     steps: tuple[Any, ...]
-    within: tuple[Any, ...]
 
     @classmethod
-    def of(cls, flow: Any, segment: Segment, *, past: bool) -> "SegmentFlow":
-        """Pieces for outputs, or for the past; the bound is e^{Mh} with M = |A|, but max(A, 0) on the diagonal."""
-        lengths = segment.pieces(past=past)
-        steps = {h: (flow * ball(h)).exp() for h in set(lengths)}
-        within = {h: absolute((majorant(flow) * ball(h)).exp()) for h in set(lengths)}
-        parts = ((ball(h), steps[h], within[h]) for h in lengths)
-        return cls(flow, matrix(segment.jump), lengths, *zip(*parts, strict=True))
+    def of(cls, by: Arithmetic, flow: Any, segment: Segment, *, past: bool) -> "_SegmentFlow":
+        """Pieces for outputs, or for the past."""
+        lengths = by.pieces(segment, past)
+        parts = {h: (by.number(h), (flow * by.number(h)).exp()) for h in set(lengths)}
+        return cls(by, flow, by.matrix(segment.jump), lengths, *zip(*(parts[h] for h in lengths), strict=True))
+
+    @cached_property
+    def within(self) -> list[Any]:
+        """Upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h, of every piece: e^{Mh} with M = |A|, but max(A, 0) on the diagonal."""
+        bounds = {h: absolute((majorant(self.flow) * ball(h)).exp()) for h in set(self.lengths)}
+        return [bounds[h] for h in self.lengths]
 
     @cached_property
     def whole(self) -> Any:
@@ -195,16 +270,26 @@ class SegmentFlow:
         """A²."""
         return self.flow * self.flow
 
+    @cached_property
+    def widths(self) -> list[Any]:
+        """Weights of a trapezoidal sum."""
+        none = self.by.number(_ZERO)
+        return [(a + b) / 2 for a, b in pairwise((none, *self.pieces, none))]
+
     def chord(self, number: int) -> Any:
         """h²/8 of a piece."""
         return self.pieces[number] ** 2 / 8
 
+    def phases(self, rows: Any) -> list[Any]:
+        """Of rows at the ends of the pieces."""
+        return list(accumulate(self.steps, mul, initial=rows))
+
 
 @dataclass(frozen=True)
-class Response(ABC):
+class _Response(ABC):
     """Of an input that enters with b over one segment."""
 
-    of: SegmentFlow
+    of: _SegmentFlow
     entry: Any
 
     @cached_property
@@ -221,48 +306,61 @@ class Response(ABC):
         return self.of.within[piece] * absolute(self.of.square * start)
 
     @abstractmethod
-    def columns(self, later: Any) -> tuple[list[Any], Any]:
-        """What is left at the end of the segment, mapped by what comes later: summed columns, remainders' entries."""
+    def columns(self, later: Any) -> Any:
+        """What is left at the end of the segment, mapped by what comes later: columns whose absolute values are added.
+
+        Those of the remainder are in `rest`.
+        """
 
     @abstractmethod
-    def since_jump(self, row: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Of the output row in every piece: sums since the jump at both ends, and what is added to the larger one."""
+    def rest(self, later: Any) -> Any:
+        """Entries of the remainder."""
+
+    @abstractmethod
+    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Of output rows in every piece: sums since the jump at both ends, and the remainder of the larger one."""
 
 
-class Flowing(Response):
+class _Flowing(_Response):
     """Of an input that is bounded by 1 at every time."""
 
-    def columns(self, later: Any) -> tuple[list[Any], Any]:
-        """See `Response.columns`."""
-        widths = [a + b for a, b in pairwise((arb(0), *self.of.pieces, arb(0)))]
+    def columns(self, later: Any) -> Any:
+        return self.of.by.scaled(later * self.of.by.beside(self.ends), self.of.widths)
+
+    def rest(self, later: Any) -> Any:
         bends = (self.curvature(self.ends[i], i) * (h**3 / 12) for i, h in enumerate(self.of.pieces))
-        rest = absolute(later) * reduce(add, bends)
-        return [later * now * (width / 2) for now, width in zip(self.ends, widths, strict=True)], absolute(rest)
+        return absolute(absolute(later) * reduce(add, bends))
 
-    def since_jump(self, row: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """See `Response.since_jump`."""
-        heights, size, area = [abs((row * now)[0, 0]) for now in self.ends], absolute(row), arb(0)
+    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+        by, area, more = self.of.by, rows * (self.entry * 0), None
+        heights = [by.modulus(rows * now) for now in self.ends]
         for i, (h, (a, b)) in enumerate(zip(self.of.pieces, pairwise(heights), strict=True)):
-            bend = (size * self.curvature(self.ends[i], i))[0, 0]
-            before, area = area, area + (a + b) * h / 2 + bend * h**3 / 12
-            yield before, area, (size * self.slope(self.ends[i], i))[0, 0] * self.of.chord(i)
+            before, area = area, area + (a + b) * (h / 2)
+            if by.proves:
+                area = area + absolute(rows) * self.curvature(self.ends[i], i) * h**3 / 12
+                more = absolute(rows) * self.slope(self.ends[i], i) * self.of.chord(i)
+            yield before, area, more
 
 
-class Sudden(Response):
+class _Sudden(_Response):
     """Of an input that enters with the jump alone."""
 
-    def columns(self, later: Any) -> tuple[list[Any], Any]:
-        """See `Response.columns`."""
-        return [later * self.ends[-1]], column((_ZERO,) * later.nrows())
+    def columns(self, later: Any) -> Any:
+        return later * self.ends[-1]
 
-    def since_jump(self, row: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """See `Response.since_jump`."""
-        for i, (a, b) in enumerate(pairwise(abs((row * now)[0, 0]) for now in self.ends)):
-            yield a, b, (absolute(row) * self.curvature(self.ends[i], i))[0, 0] * self.of.chord(i)
+    def rest(self, later: Any) -> Any:
+        return later * self.entry * 0
+
+    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+        by, more = self.of.by, None
+        for i, (a, b) in enumerate(pairwise(by.modulus(rows * now) for now in self.ends)):
+            if by.proves:
+                more = absolute(rows) * self.curvature(self.ends[i], i) * self.of.chord(i)
+            yield a, b, more
 
 
 @dataclass(frozen=True)
-class Faded(Response):
+class _Faded(_Response):
     """Of an input that fades: `weights` are Ω and Ω′ of every piece."""
 
     weights: Weights
@@ -271,36 +369,34 @@ class Faded(Response):
         """e^{Aσ}b from the start of a piece to the end of that piece and of all later ones, from b on."""
         return list(accumulate(self.of.steps[start:], lambda now, step: step * now, initial=self.entry))
 
-    def columns(self, later: Any) -> tuple[list[Any], Any]:
-        """See `Response.columns`."""
-        ends, moved = [], later * self.entry * 0
-        for i, (mass, moment) in enumerate(self.weights):
-            # the slope at the end of the segment, of what entered within the piece
-            rest = self._from(i + 1)[-1]
-            moved += self.slope(rest, i) * moment
-            ends.append(later * self._from(i)[-1] * mass)
-        return ends, absolute(absolute(later) * moved)
+    def columns(self, later: Any) -> Any:
+        return beside([later * self._from(i)[-1] * mass for i, (mass, _) in enumerate(self.weights)])
 
-    def since_jump(self, row: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """See `Response.since_jump`."""
-        size = absolute(row)
+    def rest(self, later: Any) -> Any:
+        """By the slope at the end of the segment, of what entered within the piece."""
+        moved = (self.slope(self._from(i + 1)[-1], i) * moment for i, (_, moment) in enumerate(self.weights))
+        return absolute(absolute(later) * reduce(add, moved))
+
+    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+        size = absolute(rows)
         for i, (mass, _) in enumerate(self.weights):
-            first, last = (abs((row * now)[0, 0]) for now in (self.entry, self.of.steps[i] * self.entry))
-            start, end, more = arb(0), arb(0), mass * (first.max(last) + self._bend(size, self.entry, i))
+            first, last = (modulus(rows * now) for now in (self.entry, self.of.steps[i] * self.entry))
+            more = (larger(first, last) + self._bend(size, self.entry, i)) * mass
+            start = end = rows * (self.entry * 0)
             for p, (passed, moment) in enumerate(self.weights[:i]):
                 now, since = self._from(p)[i - p], self._from(p + 1)[i - p - 1]
-                start += passed * abs((row * now)[0, 0])
-                end += passed * abs((row * self.of.steps[i] * now)[0, 0])
+                start = start + modulus(rows * now) * passed
+                end = end + modulus(rows * self.of.steps[i] * now) * passed
                 slopes = self.of.within[p] * self.slope(since, i)
-                more += passed * self._bend(size, now, i) + moment * (size * slopes)[0, 0]
+                more = more + (self._bend(size, now, i) * passed + size * slopes * moment)
             yield start, end, more
 
     def _bend(self, size: Any, start: Any, piece: int) -> Any:
-        return (size * self.curvature(start, piece))[0, 0] * self.of.chord(piece)
+        return size * self.curvature(start, piece) * self.of.chord(piece)
 
 
 @dataclass(frozen=True)
-class Pulsed(Response):
+class _Pulsed(_Response):
     """Of an input that is there near a jump: `here` that of the segment itself, `ahead` that of the next one.
 
     e^{A(τ − σ)}b is within σ·|A·…| of e^{Aτ}b. Of what is before and after the jump one is larger, and max(|x|, |y|) =
@@ -312,78 +408,82 @@ class Pulsed(Response):
     ahead: bool
 
     @cached_property
-    def _sides(self) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-        """After the jump, for what is before and after it: b with its share, and by how much it is off, at most."""
+    def _sides(self) -> tuple[Any, Any]:
+        """After the jump, for what is before and after it: b with its share."""
+        number = self.of.by.number
+        return self.of.jump * self.entry * number(self.pulse.before), self.entry * number(self.pulse.after)
+
+    @cached_property
+    def _off(self) -> tuple[Any, Any]:
+        """By how much these are off, at most."""
         pulse, flow = self.pulse, self.of.flow
         moved, early, late = flow * self.entry, self._within(pulse.early), self._within(pulse.late)
-        before = self.of.jump * self.entry * ball(pulse.before)
         shifted = absolute(self.of.jump) * early * absolute(moved) * ball(pulse.before * pulse.early)
         back = absolute((flow * ball(-pulse.late)).exp() * moved)
-        after = self.entry * ball(pulse.after)
-        return (before, shifted), (after, late * back * ball(pulse.after * pulse.late))
+        return shifted, late * back * ball(pulse.after * pulse.late)
 
     def _within(self, time: Fraction) -> Any:
         """Upper bound of |e^{Aσ}|, 0 ≤ σ ≤ time."""
         return absolute((majorant(self.of.flow) * ball(time)).exp())
 
-    def columns(self, later: Any) -> tuple[list[Any], Any]:
-        """See `Response.columns`."""
-        none = self.entry * 0
+    def columns(self, later: Any) -> Any:
         if not self.here:
-            return [later * none], absolute(none)
-        (before, off), (after, far) = self._sides
-        whole = later * reduce(lambda now, step: step * now, self.of.steps)
-        rest = absolute(whole) * _larger_response(off, far)
-        return [whole * (before + after) / 2, whole * (before - after) / 2], absolute(rest)
+            return later * (self.entry * 0)
+        (before, after), whole = self._sides, self._whole(later)
+        return self.of.by.beside([whole * (before + after) / 2, whole * (before - after) / 2])
 
-    def since_jump(self, row: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """See `Response.since_jump`."""
-        phases = list(accumulate(self.of.steps, lambda now, step: now * step, initial=row))
-        soon = self._ahead(row)
+    def _whole(self, later: Any) -> Any:
+        return later * reduce(lambda now, step: step * now, self.of.steps)
+
+    def rest(self, later: Any) -> Any:
+        return absolute(absolute(self._whole(later)) * larger(*self._off) if self.here else self.entry * 0)
+
+    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+        by, phases, none = self.of.by, self.of.phases(rows), rows * (self.entry * 0)
+        soon = self._ahead(rows) if by.proves and self.ahead else none
         for i in range(len(self.of.lengths)):
-            start, end, more = arb(0), arb(0), arb(0)
-            if self.here:
-                for side, off in self._sides:
-                    ends = [abs((phase * side)[0, 0]) for phase in phases[i : i + 2]]
-                    start, end = start.max(ends[0]), end.max(ends[1])
-                    bent = (absolute(phases[i] * self.of.square) * self.of.within[i] * absolute(side))[0, 0]
-                    # what it is off by, anywhere in the piece
-                    far = (absolute(phases[i]) * self.of.within[i] * off)[0, 0]
-                    more = more.max(bent * self.of.chord(i) + far)
+            start, end, more = none, none, none
+            for side in self._sides if self.here else ():
+                start, end = (by.larger(v, by.modulus(phases[j] * side)) for v, j in ((start, i), (end, i + 1)))
+            for side, off in zip(self._sides, self._off, strict=True) if self.here and by.proves else ():
+                bent = absolute(phases[i] * self.of.square) * self.of.within[i] * absolute(side)
+                far = absolute(phases[i]) * self.of.within[i] * off  # by what it is off, anywhere in the piece
+                more = larger(more, bent * self.of.chord(i) + far)
             left = sum(self.of.lengths[i + 1 :], _ZERO)
-            yield start, end, more + (soon if self.ahead and left < self.pulse.early else 0)
+            yield start, end, more + soon if left < self.pulse.early else more
 
-    def _ahead(self, row: Any) -> Any:
+    def _ahead(self, rows: Any) -> Any:
         """Of the pulse before the jump that ends the segment, as long as it is there."""
         moved = self._within(self.pulse.early) * absolute(self.of.flow * self.entry)
-        height = abs((row * self.entry)[0, 0]) + (absolute(row) * moved)[0, 0] * ball(self.pulse.early)
+        height = modulus(rows * self.entry) + absolute(rows) * moved * ball(self.pulse.early)
         return height * ball(self.pulse.before)
 
 
-def _larger_response(one: Any, other: Any) -> Any:
-    """Entry by entry, of columns."""
-    return arb_mat([[a.max(b)] for a, b in zip(one.entries(), other.entries(), strict=True)])
-
-
-def responses(loop: PeriodicLoop, flows: list[SegmentFlow], name: str) -> list[Response]:
-    """Of an input, over all segments."""
+def responses(loop: PeriodicLoop, flows: list[_SegmentFlow], name: str) -> list[_Response]:
+    """Of an input, over all segments; an estimate counts one that fades as one at the jump, of the same area."""
+    by = flows[0].by
     if name in loop.inputs:
-        return [Flowing(flow, column(loop.inputs[name])) for flow in flows]
+        return [_Flowing(flow, by.column(loop.inputs[name])) for flow in flows]
     if name in loop.sampled:
-        entry = column(loop.sampled[name])
-        return [Sudden(flow, entry * (not number)) for number, flow in enumerate(flows)]
+        return _sudden(flows, loop.sampled[name], 0)
     if name in loop.pulses:
         pulse, count = loop.pulses[name], len(flows)
         return [
-            Pulsed(flow, column(pulse.entry), pulse, number == pulse.first, (number + 1) % count == pulse.first)
+            _Pulsed(flow, by.column(pulse.entry), pulse, number == pulse.first, (number + 1) % count == pulse.first)
             for number, flow in enumerate(flows)
         ]
     fading = loop.fading[name]
-    entry = column(fading.entry)
-    return [Faded(flow, entry, own) for flow, own in zip(flows, _weights(flows, fading), strict=True)]
+    if not by.proves:
+        area = fading.height / fading.rate + fading.floor * loop.period
+        return _sudden(flows, tuple(v * area for v in fading.entry), fading.first)
+    return [_Faded(flow, column(fading.entry), own) for flow, own in zip(flows, _weights(flows, fading), strict=True)]
 
 
-def _weights(flows: list[SegmentFlow], fading: Fading) -> list[Weights]:
+def _sudden(flows: list[_SegmentFlow], entry: tuple[Fraction, ...], first: int) -> list[_Response]:
+    return [_Sudden(flow, flow.by.column(entry) * int(number == first)) for number, flow in enumerate(flows)]
+
+
+def _weights(flows: list[_SegmentFlow], fading: Fading) -> list[Weights]:
     """Ω and Ω′ of every piece of every segment."""
     count = len(flows)
     weights, start = [Weights()] * count, _ZERO
@@ -408,7 +508,7 @@ def _weight(fading: Fading, start: Fraction, length: Fraction) -> tuple[Any, Any
 MOST_DOUBLINGS = 12
 
 
-def slowest(flows: list[SegmentFlow]) -> list[Any]:
+def slowest(flows: list[_SegmentFlow]) -> list[Any]:
     """What the slowest mode is seen along, if there is one: a row of what is left of all states after 2^12 periods.
 
     That with the largest entry on the diagonal, which is the same in all units of the states: whoever else takes it
@@ -427,21 +527,56 @@ def slowest(flows: list[SegmentFlow]) -> list[Any]:
         if not largest > 0:
             return [arb(0)] * period.nrows()
         before, growth = growth, 2 * growth + float(largest.log())
-        period = arb_mat([[(v / largest).mid() for v in row] for row in period.tolist()])
+        period = (period / largest).mid()
     if not growth < before:
         raise unstable()
     return list(period.tolist()[max(range(period.nrows()), key=lambda i: abs(period[i, i]))])
 
 
-def seen_alone(row: list[Any], sums: list[Any]) -> tuple[int, Any, Any]:
-    """W of `norms`, its inverse, and which of its rows, that of the state that counts most, is the given one."""
-    seen, back = identity(len(row)), identity(len(row))
-    place = max(range(len(row)), key=lambda i: (abs(row[i]) * sums[i]).mid())
-    for i, v in enumerate(row):
-        if i != place and row[place] != 0:
-            seen[place, i] = (v / row[place]).mid()
-            back[place, i] = -seen[place, i]
-    return place, seen, back
+class _Periods:
+    """Ψ of a loop, its powers, and what is left of states after 2^j periods; each is formed once."""
+
+    def __init__(self, flows: list[_SegmentFlow], period: Any = None) -> None:
+        self.by, self.size = flows[0].by, flows[0].jump.nrows()
+        self.later = list(accumulate((flow.whole for flow in flows[:0:-1]), mul, initial=self.by.identity(self.size)))
+        self.powers = [self.later[-1] * flows[0].whole if period is None else period]
+        self.mode = self.by.slowest(self.powers[0]) if self.by.slowest else None
+        self.slow = slowest(flows) if self.by.proves else []
+        self._seen: dict[int, tuple[Any, Any]] = {}
+        self._left: dict[tuple[int, int], tuple[Any, Any]] = {}
+
+    def power(self, number: int) -> Any:
+        """Ψ^{2^number}."""
+        while len(self.powers) <= number:
+            self.powers.append(self.powers[-1] * self.powers[-1])
+        return self.powers[number]
+
+    def followed(self, columns: Any, doublings: int) -> Any:
+        """Columns of 2^doublings periods."""
+        for number in range(doublings):
+            columns = self.by.beside([columns, self.power(number) * columns])
+        return columns
+
+    def seen_alone(self, sums: Any) -> tuple[int, Any]:
+        """Row of the state that counts most, in whose place the slowest mode is seen, and W of `norms`."""
+        sizes = [(abs(v) * size).mid() for v, size in zip(self.slow, sums.entries(), strict=True)]
+        place = sizes.index(max(sizes))
+        if place not in self._seen:
+            seen, back = identity(self.size), identity(self.size)
+            for i, v in enumerate(self.slow):
+                if i != place and self.slow[place] != 0:
+                    seen[place, i] = (v / self.slow[place]).mid()
+                    back[place, i] = -seen[place, i]
+            self._seen[place] = seen, back
+        return place, self._seen[place][0]
+
+    def left(self, number: int, place: int) -> tuple[Any, Any]:
+        """Ψ^KW⁻¹ and D, K = 2^number."""
+        if (number, place) not in self._left:
+            seen, back = self._seen[place]
+            far = self.power(number) * back
+            self._left[number, place] = far, absolute(seen * far)
+        return self._left[number, place]
 
 
 def unstable() -> ParameterError:
@@ -459,19 +594,15 @@ def unstable() -> ParameterError:
 # ≤ g with the g that `free_peaks` returns for the part of the period in which t lies.
 #
 # **Proof.** Let X have the columns s_i and Ψ be the map of one period, so that |cx(t)| is at most the sum of the
-# absolute
-# values of the entries of cΦ(θ)ΨᵏX, θ after the beginning of period k.
+# absolute values of the entries of cΦ(θ)ΨᵏX, θ after the beginning of period k.
 #
-# - *Between two phases α < β.* ce^{Aσ}y is within (β − α)²/8·max|cA²e^{Aσ}y| of the chord of its ends, for every
-#   column
+# - *Between two phases α < β.* ce^{Aσ}y is within (β − α)²/8·max|cA²e^{Aσ}y| of the chord of its ends, for every column
 #   y, and the sum of the absolute values of chords is convex: at most the larger of both ends plus the remainders.
 # - *Periods.* Those with k < K = 2^J are looked at one by one. Let W be any invertible matrix, m at least the sums of
-#   the
-#   absolute values of every row of WΨᵏX for all k < K, and D = |WΨᴷW⁻¹|. If Dm ≤ m, these sums are at most m for k <
-#   2K,
-#   3K and so on, that is, for all k, and those of cΦ(θ)ΨᵏX at most |cΦ(θ)ΨᴷW⁻¹|m for all k ≥ K. W is that of `norms`:
-#   the slowest mode, seen alone, only has to fall. All of m is raised by 2⁻⁶⁰ of its largest entry, so that none is
-#   0. ∎
+#   the absolute values of every row of WΨᵏX for all k < K, and D = |WΨᴷW⁻¹|. If Dm ≤ m, these sums are at most m for k
+#   < 2K, 3K and so on, that is, for all k, and those of cΦ(θ)ΨᵏX at most |cΦ(θ)ΨᴷW⁻¹|m for all k ≥ K. W is that of
+#   `norms`: the slowest mode, seen alone, only has to fall. All of m is raised by 2⁻⁶⁰ of its largest entry, so that
+#   none is 0. ∎
 
 Group = tuple[Any, list[Any]]
 
@@ -491,65 +622,40 @@ def free_peaks(loop: PeriodicLoop) -> Mapping[str, tuple[Fraction, ...]]:
         When the loop is not found to be stable within 4096 periods.
     """
     with ctx.workprec(_FREE_BITS):
-        generator, rows = matrix(loop.flow), matrix(tuple(loop.outputs.values()))
-        flows = [SegmentFlow.of(generator, part, past=False) for part in loop.segments]
-        groups = _followed(flows, beside([column(s) for s in loop.start]))
-        largest: list[list[Any]] = [[] for _ in loop.outputs]
-        for flow in flows:
-            for parts in zip(*(_pieces(flow, rows, *group) for group in groups), strict=True):
-                for peaks, bounds in zip(largest, zip(*parts, strict=True), strict=True):
-                    peaks.append(reduce(arb.max, bounds))
-            groups = [(flow.whole * columns, weights) for columns, weights in groups]
-        return {output: tuple(map(upper, peaks)) for output, peaks in zip(loop.outputs, largest, strict=True)}
+        return dict(zip(loop.outputs, _upper_rows(LoopResponses(BALLS, loop).free()), strict=True))
 
 
-def _followed(flows: list[SegmentFlow], start: Any) -> list[Group]:
+def _upper_rows(columns: list[Any]) -> list[tuple[Fraction, ...]]:
+    """Rational bounds of the rows of columns beside each other."""
+    return [tuple(map(upper, row)) for row in beside(columns).tolist()]
+
+
+def _followed(periods: _Periods, start: Any) -> list[Group]:
     """ΨᵏX for all k < K, and ΨᴷW⁻¹ with m; K is so large that little is left but the slowest mode."""
-    even = [arb(1)] * start.ncols()
-    columns, power = start, reduce(lambda now, flow: flow.whole * now, flows, identity(start.nrows()))
-    slow = slowest(flows)
-    for _ in range(MOST_DOUBLINGS):
-        columns, power = beside([columns, power * columns]), power * power
-        place, seen, back = seen_alone(slow, _peaks(absolute(columns), even))
-        most = [v.abs_upper() for v in _peaks(absolute(seen * columns), even)]
-        most = [(v + max(most) * ball(_FAINT)).abs_upper() for v in most]
-        far = power * back
-        left = absolute(seen * far)
-        quick = [v * (i != place) for i, v in enumerate(most)]
-        if _after(left, most, most, Fraction(1)) and _after(left, quick, most, _FREE_SMALL):
-            return [(columns, even), (far, most)]
+    columns, even = start, [periods.by.number(Fraction(1))] * start.ncols()
+    if periods.mode:
+        return [(periods.followed(start, periods.mode.doublings), even)]
+    for number in range(MOST_DOUBLINGS):
+        columns = beside([columns, periods.power(number) * columns])
+        place, seen = periods.seen_alone(_peaks(columns, even))
+        peaks = _peaks(seen * columns, even)
+        faint = reduce(arb.max, peaks.entries()) * ball(_FAINT)
+        most = arb_mat([[(v + faint).abs_upper()] for v in peaks.entries()])
+        far, left = periods.left(number + 1, place)
+        if not_above(left * most, most) and not_above(left * _but(most, place), most * ball(_FREE_SMALL)):
+            return [(columns, even), (far, most.entries())]
     raise unstable()
 
 
-def _after(left: Any, now: list[Any], most: list[Any], share: Fraction) -> bool:
-    """Whether what a map leaves is at most a share."""
-    later = (left * arb_mat([[v] for v in now])).entries()
-    return all(a <= b * ball(share) for a, b in zip(later, most, strict=True))
+def _peaks(columns: Any, weights: list[Any]) -> Any:
+    return absolute(BALLS.highest(grouped(absolute(columns), weights)))
 
 
-def _peaks(sizes: Any, weights: list[Any]) -> list[Any]:
-    """Of every row, the largest weighted sum of a group of columns, as many as there are weights."""
-    return [reduce(arb.max, _free_sums(row, weights)) for row in sizes.tolist()]
-
-
-def _free_sums(row: list[Any], weights: list[Any]) -> list[Any]:
-    groups = (row[i : i + len(weights)] for i in range(0, len(row), len(weights)))
-    return [sum((v * w for v, w in zip(group, weights, strict=True)), arb(0)) for group in groups]
-
-
-def _pieces(flow: SegmentFlow, rows: Any, columns: Any, weights: list[Any]) -> Iterator[list[Any]]:
-    """Bound of every output in every piece, from groups of columns just before the jump."""
-    phases, columns = list(accumulate(flow.steps, mul, initial=rows)), flow.jump * columns
-    ends = [absolute(phase * columns) for phase in phases]
-    for i, phase in enumerate(phases[:-1]):
-        bends = absolute(phase * flow.square) * flow.within[i] * absolute(columns) * flow.chord(i)
-        by_row = zip(ends[i].tolist(), ends[i + 1].tolist(), bends.tolist(), strict=True)
-        yield [
-            reduce(
-                arb.max, (a.max(b) + more for a, b, more in zip(*(_free_sums(v, weights) for v in line), strict=True))
-            )
-            for line in by_row
-        ]
+def _but(column: Any, place: int) -> Any:
+    """A column with 0 in one place."""
+    copied = column * 1
+    copied[place, 0] = 0
+    return copied
 
 
 # ----------------------------------------------------------------------
@@ -559,27 +665,20 @@ def _pieces(flow: SegmentFlow, rows: Any, columns: Any, weights: list[Any]) -> I
 # g·W with the g that `norms` returns for the part of the period in which t lies.
 #
 # **Proof.** x(t) = ∫₀ᵗ Φ(t, τ)b·w(τ)dτ, so |cx(t)| ≤ W·∫|cΦ(t, τ)b|dτ over [0, t], which grows when the loop is
-# continued periodically to the past and the integral taken over (−∞, t]. That integral is bounded from above in
-# parts:
+# continued periodically to the past and the integral taken over (−∞, t]. That integral is bounded from above in parts:
 #
 # - *A piece of length h of a flow.* y(σ) = row·e^{Aσ}b is within (σ − α)(β − σ)/2·max|y″| of its chord on [α, β], so
 #   ∫|y| ≤ h(|y(α)| + |y(β)|)/2 + h³/12·max|y″|, and |y″| ≤ |row|·|A²e^{Aσ}b| with absolute values entry by entry.
-# - *All periods before.* With Ψ the map of one period, N(c) = Σ_k ‖cΨᵏU‖₁; the columns U are the ends of the pieces
-#   of
-#   one period, weighted, and one column for every entry of the remainders. Terms up to k < K = 2^J are summed. Let W
-#   be
+# - *All periods before.* With Ψ the map of one period, N(c) = Σ_k ‖cΨᵏU‖₁; the columns U are the ends of the pieces of
+#   one period, weighted, and one column for every entry of the remainders. Terms up to k < K = 2^J are summed. Let W be
 #   any invertible matrix, y_j that sum for its row j, z_j the whole one and D = |WΨᴷW⁻¹|. Sums over one block of K
-#   periods, two and so on are at most y, y + Dy, …, so if y + Dx ≤ x, then z ≤ x, and N(c) ≤ partial sum +
-#   |cΨᴷW⁻¹|·x.
-#   Rows of W are unit rows but for one, along which the slowest mode is seen alone: what is left of
-#   that mode after K periods counts as it is, and K need not outlast it.
-# - *Between two phases α < β of the output.* ce^{Aθ} is within (β − α)²/8·max|cA²e^{Aσ}| of the chord of its ends,
-#   and N
-#   is convex: at most the larger end and N of the remainder. The flow since the last jump adds ∫₀^θ|ce^{Aσ}b|dσ,
-#   whose
-#   derivative has the Lipschitz constant max|cAe^{Aσ}b|: it is within (β − α)²/8 times that of its chord. Both
-#   together
-#   are below a chord plus remainders, hence at most the larger of the two ends plus remainders. ∎
+#   periods, two and so on are at most y, y + Dy, …, so if y + Dx ≤ x, then z ≤ x, and N(c) ≤ partial sum + |cΨᴷW⁻¹|·x.
+#   Rows of W are unit rows but for one, along which the slowest mode is seen alone: what is left of that mode after K
+#   periods counts as it is, and K need not outlast it.
+# - *Between two phases α < β of the output.* ce^{Aθ} is within (β − α)²/8·max|cA²e^{Aσ}| of the chord of its ends, and
+#   N is convex: at most the larger end and N of the remainder. The flow since the last jump adds ∫₀^θ|ce^{Aσ}b|dσ,
+#   whose derivative has the Lipschitz constant max|cAe^{Aσ}b|: it is within (β − α)²/8 times that of its chord. Both
+#   together are below a chord plus remainders, hence at most the larger of the two ends plus remainders. ∎
 #
 # **Sampled inputs.** Where Σ j·w_k enters with the jumps at kT and |w_k| ≤ W for every k up to t, |cx(t)| ≤ W·Σ|cΦ(t,
 # kT)j|: the same with a sum in place of the integral. A period has the one column e^{Aτ}j without a remainder, the flow
@@ -599,8 +698,7 @@ def _pieces(flow: SegmentFlow, rows: Any, columns: Any, weights: list[Any]) -> I
 # columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added to the
 # outputs of the pieces that `early` reaches.
 #
-# **At once.** What an input of size 1 adds to an output at the same instant is added to the gain, whatever its
-# weight.
+# **At once.** What an input of size 1 adds to an output at the same instant is added to the gain, whatever its weight.
 
 _MOST_SUMS = 5 * 10**7  # products for one input: half of what the standalone checker takes before it gives up
 _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to bound themselves
@@ -609,7 +707,7 @@ _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to boun
 def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     """Gains of every (output, input), rounded up, one for each part of the period; the same parts for all.
 
-    A start that is not 0 is one input more, `free_response.START`, of size 1. Gains of loops that came before are
+    A start that is not 0 is one input more, `START`, of size 1. Gains of loops that came before are
     remembered: a proof is found, checked, told and written of one loop.
 
     Raises
@@ -624,69 +722,127 @@ def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
 @lru_cache(maxsize=128)
 def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     with ctx.workprec(_FREE_BITS):
-        flow = matrix(loop.flow)
-        rows = matrix(tuple(loop.outputs.values()))
-        bounds: dict[tuple[str, str], tuple[Fraction, ...]] = {}
-        flows, earlier = ([SegmentFlow.of(flow, part, past=past) for part in loop.segments] for past in (False, True))
-        slow = slowest(earlier)
-        places = sum(rows.nrows() * (len(part.lengths) + 1) + rows.ncols() for part in flows)
+        of, bounds = LoopResponses(BALLS, loop), dict[tuple[str, str], tuple[Fraction, ...]]()
         for name in (*loop.inputs, *loop.sampled, *loop.fading, *loop.pulses):
-            gains = _gains(responses(loop, flows, name), _Past.of(responses(loop, earlier, name), slow, places), rows)
-            bounds |= {
-                (output, name): tuple(map(upper, worst)) for output, worst in zip(loop.outputs, gains, strict=True)
-            }
+            peaks = [reduce(add, rest, larger(*ends)) for part in of.sums(name) for *ends, rest in part]
+            bounds |= {(y, name): line for y, line in zip(loop.outputs, _upper_rows(peaks), strict=True)}
         return bounds | {key: tuple(v + size for v in bounds[key]) for key, size in loop.at_once.items()}
+
+
+class LoopResponses:
+    """Sums of absolute values of the responses of a loop, and its free response, for all outputs at once."""
+
+    def __init__(self, by: Arithmetic, loop: PeriodicLoop) -> None:
+        self.by, self.loop, flow = by, loop, by.matrix(loop.flow)
+        self.rows = by.matrix(tuple(loop.outputs.values()))
+        self.flows = [_SegmentFlow.of(by, flow, part, past=False) for part in loop.segments]
+        same = all(by.pieces(part, True) == own.lengths for part, own in zip(loop.segments, self.flows, strict=True))
+        self.earlier = self.flows if same else [_SegmentFlow.of(by, flow, part, past=True) for part in loop.segments]
+        self.periods = _Periods(self.earlier)
+        count, size = self.rows.nrows(), self.rows.ncols()
+        self.places = sum(count * (len(part.lengths) + 1) + size for part in self.flows)
+
+    @cached_property
+    def _seen(self) -> list[tuple[list[Any], list[Any]]]:
+        """Rows of every segment just before it and before all earlier ones; what bends its pieces, of a proof."""
+        by, all_rows = self.by, []
+        for number, flow in enumerate(self.flows):
+            phases, bends = flow.phases(self.rows), list[Any]()
+            rows = by.above([*phases, by.identity(self.periods.size)] if by.proves else phases) * flow.jump
+            if by.proves:
+                pieces = zip(phases, flow.within, strict=False)
+                bends = [absolute(phase * flow.square) * within for phase, within in pieces]
+            before = (part.whole for part in self.earlier[number - 1 :: -1]) if number else ()
+            all_rows.append((list(accumulate(before, mul, initial=rows)), bends))
+        return all_rows
+
+    def sums(self, name: str) -> Iterator[list[tuple[Any, Any, tuple[Any, ...]]]]:
+        """For an input, on every piece of every segment: sums for every output at both ends, and remainders."""
+        by, count, size = self.by, self.rows.nrows(), self.periods.size
+        parts = responses(self.loop, self.flows, name)
+        earlier = parts if self.earlier is self.flows else responses(self.loop, self.earlier, name)
+        past = _Past.of(earlier, self.periods, self.places)
+        for number, (part, (rows, bends)) in enumerate(zip(parts, self._seen, strict=True)):
+            before, result = past.of_rows(rows, number), list[tuple[Any, Any, tuple[Any, ...]]]()
+            pieces = len(part.of.lengths)
+            ends = [by.part(before, i * count, (i + 1) * count) for i in range(pieces + 1)]
+            units = by.part(before, before.nrows() - size, before.nrows())
+            for i, (start, end, more) in enumerate(part.since_jump(self.rows)):
+                rest = (more, bends[i] * units * part.of.chord(i)) if by.proves else ()
+                result.append((ends[i] + start, ends[i + 1] + end, rest))
+            yield result
+
+    def free(self) -> list[Any]:
+        """Largest outputs of the free response from the box: of a proof on every piece, else at all ends of pieces."""
+        by, peaks = self.by, []
+        period = reduce(lambda now, flow: flow.whole * now, self.flows, by.identity(self.periods.size))
+        periods = _Periods(self.flows, period) if by.proves else self.periods
+        groups = _followed(periods, by.beside([by.column(s) for s in self.loop.start]))
+        for flow in self.flows:
+            phases, parts = flow.phases(self.rows), []
+            for columns, weights in groups:
+                after = flow.jump * columns
+                ends = [by.grouped(by.absolute(phase * after), weights) for phase in phases]
+                if by.proves:
+                    near = zip(phases[:-1], flow.within, strict=True)
+                    bends = (absolute(phase * flow.square) * within * absolute(after) for phase, within in near)
+                    rest = (by.grouped(bend * flow.chord(i), weights) for i, bend in enumerate(bends))
+                    ends = [larger(*both) + more for both, more in zip(pairwise(ends), rest, strict=True)]
+                parts.append([by.highest(end) for end in ends])
+            peaks += [reduce(by.larger, both) for both in zip(*parts, strict=True)]
+            groups = [(flow.whole * columns, weights) for columns, weights in groups]
+        return peaks
 
 
 @dataclass(frozen=True, slots=True)
 class _Past:
     """Everything before the first jump of a period: columns of K periods, and what bounds the rest."""
 
-    parts: list[Response]
+    parts: list[_Response]
     columns: Any
     far: Any
     bound: Any
 
     @classmethod
-    def of(cls, parts: list[Response], slow: list[Any], rows: int) -> "_Past":
-        size = parts[0].of.jump.nrows()
-        later, ends, rest = identity(size), list[Any](), arb_mat(size, 1)
-        for part in reversed(parts):
-            own, remainder = part.columns(later)
-            ends, rest, later = [*own, *ends], rest + remainder, later * part.of.whole
-        return cls._summed(parts, later, beside([*ends, _diagonal(rest)]), slow, rows)
-
-    @classmethod
-    def _summed(cls, parts: list[Response], period: Any, columns: Any, slow: list[Any], rows: int) -> "_Past":
-        size = period.nrows()
-        place, seen, back = seen_alone(slow, _row_sums(columns))
-        sums = _row_sums(seen * columns)
-        for _ in range(MOST_DOUBLINGS):
+    def of(cls, parts: list[_Response], periods: _Periods, rows: int) -> "_Past":
+        by, size, later = periods.by, periods.size, periods.later[::-1]
+        ends = [part.columns(map_) for part, map_ in zip(parts, later, strict=True)]
+        if by.proves:
+            rests = [part.rest(map_) for part, map_ in zip(parts, later, strict=True)]
+            ends.append(_diagonal(reduce(add, rests[::-1])))
+        columns = by.beside(ends)
+        if mode := periods.mode:
+            return cls(
+                parts, periods.followed(columns, mode.doublings), mode.along, by.sums(mode.seen * columns) * mode.left
+            )
+        place, seen = periods.seen_alone(row_sums(columns))
+        sums = row_sums(seen * columns)
+        for number in range(MOST_DOUBLINGS):
             if 2 * columns.ncols() * size * (size + rows) > _MOST_SUMS:
                 break
-            following = period * columns
-            sums = [a + b for a, b in zip(sums, _row_sums(seen * following), strict=True)]
-            columns, period = beside([columns, following]), period * period
-            far = period * back
-            left = absolute(seen * far)
-            quick = _as_column([v * (i != place) for i, v in enumerate(sums)])
-            shares = zip((left * quick).entries(), sums, strict=True)
-            if all(a == 0 or a / b < ball(_FREE_SMALL) for a, b in shares):
+            following = periods.power(number) * columns
+            sums = sums + row_sums(seen * following)
+            columns = beside([columns, following])
+            far, left = periods.left(number + 1, place)
+            if not_above(left * _but(sums, place), sums * ball(_FREE_SMALL)):
                 return cls(parts, columns, far, _whole(left, sums))
         raise unstable()
 
-    def of_rows(self, rows: Any, segment: int) -> list[Any]:
-        """N of every row that acts just before a segment: those before it in this period, and all that is earlier."""
-        if segment == 0:
-            near, far = _row_sums(rows * self.columns), absolute(rows * self.far) * self.bound
-            return [a + b for a, b in zip(near, far.entries(), strict=True)]
-        before = self.parts[segment - 1]
-        ends, rest = before.columns(identity(rows.ncols()))
-        own = _row_sums(rows * beside([*ends, _diagonal(rest)]))
-        return [a + b for a, b in zip(own, self.of_rows(rows * before.of.whole, segment - 1), strict=True)]
+    def of_rows(self, rows: list[Any], segment: int) -> Any:
+        """N of rows that act just before a segment: those before it in this period, and all that is earlier.
+
+        `rows` are these, and what they are just before all earlier segments, the last first.
+        """
+        by = self.parts[0].of.by
+        sums = by.sums(rows[-1] * self.columns) + by.absolute(rows[-1] * self.far) * self.bound
+        for part, line in zip(self.parts[:segment], rows[-2::-1], strict=True):
+            unit = by.identity(line.ncols())
+            ends = [part.columns(unit), *([_diagonal(part.rest(unit))] if by.proves else [])]
+            sums = by.sums(line * by.beside(ends)) + sums
+        return sums
 
 
-def _whole(left: Any, sums: list[Any]) -> Any:
+def _whole(left: Any, sums: Any) -> Any:
     """Some x with y + Dx ≤ x.
 
     Raises
@@ -694,49 +850,16 @@ def _whole(left: Any, sums: list[Any]) -> Any:
     ParameterError
         When the one that is tried is none.
     """
-    own, size = _as_column(sums), len(sums)
     try:
-        solution = absolute((identity(size) - left).solve(own) * ball(_ROOM))
+        solution = absolute((identity(left.nrows()) - left).solve(sums) * ball(_ROOM))
     except ZeroDivisionError:
         raise unstable() from None
-    bounded = zip(own.entries(), (left * solution).entries(), solution.entries(), strict=True)
-    if not all(y + far <= x for y, far, x in bounded):
+    if not not_above(sums + left * solution, solution):
         raise unstable()
     return solution
-
-
-def _gains(parts: list[Response], past: _Past, outputs: Any) -> list[list[Any]]:
-    """Bounds for every output, on every piece of every segment."""
-    size, count = outputs.ncols(), outputs.nrows()
-    gains: list[list[Any]] = [[] for _ in range(count)]
-    for number, part in enumerate(parts):
-        flow = part.of
-        phases = list(accumulate(flow.steps, mul, initial=outputs))
-        rows = _above([*phases, identity(size)]) * flow.jump
-        before = past.of_rows(rows, number)
-        units = _as_column(before[-size:])
-        for k in range(count):
-            row = arb_mat([outputs.tolist()[k]])
-            for i, (start, end, more) in enumerate(part.since_jump(row)):
-                bent = (absolute(phases[i] * flow.square) * flow.within[i] * units)[k, 0]
-                larger = (before[i * count + k] + start).max(before[(i + 1) * count + k] + end)
-                gains[k].append(larger + more + bent * flow.chord(i))
-    return gains
-
-
-def _as_column(values: list[Any]) -> Any:
-    return arb_mat([[v] for v in values])
 
 
 def _diagonal(column: Any) -> Any:
     """One column for every entry that is not zero."""
     nonzero = [i for i, v in enumerate(column.entries()) if not v.is_zero()]
     return arb_mat([[column[i, 0] if i == j else arb(0) for j in nonzero] for i in range(column.nrows())])
-
-
-def _above(parts: list[Any]) -> Any:
-    return arb_mat([list(row) for part in parts for row in part.tolist()])
-
-
-def _row_sums(matrix: Any) -> list[Any]:
-    return [sum(map(abs, row), arb(0)) for row in matrix.tolist()]

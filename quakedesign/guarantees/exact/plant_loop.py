@@ -3,19 +3,35 @@
 Chapters: the loop in exact matrices; L1 norms of all outputs for all inputs at once, in ball arithmetic.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import reduce
-from itertools import pairwise
+from itertools import accumulate, pairwise
+from operator import add, mul
 from typing import Any
 
 from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import apart, end_of, shortly
-from quakedesign.guarantees.exact.norms import absolute, ball, beside, column, identity, majorant, matrix
+from quakedesign.exact import apart, shortly
+from quakedesign.guarantees.exact.norms import (
+    BALLS,
+    above,
+    absolute,
+    ball,
+    beside,
+    column,
+    identity,
+    larger,
+    majorant,
+    matrix,
+    not_above,
+    row_sums,
+    scaled,
+    upper,
+)
 from quakedesign.plant.plant_values import ExactSector, Matrix, Row, SlowLoad, unit
 
 # ----------------------------------------------------------------------
@@ -242,93 +258,60 @@ class _AllResponses:
         self.jumps = [matrix(jump) for jump, _ in loop.segments]
         self.lengths = [ball(time / pieces) for _, time in loop.segments]
         self.steps = [(self.flow * h).exp() for h in self.lengths]
-        self.powers = [self._powers(step) for step in self.steps]
+        self.powers = [
+            list(accumulate([step] * pieces, lambda now, more: more * now, initial=identity(self.size)))
+            for step in self.steps
+        ]
         self.near = [absolute((majorant(self.flow) * h).exp()) for h in self.lengths]
         self.within = [absolute((majorant(self.flow) * (h * pieces)).exp()) for h in self.lengths]
-
-    def _powers(self, step: Any) -> list[Any]:
-        powers = [identity(self.size)]
-        for _ in range(self.pieces):
-            powers.append(step * powers[-1])
-        return powers
 
     def bounds(self) -> ResponseBounds:
         """The bounds."""
         wholes = [powers[-1] * jump for powers, jump in zip(self.powers, self.jumps, strict=True)]
-        earlier, period = [identity(self.size)], identity(self.size)
-        for whole in wholes:
-            period = whole * period
-            earlier.append(period)
-        later, after = [identity(self.size)], identity(self.size)
-        for whole in reversed(wholes[1:]):
-            after = after * whole
-            later.insert(0, after)
+        *earlier, period = accumulate(wholes, lambda now, whole: whole * now, initial=identity(self.size))
+        later = list(accumulate(wholes[:0:-1], mul, initial=identity(self.size)))[::-1]
         blocks, rests = zip(*(self._own(s, later[s]) for s in range(len(wholes))), strict=True)
-        first, first_rests = self._own(0, identity(self.size)) if len(wholes) > 1 else ([], [])
         # all periods before: groups of columns for every input, units for the remainders
         own = [beside([block[i] for block in blocks]) for i in range(self.kinds)]
         own += [later[0] * self.powers[0][-1] * column(entry) for entry in self.loop.sampled]
-        left = [reduce(lambda a, b: a + b, (rest[i] for rest in rests)) for i in range(self.kinds)]
+        left = [reduce(add, (rest[i] for rest in rests)) for i in range(self.kinds)]
         left += [arb_mat(self.size, 1)] * len(self.loop.sampled)
-        rows = [
-            _above([self.rows * power for power in powers] + [identity(self.size)]) * jump * before
-            for powers, jump, before in zip(self.powers, self.jumps, earlier, strict=False)
-        ]
-        sums, free = self._all_periods(_above([*rows, identity(self.size)]), period, own, left)
-        count = len(self.loop.rows)
-        places = (self.pieces + 1) * count + self.size
-        inputs = [[Fraction(0)] * count for _ in own]
-        start = [Fraction(0)] * count
-        for s in range(len(rows)):
-            span = range(s * places, (s + 1) * places)
-            before = [[sums[r][i] for r in span] for i in range(len(own))]
+        seen = [above([*(self.rows * v for v in powers), identity(self.size)]) for powers in self.powers]
+        rows = [part * jump * before for part, jump, before in zip(seen, self.jumps, earlier, strict=True)]
+        sums, free = self._all_periods(above([*rows, identity(self.size)]), period, own, left)
+        peaks, places = [], seen[0].nrows()
+        for s in range(len(wholes)):
+            before = [BALLS.part(total, s * places, (s + 1) * places) for total in [*sums, free]]
             if s:  # what entered earlier in this period
-                seen = _above([self.rows * power for power in self.powers[s]] + [identity(self.size)]) * self.jumps[s]
-                for i in range(self.kinds):
-                    near, rest = absolute(seen * first[i]), absolute(seen) * first_rests[i]
-                    before[i] = [
-                        v + sum(line, arb(0)) + rest[r, 0]
-                        for r, (v, line) in enumerate(zip(before[i], near.tolist(), strict=True))
-                    ]
-            for i in range(len(own)):
-                peaks = self._peaks(s, i, before[i])
-                inputs[i] = [max(a, b) for a, b in zip(inputs[i], peaks, strict=True)]
-            if self.loop.start:
-                peaks = self._chorded(s, [free[r] for r in span], None)
-                start = [max(a, b) for a, b in zip(start, peaks, strict=True)]
+                first, first_rests = self._own(0, identity(self.size))
+                now = seen[s] * self.jumps[s]
+                for i, (near, rest) in enumerate(zip(first, first_rests, strict=True)):
+                    before[i] = before[i] + row_sums(absolute(now * near)) + absolute(now) * rest
+            peaks.append([self._peaks(s, i, total) for i, total in enumerate(before)])
+        *inputs, start = (tuple(map(max, zip(*lines, strict=True))) for lines in zip(*peaks, strict=True))
         return ResponseBounds(
-            inputs=tuple(tuple(inputs[kind]) for kind in self.kind),
-            sampled=tuple(map(tuple, inputs[self.kinds :])),
-            start=tuple(start),
+            inputs=tuple(inputs[kind] for kind in self.kind), sampled=tuple(inputs[self.kinds :]), start=start
         )
 
     def _own(self, s: int, later: Any) -> tuple[list[Any], list[Any]]:
         """Columns and remainder of every flowing input over one segment, at the end of the period."""
-        h, powers = self.lengths[s], self.powers[s]
-        columns, rests = [], []
+        h, columns, rests = self.lengths[s], [], []
         for entry in self.entries:
-            ends = [power * entry for power in powers]
-            widths = [h / 2, *[h] * (self.pieces - 1), h / 2]
-            columns.append(later * beside([end * width for end, width in zip(ends, widths, strict=True)]))
+            ends = [power * entry for power in self.powers[s]]
+            columns.append(later * scaled(beside(ends), [h / 2, *[h] * (self.pieces - 1), h / 2]))
             bends = (self.near[s] * absolute(self.square * end) for end in ends[:-1])
-            rest = reduce(lambda a, b: a + b, bends) * (h**3 / 12)
-            rests.append(absolute(later) * rest)
+            rests.append(absolute(later) * (reduce(add, bends) * (h**3 / 12)))
         return columns, rests
 
-    def _all_periods(
-        self, rows: Any, period: Any, own: list[Any], left: list[Any]
-    ) -> tuple[list[list[Any]], list[Any]]:
-        """Sums over all periods by row and input, and the largest free response by row."""
-        size, groups = self.size, [block.ncols() for block in own]
-        start = [column(entry) for entry in self.loop.start]
+    def _all_periods(self, rows: Any, period: Any, own: list[Any], left: list[Any]) -> tuple[list[Any], Any]:
+        """Sums over all periods of every row for every input, and the largest free response of every row."""
+        size, start = self.size, [column(entry) for entry in self.loop.start]
         columns = beside([*own, identity(size), *start])
-        ends = [0, *_accumulated([*groups, *[1] * size, len(start)])]
+        ends = list(accumulate([*(block.ncols() for block in own), *[1] * size, len(start)], initial=0))
         now, height, width = rows, rows.nrows(), columns.ncols()
-        sums = [[arb(0)] * (len(groups) + size) for _ in range(height)]
-        free = [arb(0)] * height
-        turned = [columns]  # after some periods: products of many maps, one after another, would lose all digits
-        for _ in range(_AT_ONCE - 1):
-            turned.append(period * turned[-1])
+        sums, free = arb_mat(height, len(ends) - 1), arb_mat(height, 1)
+        # after some periods: products of many maps, one after another, would lose all digits
+        turned = list(accumulate([period] * (_AT_ONCE - 1), lambda late, once: once * late, initial=columns))
         leap, check, done = period**_AT_ONCE, _AT_ONCE, 0
         _require_fading(leap, height * size * (width + size))
         while True:
@@ -336,103 +319,67 @@ class _AllResponses:
                 raise _unstable()
             for _ in range((check - done) // _AT_ONCE):
                 for late in turned:
-                    for r, line in enumerate((now * late).tolist()):
-                        parts = [sum(map(abs, line[a:b]), arb(0)) for a, b in pairwise(ends)]
-                        sums[r] = [a + b for a, b in zip(sums[r], parts[:-1], strict=True)]
-                        free[r] = free[r].max(parts[-1])
+                    table = (now * late).tolist()
+                    lines = [[sum(map(abs, line[a:b]), arb(0)) for a, b in pairwise(ends)] for line in table]
+                    sums, free = sums + arb_mat(lines), larger(free, arb_mat([line[-1:] for line in lines]))
                 now = now * leap
             done, check = check, 2 * check
-            units = range(height - size, height)
-            far = absolute(arb_mat([now.tolist()[r] for r in units]))
+            far = absolute(BALLS.part(now, height - size, height))
             if not all(v < 1 << 80 for v in far.entries()):
                 raise _unstable()
-            totals = [self._total(sums, i, left) for i in range(len(own))]
-            wholes = [_raised([totals[i][r] for r in units]) for i in range(len(own))]
-            most = _raised([free[r] for r in units])
-            if all(_fades(far, part) for part in wholes) and (not start or _fades(far, most)):
+            totals = [_total(sums, i, len(own), rest) for i, rest in enumerate(left)]
+            wholes = [_raised(BALLS.part(total, height - size, height)) for total in totals]
+            most = _raised(BALLS.part(free, height - size, height))
+            if all(not_above(far * part, part * ball(_LEFT)) for part in [*wholes, *([most] if start else [])]):
                 break
         beyond = absolute(now)
         for i, part in enumerate(wholes):
-            solution = _bounded(far, part)
-            more = (beyond * arb_mat([[v] for v in solution])).entries()
-            totals[i] = [(a + b).abs_upper() for a, b in zip(totals[i], more, strict=True)]
-        if start:
-            most = [(v * ball(_ROOM)).abs_upper() for v in most]
-            if not all(a <= b for a, b in zip((far * arb_mat([[v] for v in most])).entries(), most, strict=True)):
+            solution = absolute(part * ball(1 + 2 * _LEFT))  # some x with part + far·x ≤ x
+            if not not_above(part + far * solution, solution):
                 raise _unstable()
-            more = (beyond * arb_mat([[v] for v in most])).entries()
-            free = [a.max(b).abs_upper() for a, b in zip(free, more, strict=True)]
-        return [[totals[i][r] for i in range(len(own))] for r in range(height)], free
+            totals[i] = absolute(totals[i] + beyond * solution)
+        if start:
+            most = absolute(most * ball(_ROOM))
+            if not not_above(far * most, most):
+                raise _unstable()
+            free = absolute(larger(free, beyond * most))
+        return totals, free
 
-    def _total(self, sums: list[list[Any]], i: int, left: list[Any]) -> list[Any]:
-        """Sums for an input with its remainders, by those for unit columns."""
-        count, rest = len(left), left[i].entries()
-        used = [j for j, v in enumerate(rest) if not v.is_zero()]
-        return [line[i] + sum((line[count + j] * rest[j] for j in used), arb(0)) for line in sums]
+    def _peaks(self, s: int, i: int, before: Any) -> Row:
+        """Bounds of all rows in a segment for an input, or at last a start, from what came before it.
 
-    def _peaks(self, s: int, i: int, before: list[Any]) -> list[Fraction]:
-        """Bounds of all rows in a segment for an input, from what came before it."""
-        count, h = len(self.loop.rows), self.lengths[s]
-        if i >= self.kinds:
-            entry = column(self.loop.sampled[i - self.kinds])
-            entry = entry if s == 0 else self.jumps[1] * self.powers[0][-1] * entry
-            since = [absolute(self.rows * (power * entry)).entries() for power in self.powers[s]]
-            bend = (absolute(self.rows * self.square) * self.within[s] * absolute(entry)).entries()
-            return self._chorded(s, before, (since, bend), sampled=True)
-        entry = self.entries[i]
-        heights = [absolute(self.rows * (power * entry)).entries() for power in self.powers[s]]
-        bend = (absolute(self.rows * self.square) * self.within[s] * absolute(entry)).entries()
-        slope = (absolute(self.rows * self.flow) * self.within[s] * absolute(entry)).entries()
-        since = [[arb(0)] * count]
-        for a, b in pairwise(heights):
-            since.append(
-                [t + (x + y) * h / 2 + c * h**3 / 12 for t, x, y, c in zip(since[-1], a, b, bend, strict=True)]
-            )
-        return self._chorded(s, before, (since, slope))
-
-    def _chorded(self, s: int, before: list[Any], since: Any, *, sampled: bool = False) -> list[Fraction]:
-        """Largest of all pieces: of both ends, with what chords leave out."""
-        count, h = len(self.loop.rows), self.lengths[s]
-        units = arb_mat([[v] for v in before[-self.size :]])
-        bent = (absolute(self.rows * self.square) * self.within[s] * units).entries()
-        ends = [before[i * count : (i + 1) * count] for i in range(self.pieces + 1)]
-        if since is not None:
-            ends = [[a + b for a, b in zip(*pair, strict=True)] for pair in zip(ends, since[0], strict=True)]
-            bent = [a + b for a, b in zip(bent, since[1], strict=True)]
-        peaks = [reduce(arb.max, values) for values in zip(*ends, strict=True)]
-        return [end_of((peak + b * h**2 / 8).upper()) for peak, b in zip(peaks, bent, strict=True)]
+        The largest of all pieces: of both ends, with what chords leave out.
+        """
+        count, h, kinds = len(self.loop.rows), self.lengths[s], self.kinds
+        bends = absolute(self.rows * self.square) * self.within[s]
+        bent = bends * BALLS.part(before, before.nrows() - self.size, before.nrows())
+        ends = [BALLS.part(before, k * count, (k + 1) * count) for k in range(self.pieces + 1)]
+        if i < kinds + len(self.loop.sampled):
+            entry = self.entries[i] if i < kinds else column(self.loop.sampled[i - kinds])
+            if s and i >= kinds:
+                entry = self.jumps[1] * self.powers[0][-1] * entry
+            since = [absolute(self.rows * (power * entry)) for power in self.powers[s]]
+            more = bends * absolute(entry)
+            if i < kinds:
+                parts = ((a + b) * h / 2 for a, b in pairwise(since))
+                since = list(accumulate(parts, lambda t, part: t + part + more * h**3 / 12, initial=arb_mat(count, 1)))
+                bent = bent + absolute(self.rows * self.flow) * self.within[s] * absolute(entry)
+            else:
+                bent = bent + more
+            ends = list(map(add, ends, since))
+        return tuple(map(upper, (reduce(larger, ends) + bent * h**2 / 8).entries()))
 
 
-def _accumulated(counts: Iterable[int]) -> list[int]:
-    sums: list[int] = []
-    for count in counts:
-        sums.append(count + (sums[-1] if sums else 0))
-    return sums
+def _total(sums: Any, i: int, count: int, rest: Any) -> Any:
+    """Sums for an input with its remainders, by those for unit columns."""
+    used = [(count + j, v) for j, v in enumerate(rest.entries()) if not v.is_zero()]
+    return arb_mat([[line[i] + sum((line[j] * v for j, v in used), arb(0))] for line in sums.tolist()])
 
 
-def _above(parts: list[Any]) -> Any:
-    return arb_mat([list(row) for part in parts for row in part.tolist()])
-
-
-def _raised(part: list[Any]) -> list[Any]:
+def _raised(part: Any) -> Any:
     """Bounds of which none is 0, each a little larger."""
-    faint = reduce(arb.max, part) * ball(_FAINT)
-    return [(v + faint).abs_upper() for v in part]
-
-
-def _fades(far: Any, part: list[Any]) -> bool:
-    """Whether what a map leaves of bounds is a small share."""
-    later = (far * arb_mat([[v] for v in part])).entries()
-    return all(a <= b * ball(_LEFT) for a, b in zip(later, part, strict=True))
-
-
-def _bounded(far: Any, part: list[Any]) -> list[Any]:
-    """Some x with part + far·x ≤ x."""
-    bounds = [(v * ball(1 + 2 * _LEFT)).abs_upper() for v in part]
-    later = (far * arb_mat([[v] for v in bounds])).entries()
-    if not all(a + b <= x for a, b, x in zip(part, later, bounds, strict=True)):
-        raise _unstable()
-    return bounds
+    faint = reduce(arb.max, part.entries()) * ball(_FAINT)
+    return arb_mat([[(v + faint).abs_upper()] for v in part.entries()])
 
 
 def _require_fading(leap: Any, work: int) -> None:

@@ -60,9 +60,9 @@ from typing import Any
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, shortly
-from quakedesign.guarantees.exact.loop import Channel, Gains, SampledLoop
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import Channel, Gains, SampledLoop
 from quakedesign.guarantees.exact.small_gain import channel_bounds
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
 from quakedesign.plant.sliding_plant import Range, SlidingPlant

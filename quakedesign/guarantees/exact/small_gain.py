@@ -15,12 +15,20 @@ from flint import arb, ctx
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, shortly
-from quakedesign.guarantees.exact.loop import NOISELESS, Channel, Gains, GainSpread, beside, channels_of, through_layer
 from quakedesign.guarantees.exact.norms import ball, flow_norms, norms
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import (
+    NOISELESS,
+    Channel,
+    Gains,
+    GainSpread,
+    beside,
+    channels_of,
+    through_layer,
+)
 from quakedesign.laws import ImplicitRoot, NominalModel, Power
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 # ----------------------------------------------------------------------
 # Robust small-gain theorem for the sampled loop: bounds for all t ≥ 0, in exact arithmetic.
@@ -97,8 +105,8 @@ from quakedesign.plant.ranges import FaultPlant
 # exceed the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
 #
 # **Layer between well and fault.** The pressure in the fault is that of the modes, v, plus their truncation error R,
-# |R| ≤ sup|y| with the output y = ``left_out`` (`quakedesign.loop.layer`). Of β(v + R) the loop has β0·v and, with x2 =
-# e2 − β0Y in place of e2 (`quakedesign.loop.layer`), the known part of β0·R. So (β − β0)R enters x2′ beside a, with the
+# |R| ≤ sup|y| with the output y = ``left_out`` (`loop.diffusion_layer`). Of β(v + R) the loop has β0·v and, with x2 =
+# e2 − β0Y in place of e2 (`loop.diffusion_layer`), the known part of β0·R. So (β − β0)R enters x2′ beside a, with the
 # c of v for y. While the well's pressure changes continuously it is part of a; where the pressure steps, R fades after
 # every step and is an input of its own. In a slow gain, past values of R are treated as those of v, with the same c.
 # There are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its

@@ -4,7 +4,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.guarantees.exact.file_entries import Powers, TaskEntries, power_entries, powers, task_entries
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip, StickSlipClaims, StickSlipPolytope
 from quakedesign.laws.implicit_root import ImplicitRoot
 from quakedesign.laws.stick_slip_law import StickSlipLaw

@@ -78,10 +78,10 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, shortly
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
 from quakedesign.guarantees.exact.small_gain import holds
-from quakedesign.guarantees.exact.statement import above
+from quakedesign.guarantees.exact.tracking_proof import above
 from quakedesign.laws.implicit_root import ImplicitRoot
 from quakedesign.laws.stick_slip_law import StickSlipLaw
-from quakedesign.plant.ranges import FaultPlant, Range
+from quakedesign.plant.fault_plant import FaultPlant, Range
 
 BITS = 128
 NODES = 16  # pieces of a period, for integrals of impulse responses

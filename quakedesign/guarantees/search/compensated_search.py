@@ -21,13 +21,13 @@ from quakedesign.cache import search_once
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
 from quakedesign.fault.model import require_ordinary
-from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, holds
-from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
-from quakedesign.guarantees.exact.stick_slip_guarantee import FaultProof, StickSlipProof
+from quakedesign.guarantees.exact.stick_slip_proof import FaultProof, StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip
-from quakedesign.guarantees.search.estimate import BoundsEstimate, closeness, estimated, spectral_radius
+from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
+from quakedesign.guarantees.search.float_bounds import BoundsEstimate, closeness, estimated, spectral_radius
 from quakedesign.guarantees.search.linear_design import (
     MOST_DELAY,
     OBJECTIVES,
@@ -48,7 +48,7 @@ from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.implicit import end_rate, end_slip
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.symbolic import SignedPower
 
 # ----------------------------------------------------------------------

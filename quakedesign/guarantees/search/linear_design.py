@@ -21,11 +21,18 @@ from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
-from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain
-from quakedesign.guarantees.exact.statement import ContinuousProof, TrackingProof, above, continuous_peaks, guarantee
-from quakedesign.guarantees.search.estimate import (
+from quakedesign.guarantees.exact.tracking_proof import (
+    ContinuousProof,
+    TrackingProof,
+    above,
+    continuous_peaks,
+    guarantee,
+)
+from quakedesign.guarantees.search.aperiodic_search import unclocked_estimate, unclocked_guarantee
+from quakedesign.guarantees.search.float_bounds import (
     BoundsEstimate,
     closeness,
     closeness_of_bounds,
@@ -42,13 +49,12 @@ from quakedesign.guarantees.search.lqg import (
     require_setup,
     why_no_law,
 )
-from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import PeriodicLoop, exact_integrals
 from quakedesign.loop.loop_setup import MEASURED, Pump, require_step
 from quakedesign.lyapunov.exact.claim import Verdict
+from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.plant.of_fault import uncertain_plant
-from quakedesign.plant.ranges import FaultPlant
 
 # ----------------------------------------------------------------------
 # Guarantees with a slowly varying input gain, for friction that depends on the slip alone.

@@ -19,15 +19,15 @@ from scipy.linalg import LinAlgError, expm, solve_discrete_are
 from quakedesign.errors import ParameterError
 from quakedesign.exact import fraction_of, rational, shortly, to_sympy
 from quakedesign.fault import Fault
-from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.search.estimate import rounded, short
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
+from quakedesign.guarantees.search.float_bounds import rounded, short
 from quakedesign.laws import ErrorModel, LinearLaw, NominalModel, compensator, disturbance_estimate, slip_observer
 from quakedesign.laws.sampled_law import Matrix, Row, unit_row
 from quakedesign.loop import SHORTEST, Layer, SlidingModel
-from quakedesign.loop.layer import MODES
+from quakedesign.loop.diffusion_layer import MODES
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.loop.sensing.differentiator import ORDER, by_differences, names_before
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_rate
 
 # ----------------------------------------------------------------------

@@ -10,7 +10,8 @@ from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, rational
-from quakedesign.guarantees.exact.plant_guarantee import (
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, ResponseBounds, response_bounds
+from quakedesign.guarantees.exact.plant_proof import (
     MOST_PIECES,
     PlantClaims,
     PlantProof,
@@ -18,9 +19,8 @@ from quakedesign.guarantees.exact.plant_guarantee import (
     peaks,
     row_bounds,
 )
-from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, ResponseBounds, response_bounds
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.statement import MARGIN, above
+from quakedesign.guarantees.exact.tracking_proof import MARGIN, above
 from quakedesign.plant.plant_values import Row
 from quakedesign.plant.user_plant import UncertainPlant
 

@@ -16,8 +16,8 @@ from scipy.optimize import minimize
 from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof, named
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw
+from quakedesign.guarantees.exact.plant_proof import PlantProof, named
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sliding_blocks import MPA, BlockClaims, SlidingBlocks
 from quakedesign.guarantees.exact.sliding_small_gain import exponential

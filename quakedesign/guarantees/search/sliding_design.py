@@ -17,8 +17,9 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
-from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
+from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.sliding_small_gain import (
     SlidingClaims,
     after_a_step,
@@ -28,8 +29,7 @@ from quakedesign.guarantees.exact.sliding_small_gain import (
     loop_of,
     model_of,
 )
-from quakedesign.guarantees.exact.statement import SlidingProof
-from quakedesign.guarantees.search.estimate import gains_of, short, spectral_radius
+from quakedesign.guarantees.search.float_bounds import gains_of, short, spectral_radius
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop, SlidingModel

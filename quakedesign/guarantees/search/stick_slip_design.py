@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from quakedesign.cache import search_once
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof, stick_slip_guarantee
+from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import (
     COMBINATIONS,
     SLICES,
@@ -34,10 +34,10 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     sliding_rows,
     stop_bounds,
 )
-from quakedesign.guarantees.search.adversary import WorstCase
-from quakedesign.guarantees.search.estimate import short
+from quakedesign.guarantees.search.float_bounds import short
+from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.laws.stick_slip_law import StickSlipLaw
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.sos.exact.strict import read_as, written
 
 Tell = Callable[[str, float], None]

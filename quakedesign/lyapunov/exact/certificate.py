@@ -16,7 +16,7 @@ from quakedesign.lyapunov.exact.certificate_files import evidence_of, read_json,
 from quakedesign.lyapunov.exact.claim import Equilibrium, Evidence, Loop, Verdict, loop_of, require
 from quakedesign.lyapunov.exact.obligations import Obligation, claimed, different, proves
 from quakedesign.sos.exact.strict import parse
-from quakedesign.sos.exact.work import limited
+from quakedesign.sos.exact.work_budget import limited
 from quakedesign.symbolic.terms import Term, value
 
 if TYPE_CHECKING:

@@ -25,8 +25,7 @@ from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.claim import Loop, root_enclosure
 from quakedesign.lyapunov.exact.loop_expressions import unit_ranges
 from quakedesign.lyapunov.exact.obligations import Obligation, Obligations, obligation_degree, power_sum, statement_of
-from quakedesign.lyapunov.search.parametric_forms import FormRow, Kin, float_rows, values_of
-from quakedesign.lyapunov.search.search import (
+from quakedesign.lyapunov.search.lyapunov_search import (
     balance,
     exponents_of,
     find_certificate,
@@ -35,6 +34,7 @@ from quakedesign.lyapunov.search.search import (
     scaled,
     sum_of,
 )
+from quakedesign.lyapunov.search.parametric_forms import FormRow, Kin, float_rows, values_of
 from quakedesign.sos import Polynomial
 from quakedesign.sos.solve.joint import DecisionBounds, Demand, JointProgram, joint_program
 from quakedesign.symbolic.term_expressions import signed_monomials

@@ -39,7 +39,7 @@ from quakedesign.lyapunov.gains.path_following import (
     with_gains,
 )
 from quakedesign.lyapunov.search.certify import Number, closed_loop, largest_gain_range
-from quakedesign.lyapunov.search.search import (
+from quakedesign.lyapunov.search.lyapunov_search import (
     GIVE_AWAY,
     balance,
     below,
@@ -48,7 +48,7 @@ from quakedesign.lyapunov.search.search import (
     finish,
     with_largest_decay,
 )
-from quakedesign.lyapunov.search.settling import fastest_settling
+from quakedesign.lyapunov.search.settling_time import fastest_settling
 from quakedesign.parallel import Crew, Here, crew_or_here
 from quakedesign.sos.solve.conic import handing_back
 

@@ -24,7 +24,7 @@ from quakedesign.lyapunov.exact.certificate_files import certificate_text
 from quakedesign.lyapunov.exact.claim import Loop, root_enclosure
 from quakedesign.lyapunov.maps.sweep import CLEAR, Frame, Path, Sweep, prove
 from quakedesign.lyapunov.search.certify import Number, closed_loop, necessary_limit
-from quakedesign.lyapunov.search.search import candidate_degrees
+from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees
 from quakedesign.parallel import Crew, Here, crew_or_here
 from quakedesign.sos.solve.conic import handing_back
 

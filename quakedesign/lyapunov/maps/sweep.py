@@ -21,8 +21,8 @@ from quakedesign.laws import Subject
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.claim import Loop
 from quakedesign.lyapunov.exact.obligations import Obligation, statement_of
+from quakedesign.lyapunov.search.lyapunov_search import Family, balance, exponents_of, finished, lifted_scale, normal
 from quakedesign.lyapunov.search.parametric_forms import FormRow, ends_of, rows_of, values_of
-from quakedesign.lyapunov.search.search import Family, balance, exponents_of, finished, lifted_scale, normal
 from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.solve.conic import Compiled, in_cones

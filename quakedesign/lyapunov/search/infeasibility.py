@@ -13,7 +13,7 @@ from quakedesign.errors import CertificateError
 from quakedesign.exact import fraction_of
 from quakedesign.lyapunov.exact.claim import Loop
 from quakedesign.lyapunov.exact.obligations import Obligation, Obligations
-from quakedesign.lyapunov.search.search import balance, exponents_of
+from quakedesign.lyapunov.search.lyapunov_search import balance, exponents_of
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.symbolic.term_expressions import signed_monomials

@@ -47,10 +47,10 @@ from quakedesign.simulation.compiled import (
     processor_flags,
     shared_library,
 )
+from quakedesign.simulation.earthquake import natural_peak
 from quakedesign.simulation.integrators import Integrator, adaptive_integrators
-from quakedesign.simulation.natural import natural_peak
 from quakedesign.simulation.recorder import EVENTS, Metrics, Recorder, events, metrics
-from quakedesign.simulation.run import RunSetting, library_versions, loop_class, run
+from quakedesign.simulation.run_settings import RunSetting, library_versions, loop_class, run
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, criterion_of, simulate_sliding
 from quakedesign.simulation.state_plant import FRICTION, PressurePath, SlidingVariation, Tide
 from quakedesign.simulation.stepping import Advancer

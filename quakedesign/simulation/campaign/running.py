@@ -34,7 +34,7 @@ from quakedesign.simulation.campaign.problem import (
 from quakedesign.simulation.campaign.space import Sample, Space, Worst, require_count, search
 from quakedesign.simulation.closed_loop import Load
 from quakedesign.simulation.integrators import DormandPrince, integrator
-from quakedesign.simulation.run import STICK_SLIP, RunSetting, own_path, sampled_scheme
+from quakedesign.simulation.run_settings import STICK_SLIP, RunSetting, own_path, sampled_scheme
 from quakedesign.simulation.slow_sliding import PLANTS
 from quakedesign.simulation.state_plant import TIDE
 

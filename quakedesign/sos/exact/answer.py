@@ -10,7 +10,7 @@ from quakedesign.sos.exact.polynomial import Polynomial
 from quakedesign.sos.exact.polynomial_files import save
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Functional, Point, Proof, SumOfSquares, holds
-from quakedesign.sos.exact.work import limited
+from quakedesign.sos.exact.work_budget import limited
 
 
 class Positivity(Enum):

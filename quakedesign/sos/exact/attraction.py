@@ -34,7 +34,7 @@ from quakedesign.sos.exact.strict import (
     write_readable,
     written,
 )
-from quakedesign.sos.exact.work import limited
+from quakedesign.sos.exact.work_budget import limited
 
 # ----------------------------------------------------------------------
 # Regions of attraction by a Lyapunov function: what is claimed of a polynomial field, and whether its proof holds.

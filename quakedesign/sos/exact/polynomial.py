@@ -12,7 +12,7 @@ from flint import fmpq, fmpq_mpoly_ctx, fmpz_mat
 
 from quakedesign.errors import PolynomialError
 from quakedesign.exact import fraction_of, fraction_of_float, to_sympy
-from quakedesign.sos.exact.work import counted, expanded, length, longest, spend
+from quakedesign.sos.exact.work_budget import counted, expanded, length, longest, spend
 
 # ----------------------------------------------------------------------
 # Sparse polynomials with rational coefficients: exponents to nonzero coefficient.

@@ -34,7 +34,7 @@ from quakedesign.sos.exact.polynomial import (
 )
 from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.reduction import reduced_bases
-from quakedesign.sos.exact.work import expanded, length, longest, spend
+from quakedesign.sos.exact.work_budget import expanded, length, longest, spend
 
 # ----------------------------------------------------------------------
 # Squares bᵀQb with exact numbers: what they expand to, and whether they are squares.

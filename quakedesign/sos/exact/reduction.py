@@ -16,7 +16,7 @@ from quakedesign.errors import PolynomialError
 from quakedesign.exact import shortly
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree, monomials, times
 from quakedesign.sos.exact.polynomial_statement import Statement, parity, residue
-from quakedesign.sos.exact.work import spend
+from quakedesign.sos.exact.work_budget import spend
 
 _MONOMIALS, _PAIRS = 2_000, 8_000_000
 

@@ -10,7 +10,7 @@ from quakedesign.sos.exact.answer import Answer
 from quakedesign.sos.exact.attraction import Attraction, Region
 from quakedesign.sos.exact.polynomial import Polynomial, evaluate
 from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares
-from quakedesign.sos.exact.work import length
+from quakedesign.sos.exact.work_budget import length
 
 # ----------------------------------------------------------------------
 # An answer in sentences.

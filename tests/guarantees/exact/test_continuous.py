@@ -9,7 +9,7 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, ContinuousProof, NoProof
-from quakedesign.guarantees.exact import statement as continuous
+from quakedesign.guarantees.exact import tracking_proof as continuous
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee, save_guarantee
 from quakedesign.loop import exact_integrals
 from quakedesign.lyapunov.exact.claim import Verdict

@@ -19,6 +19,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import SampledLoop, continuous_peaks, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import (
     ErrorModel,
@@ -32,7 +33,7 @@ from quakedesign.laws import (
 from quakedesign.loop import exact_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant import ranges as package_task
+from quakedesign.plant import fault_plant as package_task
 from quakedesign.plant import uncertain_plant
 
 PATH = Path(__file__).parents[3] / "proofs" / "check.py"
@@ -94,7 +95,7 @@ PATHS_OF = {
     "late rock": {"diffusion": F("0.5"), "delay": F("0.02")},
 }
 for name, path in PATHS_OF.items():
-    through = family_of(uncertain_plant(load_fault("real-fault")), STEP, "slip-and-rate", path).law
+    through = family_of(uncertain_plant(load_fault("real-fault")), STEP, "slip-and-rate", ExactSetup(**path)).law
     LOOPS[name] = SampledLoop(law=through(np.array([0.94, -8.28, 0.1237])), step=STEP, **path)
 CONTINUOUS_GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
 CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)

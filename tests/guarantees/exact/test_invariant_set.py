@@ -20,8 +20,8 @@ from quakedesign.guarantees import NoProof, guarantee
 from quakedesign.guarantees.exact import invariant_set as reach
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.invariant_set import _SampleMap, reduced
-from quakedesign.guarantees.exact.loop import channels_of
 from quakedesign.guarantees.exact.norms import matrix
+from quakedesign.guarantees.exact.sampled_loop import channels_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict

@@ -21,8 +21,8 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, read_guarantee, save_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof, named
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw, response_bounds
+from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof, named
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.plant import uncertain_plant
 

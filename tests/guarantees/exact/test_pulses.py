@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from standalone_guarantee import checker
 
 from quakedesign.guarantees.exact.norms import norms
-from quakedesign.guarantees.search.estimate import gains_of
+from quakedesign.guarantees.search.float_bounds import gains_of
 from quakedesign.loop import PeriodicLoop, Pulse, Segment
 
 FINE = tuple(F(i, 16) for i in range(17))

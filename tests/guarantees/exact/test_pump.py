@@ -11,6 +11,7 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.guarantees import NoProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -55,7 +56,7 @@ def test_behind_a_lag_the_pressure_at_the_valve_counts():
     limits = Pump(least=F(-5), largest=F(5))
     assert not limits.exceeded(LowerBound(F(-5)), UpperBound(F(5)))
     task, around = stored().task, {"lag": F("0.2")}
-    law = family_of(task, F("0.184"), "slip-and-rate", around).law([-2.4, -6.0, 0.3])
+    law = family_of(task, F("0.184"), "slip-and-rate", ExactSetup(**around)).law([-2.4, -6.0, 0.3])
     lagging = replace(stored(law=law, **around), slow_gain=None)
     found = guarantee(task, lagging.held)
     (_, fault), (_, valve) = found.claims.pressures

@@ -17,7 +17,7 @@ from quakedesign.errors import QuakedesignError
 from quakedesign.exact import UpperBound
 from quakedesign.fault.friction import rate_and_state as friction_laws
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document
-from quakedesign.guarantees.exact.plant_guarantee import PlantClaims, PlantProof
+from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof
 from quakedesign.guarantees.exact.sliding_blocks import BlockClaims, SlidingBlocks
 from quakedesign.guarantees.search import sliding_block_design
 

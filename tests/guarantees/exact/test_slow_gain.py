@@ -13,14 +13,14 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, SlowGain, TrackingProof, guarantee
 from quakedesign.guarantees.exact import small_gain as module
-from quakedesign.guarantees.exact import statement
+from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
-from quakedesign.guarantees.exact.loop import GainSpread, channels_of
+from quakedesign.guarantees.exact.sampled_loop import GainSpread, channels_of
 from quakedesign.laws import summed_integrals
 from quakedesign.loop import PeriodicLoop
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
-from quakedesign.plant.ranges import FaultPlant, Friction
+from quakedesign.plant.fault_plant import FaultPlant, Friction
 
 SLOW = SlowGain(parts=2, growth=F(1, 9))
 FRICTION = Friction(static=F(4), least=F(4), largest=F(4), weakening=F(5), strengthening=F(2), rate_slope=F(0))

@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, NoProof
-from quakedesign.guarantees.exact.loop import channels_of
+from quakedesign.guarantees.exact.sampled_loop import channels_of
 from quakedesign.guarantees.exact.small_gain import bounds_from, spectral_radius
 from quakedesign.laws import ImplicitRoot, Power
 from quakedesign.plant import uncertain_plant

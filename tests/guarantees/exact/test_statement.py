@@ -9,10 +9,10 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, TrackingProof, guarantee
-from quakedesign.guarantees.exact import statement
-from quakedesign.guarantees.exact import statement as continuous
-from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.exact.statement import above, sentence_of
+from quakedesign.guarantees.exact import tracking_proof as continuous
+from quakedesign.guarantees.exact import tracking_proof as statement
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
+from quakedesign.guarantees.exact.tracking_proof import above, sentence_of
 from quakedesign.laws import ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
 from quakedesign.loop import ContinuousLaw, Instants
 from quakedesign.loop.loop_setup import Pump

@@ -20,7 +20,7 @@ from quakedesign.fault import fault_toml
 from quakedesign.guarantees import guarantee_document, load_guarantee, read_guarantee
 from quakedesign.guarantees.exact import stick_slip_set
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof, stick_slip_guarantee
+from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof, stick_slip_guarantee
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip, gap, ranges, stick_slip_bounds, stop_bounds
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip, worst_stick_slip
 from quakedesign.guarantees.stick_slip_result import StickSlipGuarantee
@@ -28,7 +28,7 @@ from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
-from quakedesign.studies.runs import certified_choice
+from quakedesign.studies.single_runs import certified_choice
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_real-fault.json"
 

@@ -12,8 +12,8 @@ from thinned import few
 
 from quakedesign.guarantees import NoProof, guarantee, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.search.adversary import _events, _on_time
-from quakedesign.guarantees.search.estimate import estimated
+from quakedesign.guarantees.search.float_bounds import estimated
+from quakedesign.guarantees.search.worst_case import _events, _on_time
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 

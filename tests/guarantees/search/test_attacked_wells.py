@@ -12,7 +12,7 @@ from thinned import few
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import design_held
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
 

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 import quakedesign as qd
 from quakedesign.guarantees import SampledLoop, guarantee
-from quakedesign.guarantees.search.adversary import worst_tracking
+from quakedesign.guarantees.search.worst_case import worst_tracking
 from quakedesign.laws import LinearLaw
 from quakedesign.plant import uncertain_plant
 

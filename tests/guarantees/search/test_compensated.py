@@ -22,7 +22,7 @@ from quakedesign.guarantees import (
     tightened,
     worst_tracking,
 )
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import implicit_pull
 from quakedesign.laws import Power, Sampling, control_law, published
 from quakedesign.laws.feed_forward import feed_forward

@@ -41,7 +41,7 @@ def designed(name):
 def unreached(monkeypatch):
     """Without how far other designs would go, which is another test's."""
     for name in ("longest_step", "longest_delay"):
-        monkeypatch.setattr(f"quakedesign.guarantees.search.defaults.{name}", lambda *_, **__: None)
+        monkeypatch.setattr(f"quakedesign.guarantees.search.default_designs.{name}", lambda *_, **__: None)
 
 
 def premises(design):
@@ -140,8 +140,8 @@ def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_st
 
 def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
     fails = NoProof(reason="small gain 1.2")
-    monkeypatch.setattr("quakedesign.guarantees.search.defaults.design_held", lambda *_, **__: fails)
-    monkeypatch.setattr("quakedesign.guarantees.search.defaults.longest_step", lambda *_, **__: None)
+    monkeypatch.setattr("quakedesign.guarantees.search.default_designs.design_held", lambda *_, **__: fails)
+    monkeypatch.setattr("quakedesign.guarantees.search.default_designs.longest_step", lambda *_, **__: None)
     design = qd.design(REAL, "elqr", plant="printed")
     assert (design.verdict, design.controller) == (Verdict.UNDECIDED, None)
     assert design.details["reason"] == "small gain 1.2"

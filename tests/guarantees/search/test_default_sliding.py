@@ -24,7 +24,7 @@ from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import controller_step, simulate, to_casadi, to_iosystem
 from quakedesign.simulation.campaign import campaign_problem
 from quakedesign.studies.comparison import Entry
-from quakedesign.studies.runs import chosen_controller
+from quakedesign.studies.single_runs import choice
 from quakedesign.synthesis import assess
 
 pytestmark = pytest.mark.slow  # tests/laws/test_rest_limit.py designs one by default
@@ -35,7 +35,7 @@ STEP = F("0.184")
 DESIGN, COMPENSATED = map(
     import_module, ("quakedesign.synthesis.sliding_mode_design", "quakedesign.guarantees.search.compensated_search")
 )
-DEFAULT = import_module("quakedesign.guarantees.search.defaults")
+DEFAULT = import_module("quakedesign.guarantees.search.default_designs")
 CERTIFICATE = Path(__file__).parents[3] / "proofs" / "certificates" / "cta_7_5_2.3_1.1.json"
 
 
@@ -54,7 +54,7 @@ def unproved(monkeypatch):
 def unreached(monkeypatch):
     """Without how far other designs would go, which is another test's."""
     for name in ("longest_step", "longest_delay"):
-        monkeypatch.setattr(f"quakedesign.guarantees.search.defaults.{name}", lambda *_, **__: None)
+        monkeypatch.setattr(f"quakedesign.guarantees.search.default_designs.{name}", lambda *_, **__: None)
 
 
 def run(controller, **options):
@@ -235,11 +235,11 @@ def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monke
 
 
 def test_gains_of_the_command_line_are_designed_either_way(unproved, monkeypatch):
-    monkeypatch.setattr("quakedesign.studies.runs.design", lambda fault, name, continuous: designed())
-    assert chosen_controller(REAL, "cta", ("designed",)) is designed().controller
+    monkeypatch.setattr("quakedesign.studies.single_runs.design", lambda fault, name, continuous: designed())
+    assert choice(REAL, "cta", ("designed",)).controller is designed().controller
     with pytest.raises(ParameterError, match="Give --gains continuous"):
-        chosen_controller(REAL, "cta", ("designed",), feedforward="centred")
-    assert chosen_controller(REAL, "cta", ("designed",), scale="1").scale == 1
+        choice(REAL, "cta", ("designed",), feedforward="centred")
+    assert choice(REAL, "cta", ("designed",), scale="1").controller.scale == 1
 
 
 UNUSUAL = {

@@ -15,9 +15,9 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.search.adversary import WorstCase
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.linear_design import _with_noise, closest
+from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.laws import published
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.lyapunov.exact.claim import Verdict

@@ -9,8 +9,8 @@ import quakedesign as qd
 from quakedesign.cli.design_commands import DesignOptions
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.guarantees import SampledLoop, guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
-from quakedesign.guarantees.search.defaults import SampledDesign
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
+from quakedesign.guarantees.search.default_designs import SampledDesign
 from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
 from quakedesign.studies import comparison

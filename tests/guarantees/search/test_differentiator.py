@@ -14,7 +14,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingGuarantee, design_held
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import measured_by
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov import Verdict

@@ -15,7 +15,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
 from quakedesign.guarantees import design_held, tightened, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.search.adversary import _steepest
+from quakedesign.guarantees.search.worst_case import _steepest
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
 from quakedesign.studies.comparison import Entry
@@ -28,7 +28,7 @@ ANY = parse_guarantee((Path(__file__).parents[3] / "proofs" / "certificates" / "
 def tide():
     patch = pytest.MonkeyPatch()
     for name in ("longest_step", "longest_delay"):  # how far other designs would go is another test's
-        patch.setattr(f"quakedesign.guarantees.search.defaults.{name}", lambda *_, **__: None)
+        patch.setattr(f"quakedesign.guarantees.search.default_designs.{name}", lambda *_, **__: None)
     yield qd.design(REAL, "elqr", disturbance_class="rate")
     patch.undo()
 

@@ -7,9 +7,9 @@ import pytest
 from quakedesign import cache
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingProof
-from quakedesign.guarantees.search import adversary
 from quakedesign.guarantees.search import linear_design as design
 from quakedesign.guarantees.search import linear_design as longest_times
+from quakedesign.guarantees.search import worst_case as adversary
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
 

@@ -12,7 +12,7 @@ import quakedesign as qd
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingProof, design_held, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup
 from quakedesign.guarantees.search import linear_design as longest_times
 from quakedesign.guarantees.search.linear_design import (
     Closest,

@@ -13,10 +13,10 @@ import quakedesign as qd
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, SampledLoop, TrackingGuarantee, TrackingProof, best_guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import design_compensated
-from quakedesign.guarantees.search.defaults import deadbeat, sampled_sliding_mode
-from quakedesign.guarantees.search.estimate import closeness
+from quakedesign.guarantees.search.default_designs import deadbeat, sampled_sliding_mode
+from quakedesign.guarantees.search.float_bounds import closeness
 from quakedesign.guarantees.search.linear_design import Linear, design_held, longest_delay, longest_step, nearest_setup
 from quakedesign.laws import control_law
 from quakedesign.loop.loop_setup import Pump

@@ -14,7 +14,7 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, worst_tracking
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.linear_design import Longest, closest, design_at
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.loop.sensing.measurement import Measurement
@@ -136,7 +136,7 @@ def test_what_cannot_be_measured_so_is_refused(wrong, said):
         qd.guarantee(REAL, **wrong)
 
 
-MODULE = "quakedesign.guarantees.search.defaults"
+MODULE = "quakedesign.guarantees.search.default_designs"
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from fractions import Fraction as F
 import numpy as np
 import pytest
 
-from quakedesign.guarantees.search.estimate import own_poles, spectral_radius
+from quakedesign.guarantees.search.float_bounds import own_poles, spectral_radius
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop, Segment
 

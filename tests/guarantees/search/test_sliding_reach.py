@@ -9,7 +9,7 @@ import pytest
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault, Reference, friction_law
 from quakedesign.guarantees import NoProof, SampledLoop, SlidingClaims, SlidingProof
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import sliding_design
 from quakedesign.guarantees.search.sliding_design import (
     LOG_RATES,

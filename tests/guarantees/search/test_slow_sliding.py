@@ -16,12 +16,12 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import SampledLoop, SlidingClaims
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_small_gain import cell_bounds
 from quakedesign.guarantees.search import sliding_design as slow_sliding
-from quakedesign.guarantees.search.adversary import SlidingPieces, corners, courses, worst_sliding
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
 from quakedesign.guarantees.search.sliding_design import LOG_RATES, proved_sliding
+from quakedesign.guarantees.search.worst_case import SlidingPieces, corners, courses, worst_sliding
 from quakedesign.guarantees.sliding_result import guarantee_sliding
 from quakedesign.loop import SlidingModel
 from quakedesign.lyapunov import Verdict

@@ -15,7 +15,7 @@ from quakedesign.cli import main
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import WorstCase, guarantee, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
-from quakedesign.guarantees.search.estimate import estimated
+from quakedesign.guarantees.search.float_bounds import estimated
 from quakedesign.lyapunov.exact.claim import Verdict
 
 SPECIFICATION = importlib.util.spec_from_file_location("attacker", Path(__file__).with_name("attacker.py"))

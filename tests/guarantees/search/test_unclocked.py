@@ -11,10 +11,10 @@ import pytest
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, tightened
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.loop import ExactSetup
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
+from quakedesign.guarantees.search import aperiodic_search as unclocked
 from quakedesign.guarantees.search import linear_design as design
-from quakedesign.guarantees.search import unclocked
-from quakedesign.guarantees.search.unclocked import unclocked_estimate, unclocked_guarantee
+from quakedesign.guarantees.search.aperiodic_search import unclocked_estimate, unclocked_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
 

@@ -28,7 +28,7 @@ from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation import integrator, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import _step
+from quakedesign.simulation.run_settings import _step
 
 REAL = load_fault("real-fault")
 SAMPLED = [*sorted(name for name, kind in schemes().items() if issubclass(kind, Sampled)), "own_parts:Halved"]

@@ -13,8 +13,8 @@ from quakedesign.lyapunov import Certificate, Loop, Verdict, Witness, decided_on
 from quakedesign.lyapunov.exact.certificate import _check_equilibrium, _check_proof, _check_roots
 from quakedesign.lyapunov.exact.claim import Equilibrium
 from quakedesign.lyapunov.exact.obligations import claimed, different
-from quakedesign.lyapunov.search.search import finish
-from quakedesign.sos.exact import work
+from quakedesign.lyapunov.search.lyapunov_search import finish
+from quakedesign.sos.exact import work_budget as work
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.symbolic import SignedPower
 from quakedesign.symbolic.terms import Term

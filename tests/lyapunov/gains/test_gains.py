@@ -87,7 +87,7 @@ def test_the_fastest_decay_at_equal_norm():
     assert found.norm <= math.hypot(7, 5, 2.3, 1.1) * (1 + 1e-9)
     assert found.certificate.check() is Verdict.PROVED
     # by the other room's bound on the settling time from all |e_i| ≤ 1, with V enclosed there in its own way
-    from quakedesign.lyapunov.search.settling import settling
+    from quakedesign.lyapunov.search.settling_time import settling
 
     bound = settling(found.certificate, 1)
     assert bound.seconds == pytest.approx(1 / found.value, rel=0.01)
@@ -125,7 +125,7 @@ def test_the_range_of_given_gains_is_the_largest_of_their_family():
     low, high = reached.certificate.loop.uncertain["beta"]
     assert reached.value == pytest.approx(math.sqrt(high / low))
     from quakedesign.lyapunov.search.certify import closed_loop
-    from quakedesign.lyapunov.search.search import find_certificate
+    from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 
     ends = (low * F(999, 1000), high * F(1001, 1000))
     assert find_certificate(closed_loop("cta", (7, 5, "2.3", "1.1"), lipschitz=1, gain_range=ends), 5) is None

@@ -17,7 +17,7 @@ from quakedesign.lyapunov.gains.path_following import (
     with_gains,
 )
 from quakedesign.lyapunov.search.certify import closed_loop
-from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.symbolic.term_expressions import signed_monomials
 
 

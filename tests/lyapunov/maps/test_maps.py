@@ -14,7 +14,7 @@ from quakedesign.lyapunov import Verdict, parse_certificate
 from quakedesign.lyapunov.maps import gain_map as maps
 from quakedesign.lyapunov.maps.gain_map import SHARES, Screener, Screeners, axis, gain_map
 from quakedesign.lyapunov.search.certify import closed_loop
-from quakedesign.lyapunov.search.search import find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.parallel import Processes
 
 SPECIFICATION = importlib.util.spec_from_file_location(

@@ -88,7 +88,7 @@ def test_a_root_outside_its_range_is_refused():
 
 @pytest.mark.slow
 def test_decay_bounds_the_settling_time():
-    from quakedesign.lyapunov.search.search import balance, with_largest_decay
+    from quakedesign.lyapunov.search.lyapunov_search import balance, with_largest_decay
 
     certificate = qd.certify("cta", GAINS, lipschitz=1)[1]
     faster = with_largest_decay(certificate, balance(certificate.loop))

@@ -8,8 +8,8 @@ import pytest
 from quakedesign import cache, load_fault, published
 from quakedesign.laws import control_law
 from quakedesign.lyapunov import Verdict, certificate_text, load_certificate
-from quakedesign.lyapunov.search import search
-from quakedesign.lyapunov.search import search as kept
+from quakedesign.lyapunov.search import lyapunov_search as kept
+from quakedesign.lyapunov.search import lyapunov_search as search
 from quakedesign.synthesis import assess
 from quakedesign.synthesis.method import GainProblem
 from quakedesign.synthesis.sliding_mode_design import _proved_base

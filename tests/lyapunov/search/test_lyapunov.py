@@ -7,7 +7,7 @@ import pytest
 from quakedesign.laws import law
 from quakedesign.lyapunov import Verdict, loop_of
 from quakedesign.lyapunov.search.certify import certify
-from quakedesign.lyapunov.search.search import candidate_degrees, find_certificate
+from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees, find_certificate
 
 
 def loop(name, gains, lipschitz):

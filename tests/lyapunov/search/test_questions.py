@@ -19,7 +19,7 @@ from quakedesign.lyapunov.search.certify import (
     largest_lipschitz,
     necessary_limit,
 )
-from quakedesign.lyapunov.search.search import find_certificate, refute
+from quakedesign.lyapunov.search.lyapunov_search import find_certificate, refute
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "reach_region", Path(__file__).with_name("super_twisting_region.py")

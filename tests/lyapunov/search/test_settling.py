@@ -11,7 +11,7 @@ import pytest
 
 from quakedesign.lyapunov import Verdict, load_certificate
 from quakedesign.lyapunov.search.certify import certify
-from quakedesign.lyapunov.search.settling import fastest_settling, settling
+from quakedesign.lyapunov.search.settling_time import fastest_settling, settling
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "settling_region", Path(__file__).with_name("super_twisting_region.py")

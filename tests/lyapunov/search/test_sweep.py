@@ -10,8 +10,8 @@ from quakedesign.errors import CertificateError
 from quakedesign.laws import law
 from quakedesign.lyapunov.maps.sweep import Frame, Sweep
 from quakedesign.lyapunov.search.certify import closed_loop
+from quakedesign.lyapunov.search.lyapunov_search import balance, family_of
 from quakedesign.lyapunov.search.parametric_forms import rows_of, values_of
-from quakedesign.lyapunov.search.search import balance, family_of
 from quakedesign.sos.solve.joint import JointProgram
 
 LOOPS = {

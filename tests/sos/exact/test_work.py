@@ -13,7 +13,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import WorkError
 from quakedesign.lyapunov import load_certificate
 from quakedesign.sos import Answer, Positivity
-from quakedesign.sos.exact import work
+from quakedesign.sos.exact import work_budget as work
 from quakedesign.sos.exact.polynomial import (
     _eliminates,
     evaluate,
@@ -36,7 +36,7 @@ from quakedesign.sos.exact.proofs import (
     localizing_matrix,
 )
 from quakedesign.sos.exact.reduction import _contributions, reach
-from quakedesign.sos.exact.work import STEPS, TERMS, expanded, length, limited, longest, spend
+from quakedesign.sos.exact.work_budget import STEPS, TERMS, expanded, length, limited, longest, spend
 from quakedesign.sos.solve.engine import prove
 
 RANDOM = random.Random(5)

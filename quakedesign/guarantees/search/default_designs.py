@@ -10,10 +10,10 @@ from typing import Any
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import UpperBound
-from quakedesign.guarantees.exact.loop import PLAIN, ExactSetup
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.statement import TrackingProof
-from quakedesign.guarantees.exact.stick_slip_guarantee import StickSlipProof
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup
+from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
+from quakedesign.guarantees.exact.tracking_proof import TrackingProof
 from quakedesign.guarantees.search.compensated_search import (
     GUARANTEED,
     STICK_SLIP,
@@ -36,7 +36,7 @@ from quakedesign.laws import SlidingMode
 from quakedesign.loop import schemes
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.lyapunov.exact.premises import Premise
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 # ----------------------------------------------------------------------
 # The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee.

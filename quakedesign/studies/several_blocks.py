@@ -15,8 +15,8 @@ from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain, Disturbance, SlidingReference
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof, named
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
+from quakedesign.guarantees.exact.plant_proof import PlantProof, named
 from quakedesign.guarantees.exact.sliding_small_gain import exponential
 from quakedesign.guarantees.search.plant_search import linear_part
 from quakedesign.guarantees.search.sliding_block_design import covered_stress
@@ -31,7 +31,7 @@ from quakedesign.simulation.coupled_sliders import (
     natural_cycles,
     simulate_held_blocks,
 )
-from quakedesign.simulation.natural import STILL, event_nudge
+from quakedesign.simulation.earthquake import STILL, event_nudge
 from quakedesign.simulation.state_plant import TIDE
 from quakedesign.studies.block_limits import chain_limits
 from quakedesign.synthesis import guarantee

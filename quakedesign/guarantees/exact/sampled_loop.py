@@ -18,7 +18,7 @@ from quakedesign.guarantees.exact.norms import START
 from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, NominalModel
 from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_response_area
 from quakedesign.loop.loop_setup import LoopSetup, Pump
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws import SampledController

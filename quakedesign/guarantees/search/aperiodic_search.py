@@ -2,19 +2,20 @@
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import LinAlgError, expm
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from quakedesign.exact import UpperBound
-from quakedesign.guarantees.exact.invariant_set import SOONEST, InvariantPolytope, reduced
-from quakedesign.guarantees.exact.loop import SampledLoop, channels_of
+from quakedesign.guarantees.exact.invariant_set import SOONEST, BetweenSamples, InvariantPolytope, reduced
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import SampledLoop, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds
-from quakedesign.guarantees.exact.statement import TrackingProof, guarantee
-from quakedesign.guarantees.search.estimate import BoundsEstimate, gains_of, short
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
+from quakedesign.guarantees.search.float_bounds import FLOATS, BoundsEstimate, floats, gains_of, short
+from quakedesign.plant.fault_plant import FaultPlant
 
 MOST_SIZE = 3  # entries of the state at a sample: hulls of more take too long
 _SAMPLE_PIECES, _BETWEEN_PIECES = 6, 8
@@ -100,6 +101,11 @@ class _Floats:
             force=0.0 if task.change is None else float(task.amplitude),
         )
 
+    @cached_property
+    def between(self) -> BetweenSamples:
+        """Rows and inputs in between."""
+        return BetweenSamples(FLOATS, floats(self.flow), floats(self.inputs.T))
+
     @property
     def fits(self) -> bool:
         """Whether its state at a sample is small enough."""
@@ -113,7 +119,7 @@ class _Floats:
         return [*early, *np.linspace(soonest, latest, _SAMPLE_PIECES + 1).tolist()]
 
     @property
-    def between(self) -> list[float]:
+    def until_next(self) -> list[float]:
         """Ends of pieces of the longest interval."""
         return [float(v) for v in np.linspace(0, self.interval[1], _BETWEEN_PIECES + 1)]
 
@@ -187,28 +193,13 @@ class _Floats:
 
         `frame` bounds the entries of the state at a sample.
         """
-        now, area, parts = rows, np.zeros(len(rows)), list[tuple[np.ndarray, np.ndarray]]()
-        bends, sizes, jumps = list[np.ndarray](), bounds[:, None] * np.abs(self.inputs), bounds @ np.abs(self.sampled)
-        most, largest = _majorant(self.flow), np.abs(self.lift) @ frame + jumps
-        for i, end in enumerate(ends):
-            if i >= first:
-                parts.append((now @ self.lift, area + np.abs(now @ self.sampled.T) @ bounds))
-            if i + 1 == len(ends):
-                break
-            h = ends[i + 1] - end
-            following, within = now @ expm(self.flow * h), np.abs(expm(most * h))
-            bent, slope = np.abs(now @ self.flow @ self.flow) @ within, np.abs(now @ self.flow) @ within
-            heights = (np.abs(now @ self.inputs.T) + np.abs(following @ self.inputs.T)) @ bounds
-            area = area + heights * h / 2 + bent @ sizes.sum(axis=0) * h**3 / 12
-            if i >= first:
-                bends.append((bent @ largest + slope @ sizes.sum(axis=0)) * h**2 / 8)
-            now = following
-        along, added = (np.array(part).swapaxes(0, 1) for part in zip(*parts, strict=True))
-        return along, added, np.array(bends).T
-
-
-def _majorant(flow: np.ndarray) -> np.ndarray:
-    return np.asarray(np.where(np.eye(len(flow)), np.maximum(flow, 0), np.abs(flow)))
+        largest = np.abs(self.lift) @ frame + bounds @ np.abs(self.sampled)
+        places = [
+            (now @ self.lift, area[:, 0] + np.abs(now @ self.sampled.T) @ bounds, more[:, 0])
+            for now, area, more in self.between.along(floats(rows), ends, first, floats(largest[:, None]), bounds)
+        ]
+        along, added, bends = (np.array(part).swapaxes(0, 1) for part in zip(*places, strict=True))
+        return along, added, bends[:, :-1]
 
 
 def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pushes: list[np.ndarray]) -> np.ndarray:
@@ -322,7 +313,7 @@ class _Sides:
 
     def largest(self, loop: _Floats, bounds: np.ndarray) -> np.ndarray:
         """Bound of every output."""
-        along, added, bends = loop.along(loop.rows, loop.between, 0, self._frame, bounds)
+        along, added, bends = loop.along(loop.rows, loop.until_next, 0, self._frame, bounds)
         heights = self._shares(self._bases(along), along).sum(axis=2) + added
         return np.asarray((np.maximum(heights[:, 1:], heights[:, :-1]) + bends).max(axis=1))
 
@@ -332,7 +323,7 @@ class _Sides:
         rounded = _Sides(np.array(facets, dtype=float))
         after, frame = rounded.facets @ loop.seen, rounded._frame
         samples = loop.along(after, loop.at_samples, SOONEST, frame, bounds)[0]
-        outputs = loop.along(loop.rows, loop.between, 0, frame, bounds)[0]
+        outputs = loop.along(loop.rows, loop.until_next, 0, frame, bounds)[0]
         at_samples, between = (_as_tuples(rounded._bases(rows)) for rows in (samples, outputs))
         inputs = tuple(short(float(v) * (1 + 10.0**-5), _DIGITS) for v in bounds)
         return InvariantPolytope(inputs=inputs, facets=facets, at_samples=at_samples, between=between)

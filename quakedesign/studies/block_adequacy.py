@@ -8,7 +8,7 @@ from typing import Any
 from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.guarantees import NoProof
-from quakedesign.guarantees.exact.plant_guarantee import PlantProof
+from quakedesign.guarantees.exact.plant_proof import PlantProof
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant import UncertainPlant
 from quakedesign.synthesis import guarantee

@@ -13,7 +13,7 @@ from quakedesign.fault import Disturbance, Fault
 from quakedesign.loop import simulation_scheme
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.recorder import Recorder
-from quakedesign.simulation.run import RunSetting, loop_class, run
+from quakedesign.simulation.run_settings import RunSetting, loop_class, run
 from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, LoopTrajectory, OutcomeCriterion, Trajectory
 from quakedesign.symbolic import derive
 

@@ -4,22 +4,24 @@ Used by searches only; nothing is proved here. The last chapter rounds proposed 
 rationals.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import reduce
 from math import floor, inf, log10
+from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
 
-from quakedesign.guarantees.exact.loop import GainSpread, SampledLoop
-from quakedesign.guarantees.exact.norms import START
+from quakedesign.errors import ParameterError
+from quakedesign.guarantees.exact.norms import START, Arithmetic, LoopResponses, SlowestMode, unstable
 from quakedesign.guarantees.exact.proof import NoProof
+from quakedesign.guarantees.exact.sampled_loop import GainSpread, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 # ----------------------------------------------------------------------
 # Floating-point estimates of the bounds of a guarantee, for searches; no decision depends on them.
@@ -110,161 +112,90 @@ def _closeness(bounds: Bounds | NoProof | None, least: float) -> tuple[float, Bo
     return (_small(bounds), bounds) if bounds is not None and bounds.proved else (1 + least, None)
 
 
-@dataclass(frozen=True, slots=True)
-class _Flow:
-    """Jump, e^{Ah}, the map of the segment, and the length h [s] of a piece."""
-
-    jump: np.ndarray
-    step: np.ndarray
-    whole: np.ndarray
-    piece: float
-
-
 def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | None:
     """Gains at every end of a piece."""
-    flow = np.array(loop.flow, dtype=float)
-    flows, period = [], np.eye(len(flow))
-    for segment in loop.segments:
-        piece = float(segment.duration) / _PIECES
-        jump, step = np.array(segment.jump, dtype=float), expm(flow * piece)
-        flows.append(_Flow(jump, step, np.linalg.matrix_power(step, _PIECES) @ jump, piece))
-        period = flows[-1].whole @ period
-    slowest = _Slowest.of(period)
-    if not max(slowest.decay, slowest.others) < 1 - np.log(1 / _FORGOTTEN) / _MOST_PERIODS:
+    try:
+        of, gains = LoopResponses(FLOATS, loop), dict[str, list[Any]]()
+        for name in (*loop.inputs, *loop.sampled, *loop.fading, *loop.pulses):
+            gains[name] = [v for part in of.sums(name) for v in (part[0][0], *(end for _, end, _ in part))]
+        if loop.start:
+            gains[START] = of.free()
+    except ParameterError:
         return None
-    doublings = int(np.ceil(np.log2(max(np.log(_FORGOTTEN) / np.log(max(slowest.others, 0.1)), 2))))
-    rows = np.array(list(loop.outputs.values()), dtype=float)
-    gains = {name: _of_input(entry, flows, doublings, rows, enters, slowest) for name, entry, enters in _entries(loop)}
-    for name, entries in _pulses(loop, flows):
-        sides = [_of_input(entry, flows, doublings, rows, loop.pulses[name].first, slowest) for entry in entries]
-        gains[name] = np.sum(sides, axis=0)
-    gains |= {START: _free(np.array(loop.start, dtype=float).T, flows, doublings, rows)} if loop.start else {}
-    return {
-        (output, name): tuple(float(v + loop.at_once.get((output, name), 0)) for v in values)
-        for name, of in gains.items()
-        for output, values in zip(loop.outputs, of, strict=True)
+    lines = {name: np.concatenate(values, axis=1).tolist() for name, values in gains.items()}
+    values = {
+        (y, name): tuple(line) for name, part in lines.items() for y, line in zip(loop.outputs, part, strict=True)
     }
+    return values | {key: tuple(v + float(size) for v in values[key]) for key, size in loop.at_once.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class _Slowest:
-    """Decay per period of the slowest mode and of all others, with its eigenvectors.
+class _FloatMatrix(np.ndarray):
+    """Matrix of floats with the operators and methods of `flint.arb_mat` that the algorithm of `norms` needs."""
 
-    All modes count as others where the slowest is a complex pair, where two modes decay almost equally, and where all
-    modes decay within a few periods.
-    """
-
-    decay: float
-    others: float
-    along: np.ndarray
-    seen: np.ndarray
+    __array_priority__ = 1.0  # so that what is concatenated is one
 
     @classmethod
-    def of(cls, period: np.ndarray) -> "_Slowest":
-        values, vectors = np.linalg.eig(period)
-        first, *rest = np.argsort(-abs(values))
-        decay, others = float(abs(values[first])), float(max(abs(values[rest]), default=0.0))
-        none = np.zeros(len(period))
-        if decay >= 1 or values[first].imag or others > _ALIKE * decay or decay**_SOON < _FORGOTTEN:
-            return cls(0.0, decay, none, none)
-        try:
-            seen = np.linalg.solve(vectors.T, np.eye(len(period))[first]).real
-        except np.linalg.LinAlgError:
-            return cls(0.0, decay, none, none)
-        return cls(decay, others, vectors[:, first].real, seen)
+    def of(cls, rows: Iterable[Iterable[Fraction]]) -> Any:
+        return np.array([[v.numerator / v.denominator for v in row] for row in rows]).view(cls)
 
-    def left(self, columns: np.ndarray, periods: int) -> np.ndarray:
-        """Sum over all later periods of the responses to the columns, after a number of periods."""
-        size = np.abs(self.seen @ columns).sum() * self.decay**periods / (1 - self.decay)
-        return np.asarray(self.along * size)
+    def __mul__(self, other: Any) -> Any:
+        return self.dot(other) if isinstance(other, _FloatMatrix) else np.multiply(self, other)
+
+    def exp(self) -> Any:
+        return floats(expm(self.view(np.ndarray)))
+
+    def nrows(self) -> int:
+        return len(self)
+
+    def ncols(self) -> int:
+        return len(self[0])
 
 
-def _entries(loop: PeriodicLoop) -> Iterator[tuple[str, np.ndarray, int | None]]:
-    """Inputs and the segment whose jump they enter with; fading inputs enter with a jump."""
-    for name, row in loop.inputs.items():
-        yield name, np.array(row, float), None
-    for name, row in loop.sampled.items():
-        yield name, np.array(row, float), 0
-    for name, fading in loop.fading.items():
-        area = fading.height / fading.rate + fading.floor * loop.period
-        yield name, np.array(fading.entry, float) * float(area), fading.first
+def floats(values: np.ndarray) -> Any:
+    """Array as a matrix with the operators of `flint.arb_mat`."""
+    return values.view(_FloatMatrix)
 
 
-def _pulses(loop: PeriodicLoop, flows: list[_Flow]) -> Iterator[tuple[str, list[np.ndarray]]]:
-    """Inputs that act near a jump, with half the sum and half the difference of both sides."""
-    for name, pulse in loop.pulses.items():
-        entry = np.array(pulse.entry, float)
-        before, after = flows[pulse.first].jump @ entry * float(pulse.before), entry * float(pulse.after)
-        yield name, [(before + after) / 2, (before - after) / 2]
+def _slowest(period: Any) -> SlowestMode:
+    """A complex pair, or two modes with nearly equal decay, are not separated: they are followed to their end.
+
+    So are all where all modes decay within a few periods.
+    """
+    values, vectors = np.linalg.eig(period.view(np.ndarray))
+    first, *rest = np.argsort(-abs(values))
+    decay, others = float(abs(values[first])), float(max(abs(values[rest]), default=0.0))
+    seen = along = np.zeros(len(period))
+    if not (decay >= 1 or values[first].imag or others > _ALIKE * decay or decay**_SOON < _FORGOTTEN):
+        with suppress(np.linalg.LinAlgError):
+            seen, along = np.linalg.solve(vectors.T, np.eye(len(period))[first]).real, vectors[:, first].real
+    if not seen.any():
+        decay, others = 0.0, decay
+    if not max(decay, others) < 1 - np.log(1 / _FORGOTTEN) / _MOST_PERIODS:
+        raise unstable()
+    doublings = int(np.ceil(np.log2(max(np.log(_FORGOTTEN) / np.log(max(others, 0.1)), 2))))
+    left = decay**2**doublings / (1 - decay)
+    return SlowestMode(doublings=doublings, seen=floats(seen[None]), along=floats(along[:, None]), left=left)
 
 
-def _of_input(
-    entry: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray, enters: int | None, slowest: _Slowest
-) -> np.ndarray:
-    responses = [_response(entry * (enters in (None, i)), flow) for i, flow in enumerate(flows)]
-    sums = [_Sums(response, flow.piece, enters is not None) for response, flow in zip(responses, flows, strict=True)]
-    own, later = [], np.eye(len(entry))
-    for flow, part in zip(flows[::-1], sums[::-1], strict=True):
-        own.append(later @ part.columns)
-        later = later @ flow.whole
-    before = np.hstack(own)
-    left = slowest.left(before, 2**doublings)[:, None]
-    for _ in range(doublings):
-        before, later = np.hstack([before, later @ before]), later @ later
-    before = np.hstack([before, left])
-    peaks = []
-    for flow, part in zip(flows, sums, strict=True):
-        since, row = part.since(rows), rows
-        for i in range(_PIECES + 1):
-            peaks.append(np.abs(row @ flow.jump @ before).sum(axis=1) + since[:, i])
-            row = row @ flow.step
-        before = np.hstack([flow.whole @ before, part.columns])
-    return np.array(peaks).T
-
-
-def _free(start: np.ndarray, flows: list[_Flow], doublings: int, rows: np.ndarray) -> np.ndarray:
-    """Largest outputs of the free response from the box of the columns of `start`."""
-    columns, period = start[None], reduce(lambda now, flow: flow.whole @ now, flows, np.eye(len(start)))
-    for _ in range(doublings):
-        columns, period = np.concatenate([columns, period @ columns]), period @ period
-    peaks = []
-    for flow in flows:
-        now = flow.jump @ columns
-        for _ in range(_PIECES + 1):
-            peaks.append(np.abs(rows @ now).sum(axis=2).max(axis=0))
-            now = flow.step @ now
-        columns = flow.whole @ columns
-    return np.array(peaks).T
-
-
-@dataclass(frozen=True, slots=True)
-class _Sums:
-    """Response over one segment to an input that flows, or that enters with the jump."""
-
-    response: np.ndarray
-    piece: float
-    sudden: bool
-
-    @property
-    def columns(self) -> np.ndarray:
-        """Factor for the sums of all later periods."""
-        weights = np.array([0.5, *[1.0] * (_PIECES - 1), 0.5])
-        return self.response[:, -1:] if self.sudden else self.response * weights * self.piece
-
-    def since(self, rows: np.ndarray) -> np.ndarray:
-        """From the jump to every end of a piece."""
-        size: np.ndarray = np.abs(rows @ self.response)
-        if self.sudden:
-            return size
-        return np.insert(np.cumsum((size[:, 1:] + size[:, :-1]) * self.piece / 2, axis=1), 0, 0, axis=1)
-
-
-def _response(entry: np.ndarray, flow: _Flow) -> np.ndarray:
-    """e^{Ahi}b at the ends of the pieces, one column each."""
-    ends = [entry]
-    for _ in range(_PIECES):
-        ends.append(flow.step @ ends[-1])
-    return np.array(ends).T
+FLOATS = Arithmetic(
+    slowest=_slowest,
+    number=float,
+    matrix=_FloatMatrix.of,
+    column=lambda values: _FloatMatrix.of([(v,) for v in values]),
+    identity=lambda size: floats(np.eye(size)),
+    pieces=lambda segment, _: (float(segment.duration) / _PIECES,) * _PIECES,
+    beside=lambda parts: np.concatenate(parts, axis=1),
+    above=np.concatenate,
+    majorant=lambda flow: floats(np.where(np.eye(len(flow)), np.maximum(flow, 0), np.abs(flow))),
+    absolute=np.abs,
+    modulus=np.abs,
+    larger=np.maximum,
+    scaled=lambda whole, weights: np.multiply(whole, weights),
+    part=lambda whole, first, end: whole[first:end],
+    sums=lambda whole: np.add.reduce(np.abs(whole), axis=1, keepdims=True),
+    grouped=lambda sizes, weights: sizes.reshape(len(sizes), -1, len(weights)).dot(weights),
+    highest=lambda whole: np.maximum.reduce(whole, axis=1, keepdims=True),
+)
 
 
 # ----------------------------------------------------------------------

@@ -16,15 +16,16 @@ from scipy.linalg import expm
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.cache import search_once
-from quakedesign.guarantees.exact.loop import SampledLoop
+from quakedesign.guarantees.exact.sampled_loop import SampledLoop
+from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.sliding_small_gain import loop_of, model_of
-from quakedesign.guarantees.exact.statement import ContinuousProof, SlidingProof, TrackingProof
-from quakedesign.guarantees.search.estimate import PERIODS, moved, periods_to_forget
+from quakedesign.guarantees.exact.tracking_proof import ContinuousProof, TrackingProof
+from quakedesign.guarantees.search.float_bounds import PERIODS, moved, periods_to_forget
 from quakedesign.laws import NOISES
 from quakedesign.laws.implicit_root import root_of
 from quakedesign.loop import PeriodicLoop
 from quakedesign.loop.periodic import Matrix, Row
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.plant.sliding_plant import SlidingPlant
 
 # ----------------------------------------------------------------------

@@ -55,7 +55,7 @@ from quakedesign.simulation import (
     simulate_state,
 )
 from quakedesign.simulation import simulate as run_loop
-from quakedesign.simulation.run import PRINTED, STICK_SLIP
+from quakedesign.simulation.run_settings import PRINTED, STICK_SLIP
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, Tide
 from quakedesign.simulation.stick_slip import (

@@ -9,18 +9,19 @@ from quakedesign import laws
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.guarantees.exact.proof import NoProof, Proof
-from quakedesign.guarantees.exact.statement import SlidingProof, TrackingProof
+from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.stick_slip_set import (
     SampledStickSlip,
     StickSlipClaims,
     StickSlipPolytope,
     stick_slip_bounds,
 )
+from quakedesign.guarantees.exact.tracking_proof import TrackingProof
 from quakedesign.laws import ImplicitRoot
 from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
 from quakedesign.lyapunov.exact.claim import Verdict
-from quakedesign.plant.ranges import FaultPlant
+from quakedesign.plant.fault_plant import FaultPlant
 
 if TYPE_CHECKING:
     from quakedesign.laws.stick_slip_controller import StickSlipController

@@ -12,7 +12,7 @@ from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.loop_expressions import error_units
 from quakedesign.lyapunov.exact.obligations import Obligations, obligation_degree
 from quakedesign.lyapunov.search.certify import Number, closed_loop
-from quakedesign.lyapunov.search.search import balance, candidate_degrees, find_certificate, with_largest_decay
+from quakedesign.lyapunov.search.lyapunov_search import balance, candidate_degrees, find_certificate, with_largest_decay
 from quakedesign.symbolic.enclosure import enclose
 from quakedesign.symbolic.term_expressions import from_terms
 
