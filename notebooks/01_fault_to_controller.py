@@ -126,7 +126,7 @@ from quakedesign.report import headline
 published = qd.simulate(fault, qd.published("real-fault")["cta"], duration=2000, plant="printed")
 print(f"published 2-CTA: pressure varies by {published.metrics.pressure_total_variation / 1e9:.3g} GPa in {published.metrics.steps} steps\n")
 for entry in comparison.of("designed"):
-    print(f"{entry.label}: {entry.guarantee.sentence()}\n  {headline(entry)}\n")
+    print(f"{entry.label}: {entry.proof.sentence()}\n  {headline(entry)}\n")
 
 # %% [markdown]
 # What this notebook claims:
@@ -135,7 +135,7 @@ for entry in comparison.of("designed"):
 path = {entry.label: entry.run.metrics.pressure_total_variation for entry in comparison.entries}
 assert model.unstable and len(moving) > 6
 assert str(cta.verdict) == str(elqr.verdict) == str(paper.verdict) == "proved"
-assert all(entry.run.metrics.peak_slip_rate < entry.guarantee.claims.peak_slip_rate for entry in comparison.of("designed"))
+assert all(entry.run.metrics.peak_slip_rate < entry.proof.claims.peak_slip_rate for entry in comparison.of("designed"))
 assert all(p.holds for p in cta.premises) and not all(p.holds for p in paper.premises)
 assert refused and str(own_proof) == "proved" and str(verdict) == "refuted"
 assert all(entry.run.metrics.max_slip_error < published.metrics.max_slip_error / 10 for entry in comparison.entries)

@@ -36,7 +36,7 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.plant import (uncertain_plant)
 from quakedesign.report import verdict_lines
 from quakedesign.simulation import natural_earthquake
-from quakedesign.guarantees import design_held, worst_found
+from quakedesign.guarantees import design_held, worst_tracking
 from own.printed_theorem import both_tests
 from quakedesign.linear import uncertainty_bounds
 from quakedesign.linear import judge
@@ -152,7 +152,7 @@ print(sampled.sentence())
 
 # %%
 peaks = {kind: design.certified_peaks(kind) for kind in ("amplitude", "rate")}
-bad = {kind: worst_found(found) for kind, found in peaks.items()}
+bad = {kind: worst_tracking(found) for kind, found in peaks.items()}
 for kind, found in peaks.items():
     most, known = found.claims.slip_rate_error, bad[kind].slip_rate_error
     print(f"{kind}: never farther from the reference's rate than {most:.3g} m/s, proved; {known:.3g} m/s is reached by a bad course (ratio {float(most) / known:.2f})")

@@ -42,7 +42,7 @@ from quakedesign.cli.app import app
 from quakedesign.errors import QuakedesignError
 from quakedesign.exact import rational
 from quakedesign.fault import parse_fault
-from quakedesign.guarantees import Held, farthest_rock, guarantee, longest_delay
+from quakedesign.guarantees import SampledLoop, farthest_rock, guarantee, longest_delay
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import SlowGain
 from quakedesign.laws import summed_integrals
@@ -455,7 +455,7 @@ def guaranteed():
     """File of a guarantee, whose claims are proved."""
     fault = qd.load_fault("real-fault")
     step = rational(fault.sampling_time)
-    held = Held(law=summed_integrals(tuple(map(Fraction, GAINS)), step), step=step)
+    held = SampledLoop(law=summed_integrals(tuple(map(Fraction, GAINS)), step), step=step)
     return guarantee_text(guarantee(uncertain_plant(fault), held))
 
 
@@ -553,7 +553,7 @@ MINUTES = {"design", "compare", "certify", "assess", "natural_earthquake", "run_
 MINUTES |= {"decide", "largest", "accuracy", "gain_sensitivity", "noise_sensitivity", "velocity_step"}
 
 
-MINUTES |= {"limits", "guarantee", "design_held", "worst_found", "judge", "gain_map", "settling", "natural_run"}
+MINUTES |= {"limits", "guarantee", "design_held", "worst_tracking", "judge", "gain_map", "settling", "natural_run"}
 MINUTES |= {"largest_lipschitz", "stability_map", "gain_map_figure", "uncertainty_bounds", "check_files"}
 
 

@@ -68,14 +68,14 @@ def _version() -> str:
 app.version = _version
 
 
-def given(options: Mapping[str, Any]) -> dict[str, Any]:
+def specified(options: Mapping[str, Any]) -> dict[str, Any]:
     """Options that were given."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def refuse(options: Mapping[str, Any], what: str) -> None:
     """Refuse options that belong to something else, if any is given."""
-    if names := list(given(options)):
+    if names := list(specified(options)):
         raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Omit {', '.join(names)}.")
 
 
@@ -97,7 +97,7 @@ class _Screen(Console):
     def print(self, *objects: Any, **options: Any) -> None:
         """Lines that are wider than a terminal go on below their beginning; files and pipes get them whole."""
         if self.is_terminal:
-            objects = tuple(self._wrapped(told) if isinstance(told, str) else told for told in objects)
+            objects = tuple(self._wrapped(text) if isinstance(text, str) else text for text in objects)
         super().print(*objects, **options)
 
     def render_str(self, text: str, **options: Any) -> Text:

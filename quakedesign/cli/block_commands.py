@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def several_blocks(
-    fault: str, command: Any, options: dict[str, Any], known: Collection[str] = (), box: str | None = None
+    fault: str, command: Any, options: dict[str, Any], accepted: Collection[str] = (), box: str | None = None
 ) -> "BlockChain | None":
     """The blocks of a fault file; None for one without, and for names that are no file.
 
@@ -37,9 +37,9 @@ def several_blocks(
     chain = load_chain(fault, box=box)
     if chain is None:
         return None
-    usual = {"fault", "output", "json", "force", "box", "allow_code", "accept_poor_fit", *known}
-    given = {name: value for name, value in options.items() if value != ()}
-    chosen = changed_options(command, given)
+    usual = {"fault", "output", "json", "force", "box", "allow_code", "accept_poor_fit", *accepted}
+    chosen_values = {name: value for name, value in options.items() if value != ()}
+    chosen = changed_options(command, chosen_values)
     others = [name for name in chosen if name not in usual]
     if "more" in others:
         raise ParameterError(
@@ -47,7 +47,7 @@ def several_blocks(
         )
     if others:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(others))
-        has = {*known, "json"} - {"state"} | ({"force", "box"} & options.keys())
+        has = {*accepted, "json"} - {"state"} | ({"force", "box"} & options.keys())
         raise ParameterError(
             f"{command.__name__} has, of a fault of several blocks, the options "
             f"{', '.join(f'--{name}' for name in sorted(has)).replace('_', '-')}. Received {named}. Omit these."
@@ -62,7 +62,7 @@ def chain_at_step(chain: "BlockChain", setup: LoopSetup) -> "BlockChain":
     return replace(chain, fault=setup.at_step(chain.fault)[0])
 
 
-def _scope(found: Any, chain: "BlockChain") -> list[str]:
+def _scope(proof: Any, chain: "BlockChain") -> list[str]:
     """What a statement about blocks depends on, and what its words mean."""
     from quakedesign.studies.several_blocks import farthest_balance
 
@@ -72,7 +72,7 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
             "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
             "pressure is the plan",
         ]
-    if (far := farthest_balance(chain, found)) is not None:
+    if (far := farthest_balance(chain, proof)) is not None:
         meant = (
             "the load of a pressure is the pressure that keeps the averages of the slips, one for each well, on the "
             "reference; slip errors are relative to the equilibrium of each block under these pressures, which is "
@@ -83,21 +83,21 @@ def _scope(found: Any, chain: "BlockChain") -> list[str]:
     return [*([healed] if excess else []), meant]
 
 
-def _facts(found: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> dict[str, Any]:
-    if not found.proved:
-        return {"verdict": "undecided", "reason": found.reason}
-    proved = {} if one is None else one.proved_facts()
-    facts = {"verdict": "proved", "sentence": found.sentence(), **found.to_dict()}
-    return {**facts, "notes": [*found.notes, *_scope(found, chain)], **proved}
+def _values(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> dict[str, Any]:
+    if not proof.proved:
+        return {"verdict": "undecided", "reason": proof.reason}
+    proved = {} if one is None else one.proved_values()
+    values = {"verdict": "proved", "sentence": proof.sentence(), **proof.to_dict()}
+    return {**values, "notes": [*proof.notes, *_scope(proof, chain)], **proved}
 
 
-def _lines(found: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> list[str]:
+def _lines(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> list[str]:
     """What is proved and what it depends on, with a run if there is one; else why nothing is proved."""
-    if found.proved:
-        conditions = [*found.statement(), *_scope(found, chain)]
+    if proof.proved:
+        conditions = [*proof.statement(), *_scope(proof, chain)]
         return conditions if one is None else one.screen(conditions)
     far = "the command limits gives the pressures that every controller of this file needs with its diffusivity"
-    return [found.sentence(), *([far] if chain.diffusivity else [])]
+    return [proof.sentence(), *([far] if chain.diffusivity else [])]
 
 
 def show_chain(chain: "BlockChain", output: Output) -> int:
@@ -112,8 +112,8 @@ def chain_limits(chain: "BlockChain", output: Output, **beside: Any) -> int:
     """The command `limits`."""
     from quakedesign.studies import chain_limits as limits
 
-    found = limits(chain, **beside)
-    output.show(found.to_dict(), found.lines())
+    result = limits(chain, **beside)
+    output.show(result.to_dict(), result.lines())
     return 0
 
 
@@ -157,17 +157,17 @@ def guarantee_chain(
         with progress() as tell:
             tell("design and proof", 0.0)
             result = guarantee(chain, law, step=step, **sliding)
-    found = result.proof
-    if out is not None and found.proved:
+    proof = result.proof
+    if out is not None and proof.proved:
         with made_folder(out.parent):
             result.save(out)
-    unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not found.proved else []
-    written = None if out is None or not found.proved else str(out)
+    unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not proof.proved else []
+    written = None if out is None or not proof.proved else str(out)
     from quakedesign.studies.several_blocks import ChainRun
 
-    one = None if sliding is not None else ChainRun(chain=chain, controller=law, proof=found, run=None)
-    output.show({**_facts(found, chain, one), "certificate": written}, [*_lines(found, chain, one), *unwritten])
-    return 0 if found.proved else 1
+    one = None if sliding is not None else ChainRun(chain=chain, controller=law, proof=proof, run=None)
+    output.show({**_values(proof, chain, one), "certificate": written}, [*_lines(proof, chain, one), *unwritten])
+    return 0 if proof.proved else 1
 
 
 _HEADS = ("law", "proved", "", "in the run", "", "pressure", "")
@@ -206,7 +206,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
         "",
         last,
     ]
-    output.show({one.controller: _run_facts(one) for one in runs}, lines)
+    output.show({one.controller: _run_values(one) for one in runs}, lines)
     return 0 if all(one.safe for one in runs) else 1
 
 
@@ -216,11 +216,11 @@ def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
         raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
 
 
-def _run_facts(one: "ChainRun | SlidingChainRun") -> dict[str, Any]:
+def _run_values(one: "ChainRun | SlidingChainRun") -> dict[str, Any]:
     if one.proof is None:
         return {"run": one.to_dict(), "guarantee": None}
-    found = _facts(one.proof, one.chain, one)
-    return found if one.run is None else {"guarantee": found, "run": one.to_dict()}
+    values = _values(one.proof, one.chain, one)
+    return values if one.run is None else {"guarantee": values, "run": one.to_dict()}
 
 
 def export_chain(
@@ -241,20 +241,20 @@ def export_chain(
     require_free(folder, force)
     with progress() as tell:
         tell("design and proof", 0.0)
-        found = chain_law(chain, controller, law.certificate)
-    if not found.proved:
-        output.show(_facts(found, chain), [*_lines(found, chain), "nothing is exported, as no law is proved"])
+        proof = chain_law(chain, controller, law.certificate)
+    if not proof.proved:
+        output.show(_values(proof, chain), [*_lines(proof, chain), "nothing is exported, as no law is proved"])
         return 1
-    step = block_step(chain, found.law, remarks=(*found.statement(), *_scope(found, chain)))
+    step = block_step(chain, proof.law, remarks=(*proof.statement(), *_scope(proof, chain)))
     exported = write_step(step, folder, fmu=fmu, force=force)
     files = {"files": [str(folder / name) for name in (FILES if fmu else FILES[:2])], "premises": []}
-    answer = exported.to_dict() | files
-    output.show(answer | {"guarantee": _facts(found, chain)}, export_lines(answer))
+    values = exported.to_dict() | files
+    output.show(values | {"guarantee": _values(proof, chain)}, export_lines(values))
     return 0
 
 
 def run_chain(
-    chain: "BlockChain", out: Path | None, force: bool, output: Output, formats: Any = ("png",), **given: Any
+    chain: "BlockChain", out: Path | None, force: bool, output: Output, formats: Any = ("png",), **entered: Any
 ) -> int:
     """The commands `design` and `simulate`: a law, its proof, a run and, with a folder, files and a figure."""
     from quakedesign.report.folder import prepare
@@ -267,12 +267,12 @@ def run_chain(
     with progress() as tell:
         tell("design, proof and run", 0.0)
         if chain.ages:
-            given |= {"tell": lambda done: tell("run", done)}
-        one = run_sliding_chain(chain, **given) if chain.ages else run_of_chain(chain, **given)
-    found: Any = one.proof
-    facts = _run_facts(one)
-    said = [] if found is None else _lines(found, chain, one)
-    said += one.lines() if found is None or not found.proved else []
+            entered |= {"tell": lambda done: tell("run", done)}
+        one = run_sliding_chain(chain, **entered) if chain.ages else run_of_chain(chain, **entered)
+    proof: Any = one.proof
+    values = _run_values(one)
+    lines = [] if proof is None else _lines(proof, chain, one)
+    lines += one.lines() if proof is None or not proof.proved else []
     if out is not None and one.run is not None:
         from quakedesign.files import whole_folder
         from quakedesign.guarantees.exact.guarantee_files import save_guarantee
@@ -280,12 +280,12 @@ def run_chain(
         from quakedesign.report.drawing import file_names, write_figures, write_results
 
         with whole_folder(out) as folder:
-            if found is not None:
-                save_guarantee(found, folder / "guarantee.json")
-            proved = "" if found is None else found.sentence()
+            if proof is not None:
+                save_guarantee(proof, folder / "guarantee.json")
+            proved = "" if proof is None else proof.sentence()
             write_figures(folder, {"blocks": block_figure(chain, one.run, proved)}, formats)
-            write_results(folder, facts)
-        files = "results.json, " + ("" if found is None else "guarantee.json, ") + file_names("blocks", formats)
-        said.append(f"written: {out}/ ({files})")
-    output.show(facts, said)
+            write_results(folder, values)
+        files = "results.json, " + ("" if proof is None else "guarantee.json, ") + file_names("blocks", formats)
+        lines.append(f"written: {out}/ ({files})")
+    output.show(values, lines)
     return 0 if one.safe else 1

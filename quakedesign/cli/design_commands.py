@@ -94,25 +94,25 @@ class DesignOptions(WellOptions):
     whole_task: Annotated[bool, Parameter(negative="")] = False
     accept_poor_fit: Annotated[bool, Parameter(negative="")] = False
 
-    def asked(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
+    def problem(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
         """Fault of a name, and the arguments of `designed_comparison`; checked before anything heavy is loaded."""
         from quakedesign.fault import load_fault, with_accepted_fit
 
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
         loaded = with_accepted_fit(loaded, self.accept_poor_fit)
-        given = vars(self)["diffusion"]
-        if given is not None and not rational(given, "diffusion"):
-            loaded.friction.require(no_diffusion=given)
+        entered = vars(self)["diffusion"]
+        if entered is not None and not rational(entered, "diffusion"):
+            loaded.friction.require(no_diffusion=entered)
         behind = bool(self.setup().path)  # a delay, a lag or rock, for which the e-LQR alone is designed
         laws = "elqr" if behind and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
         loaded.friction.require(plant=self.plant)
         shown = {"published_scheme": self.published_scheme, "plant": self.plant, "whole_task": self.whole_task}
-        told = self.told()
-        loaded, told["options"]["setup"] = told["options"]["setup"].at_step(loaded)
-        return loaded, {"names": names, **shown, **told}
+        arguments = self.arguments()
+        loaded, arguments["options"]["setup"] = arguments["options"]["setup"].at_step(loaded)
+        return loaded, {"names": names, **shown, **arguments}
 
-    def told(self) -> dict[str, Any]:
+    def arguments(self) -> dict[str, Any]:
         """Options of `designed_comparison`.
 
         Raises
@@ -173,19 +173,19 @@ def design(
     verbose
         Also print the fault, gains, verdicts with premises, certified domains and all metrics, as in the report.
     """
-    given = dict(locals())
+    entered = dict(locals())
     from quakedesign.cli.block_commands import block_law, chain_at_step, require_loads, run_chain, several_blocks
     from quakedesign.report.folder import prepare
 
-    known = ("step", "out", "format", "verbose", "box", "controller", "lag", "stress")
-    if (chain := several_blocks(fault, globals()["design"], given, known, options.box)) is not None:
+    accepted = ("step", "out", "format", "verbose", "box", "controller", "lag", "stress")
+    if (chain := several_blocks(fault, globals()["design"], entered, accepted, options.box)) is not None:
         chain = chain_at_step(chain, options.setup())
         require_loads(chain, options.sliding)
         law = {"controller": block_law(options.controller, "all")} | (
             {"sliding": options.sliding} if chain.ages else {}
         )
         return run_chain(chain, out or Path(f"quakedesign-{chain.name}"), force, output, format, **law)
-    loaded, asked = options.asked(fault)
+    loaded, arguments = options.problem(fault)
     folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)
     hold(folder)
@@ -193,10 +193,10 @@ def design(
     from quakedesign.report.folder import write_folder
 
     with progress() as tell:
-        comparison = designed_comparison(loaded, tell=tell, **asked)
+        comparison = designed_comparison(loaded, tell=tell, **arguments)
         results = write_folder(comparison, folder, force=force, formats=format, command=command_line(), tell=tell)
 
-    def said() -> None:
+    def printed() -> None:
         from quakedesign.report.terminal import print_comparison
 
         print_comparison(comparison, console(), whole=verbose)
@@ -204,7 +204,7 @@ def design(
         if not verbose:
             print_lines([f"gains, premises and equations: {folder}/report.html, or --verbose"])
 
-    output.show(results, said)
+    output.show(results, printed)
     return 0 if positive(comparison) else 1
 
 
@@ -260,19 +260,19 @@ def compare(
     verbose
         Also print the fault, gains, verdicts with premises, all metrics, and numbers that the paper prints.
     """
-    given = dict(locals())
+    entered = dict(locals())
     from quakedesign.cli.block_commands import chain_at_step, compare_chain, several_blocks
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.folder import results
     from quakedesign.report.terminal import printed_lines
     from quakedesign.studies.paper import printed, table
 
-    known = ("step", "verbose", "box", "controller", "lag", "stress")
-    if (chain := several_blocks(fault, compare, given, known, options.box)) is not None:
+    accepted = ("step", "verbose", "box", "controller", "lag", "stress")
+    if (chain := several_blocks(fault, compare, entered, accepted, options.box)) is not None:
         return compare_chain(chain_at_step(chain, options.setup()), options.controller, options.sliding, output)
-    loaded, asked = options.asked(fault)
+    loaded, arguments = options.problem(fault)
     with progress() as tell:
-        comparison = designed_comparison(loaded, tell=tell, **asked)
+        comparison = designed_comparison(loaded, tell=tell, **arguments)
     if output.json:
         beside = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **beside})
@@ -307,7 +307,7 @@ def figures(
     """
     from quakedesign.report.folder import prepare, write_folder
 
-    loaded, asked = options.asked(fault)
+    loaded, arguments = options.problem(fault)
     folder = out or Path(f"quakedesign-{loaded.name}-figures")
     prepare(folder, force=force)
     hold(folder)
@@ -317,7 +317,7 @@ def figures(
     from quakedesign.report.terminal import printed_lines
 
     with progress() as tell:
-        comparison = designed_comparison(loaded, tell=tell, **asked)
+        comparison = designed_comparison(loaded, tell=tell, **arguments)
         study = paper_study(comparison, progress=tell)
         results = write_folder(
             comparison, folder, force=force, study=study, formats=format, command=command_line(), tell=tell
@@ -326,7 +326,7 @@ def figures(
         print_json(results)
         return 0
     runs = ((e.label, "; ".join(run_sentences(e.run, loaded))) for e in comparison.entries if e.run)
-    print_lines(f"{label}: {said}" for label, said in runs)
+    print_lines(f"{label}: {sentence}" for label, sentence in runs)
     files = [(drawn["file"], drawn["paper"]) for drawn in results["figures"].values()]
     print_lines(f"{folder}/{file}" + (f": {paper} of the paper" if paper else "") for file, paper in files)
     print_lines(printed_lines(results["printed"], loaded.name))

@@ -109,8 +109,8 @@ def scale(
     from quakedesign.studies.scaling import scale_answer
 
     clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}
-    answer = scale_answer(source, target, controller, gains, clock=clocks[clock])
-    output.show(answer, scale_lines(answer))
+    result = scale_answer(source, target, controller, gains, clock=clocks[clock])
+    output.show(result, scale_lines(result))
     return 0
 
 
@@ -136,8 +136,8 @@ def errata(*rows: int, output: Output = PLAIN) -> int:
 
 
 def _row_lines(row: dict[str, Any]) -> list[str]:
-    held = "holds" if row["holds"] else "DOES NOT HOLD"
-    text = f"{row['row']}. {held} ({row['kind']}): {row['evidence']}"
+    outcome = "holds" if row["holds"] else "DOES NOT HOLD"
+    text = f"{row['row']}. {outcome} ({row['kind']}): {row['evidence']}"
     return [text, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]
 
 
@@ -282,26 +282,26 @@ def identify(
     how: dict[str, Any] = {"stiffness": spring, "rates": speeds, "states": states, "trend": trend, "seed": seed}
     several = identify_steps(records, law, **how) if len(records) > 1 else None
     identification = fitted(records[0], law, **how) if several is None else several.common
-    found = several or identification
-    file, told = out, list[str]()
+    result = several or identification
+    file, remarks = out, list[str]()
     if out is not None:
         try:
             save_fault(identification, around, out)
-            told.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
-            told += task_remarks(identification, around)
+            remarks.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
+            remarks += task_remarks(identification, around)
         except RecordError as refused:
             file = None
-            told.append(f"not written: {out}: {refused}")
+            remarks.append(f"not written: {out}: {refused}")
     if figure is not None:
-        save_figure(found, figure)
+        save_figure(result, figure)
     written = ", ".join(str(path) for path in (figure, file) if path is not None)
-    told = [*law_remarks(identification, around), *([f"written: {written}"] if written else []), *told]
-    told = [line for each in told for line in wrap(each, 80, subsequent_indent="  ", break_long_words=False)]
+    remarks = [*law_remarks(identification, around), *([f"written: {written}"] if written else []), *remarks]
+    remarks = [line for each in remarks for line in wrap(each, 80, subsequent_indent="  ", break_long_words=False)]
     usable = file is not None or (out is None and identification.explained)
-    told += [f"next: {next_command(identification, file)}"] if usable else []
-    entries = found.to_dict() | {"figure": figure and str(figure), "file": file and str(file)}
-    told += [] if verbose else ["tests, noise and assumptions: --verbose"]
-    output.show(entries, [*identification_lines(found, verbose=verbose), *told])
+    remarks += [f"next: {next_command(identification, file)}"] if usable else []
+    entries = result.to_dict() | {"figure": figure and str(figure), "file": file and str(file)}
+    remarks += [] if verbose else ["tests, noise and assumptions: --verbose"]
+    output.show(entries, [*identification_lines(result, verbose=verbose), *remarks])
     return 0 if identification.explained else 1
 
 
@@ -321,9 +321,9 @@ def schema(command: str, /, *, output: Output = PLAIN) -> int:
     command
         Name of the command, such as design.
     """
-    known = json.loads(resources.files("quakedesign.cli").joinpath("output_schemas.json").read_text(encoding="utf-8"))
-    require_known(command, known, "command with a schema", UnknownNameError)
-    output.show(known[command], lambda: print_json(known[command]))
+    schemas = json.loads(resources.files("quakedesign.cli").joinpath("output_schemas.json").read_text(encoding="utf-8"))
+    require_known(command, schemas, "command with a schema", UnknownNameError)
+    output.show(schemas[command], lambda: print_json(schemas[command]))
     return 0
 
 

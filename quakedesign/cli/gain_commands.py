@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.app import app, console, given, new_file, progress, refuse
+from quakedesign.cli.app import app, console, new_file, progress, refuse, specified
 from quakedesign.cli.options import PLAIN, Force, Formats, Gains, Output, Scheduler, Seconds, Whole
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.files import hold
@@ -89,21 +89,21 @@ def synthesise(
     of_trial, what = {"step": step, "scheme": scheme, "metric": metric}, f"the objective {objective}"
     if objective == "sampled":
         refuse({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
-        synthesis, more = _sampled(law, fault, lipschitz, gain_range, degree, given(of_trial))
+        synthesis, more = _sampled(law, fault, lipschitz, gain_range, degree, specified(of_trial))
     else:
         refuse({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
         from quakedesign.lyapunov.gains.synthesise import synthesise as search
 
         ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}
-        options = {"workers": 2, **given(of_search), "degrees": degree or None, "bound": bound, **ranges}
+        options = {"workers": 2, **specified(of_search), "degrees": degree or None, "bound": bound, **ranges}
         synthesis, more = search(law, objective, **options), {}
     if synthesis is not None and out is not None:
         synthesis.certificate.save(out)
-    answer = _facts(synthesis) | more | {
+    values = _values(synthesis) | more | {
         "certificate": str(out) if synthesis is not None and out is not None else None,
         "seconds": perf_counter() - began,
     }  # fmt: skip
-    output.show(answer, lambda: _print(law, synthesis, more))
+    output.show(values, lambda: _print(law, synthesis, more))
     return 0 if synthesis is not None else 1
 
 
@@ -124,7 +124,7 @@ def _sampled(
     return synthesise_sampled(trial, degrees=degree or None), {"fault": fault, **tried}
 
 
-def _facts(synthesis: "Synthesis | None") -> dict[str, Any]:
+def _values(synthesis: "Synthesis | None") -> dict[str, Any]:
     """Answer as JSON: gains and ranges as texts, measured values as numbers."""
     if synthesis is None:
         return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
@@ -261,8 +261,8 @@ def gain_map(
             scheduler=scheduler,
             tell=tell,
         )
-    facts = write_gain_map(drawn, folder, format)
+    values = write_gain_map(drawn, folder, format)
     written = f"written: {folder}/ ({file_names('map', format)}, map.csv, results.json, certificates)"
-    output.show(facts, [*gain_map_lines(drawn), written])
-    proved = all(level["edge_proved"] == level["edge"] for level in facts["levels"])
-    return 0 if proved and any(level["screened"] for level in facts["levels"]) else 1
+    output.show(values, [*gain_map_lines(drawn), written])
+    proved = all(level["edge_proved"] == level["edge"] for level in values["levels"])
+    return 0 if proved and any(level["screened"] for level in values["levels"]) else 1

@@ -116,8 +116,8 @@ def guarantee(
     from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
 
-    known = ("step", "out", "controller", "stress", "lag")
-    if (several := several_blocks(fault, globals()["guarantee"], options, known, box)) is not None:
+    accepted = ("step", "out", "controller", "stress", "lag")
+    if (several := several_blocks(fault, globals()["guarantee"], options, accepted, box)) is not None:
         setup = around.setup()
         sliding = {"stress": stress, "lag": setup.lag}
         require_loads(several, sliding)
@@ -126,40 +126,40 @@ def guarantee(
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)
     setup = around.setup(measured=measured)
-    asked: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}
-    asked |= {"disturbance_class": disturbance_class, "spread": spread, "plant": plant}
+    arguments: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}
+    arguments |= {"disturbance_class": disturbance_class, "spread": spread, "plant": plant}
     if law is not None:
         from quakedesign.laws import SampledLaw
 
-        asked["law"] = SampledLaw.load(law)
-    calls = [partial(guaranteed, one, controller, setup, **asked) for one in faults]
+        arguments["law"] = SampledLaw.load(law)
+    calls = [partial(guaranteed, one, controller, setup, **arguments) for one in faults]
     with progress() as tell:
         if not more and scheduler is None and workers == 1:
             calls = [partial(calls[0], progress=tell)]
-        found: Any = answers(calls, workers=workers, scheduler=scheduler, tell=tell if more else None)
+        results: Any = answers(calls, workers=workers, scheduler=scheduler, tell=tell if more else None)
     entries = {"class": disturbance_class, "seconds": perf_counter() - began}
     if not more:
-        if isinstance(found[0], QuakedesignError):
-            raise found[0]
-        written = f"written: {files[0]}" if _proved(found[0]) else f"{files[0]} is not written, as nothing is proved"
-        box_of = box_sentences(faults[0]) if _proved(found[0]) else []
-        lines = [*found[0].lines(), *box_of, *([written] if files[0] else [])]
-        output.show(_facts(found[0], files[0]) | entries, chain(_first(faults[0], found[0]), lines))
+        if isinstance(results[0], QuakedesignError):
+            raise results[0]
+        written = f"written: {files[0]}" if _proved(results[0]) else f"{files[0]} is not written, as nothing is proved"
+        box_of = box_sentences(faults[0]) if _proved(results[0]) else []
+        lines = [*results[0].lines(), *box_of, *([written] if files[0] else [])]
+        output.show(_values(results[0], files[0]) | entries, chain(_first(faults[0], results[0]), lines))
     else:
-        each = zip(faults, found, files, strict=True)
-        parts = [{"fault": one.name} | _facts(proof, path) for one, proof, path in each]
-        lines = [f'"{one.name}": {line}' for one, proof in zip(faults, found, strict=True) for line in _lines(proof)]
+        each = zip(faults, results, files, strict=True)
+        parts = [{"fault": one.name} | _values(proof, path) for one, proof, path in each]
+        lines = [f'"{one.name}": {line}' for one, proof in zip(faults, results, strict=True) for line in _lines(proof)]
         output.show({"guarantees": parts, **entries}, lines)
-    return 0 if all(_proved(one) for one in found) else 1
+    return 0 if all(_proved(one) for one in results) else 1
 
 
-def _proved(answer: Any) -> bool:
-    return not isinstance(answer, QuakedesignError) and answer.proved
+def _proved(result: Any) -> bool:
+    return not isinstance(result, QuakedesignError) and result.proved
 
 
-def _first(fault: Any, answer: Any) -> Iterator[str]:
+def _first(fault: Any, result: Any) -> Iterator[str]:
     """The guarantee beside the natural earthquake, and a blank line; nothing without a proof."""
-    if not _proved(answer):
+    if not _proved(result):
         return
     from textwrap import wrap
 
@@ -170,12 +170,12 @@ def _first(fault: Any, answer: Any) -> Iterator[str]:
         peak = natural_peak(fault)
     except (ParameterError, SimulationError):  # of friction with a state, or whose earthquake cannot be computed
         peak = None
-    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', answer.proof, peak, fault.magnitude)}.", 80)
+    yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', result.proof, peak, fault.magnitude)}.", 80)
     yield ""
 
 
-def _lines(answer: Any) -> list[str]:
-    return [f"refused: {answer}"] if isinstance(answer, QuakedesignError) else answer.lines()
+def _lines(result: Any) -> list[str]:
+    return [f"refused: {result}"] if isinstance(result, QuakedesignError) else result.lines()
 
 
 def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | None]:
@@ -196,17 +196,17 @@ def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | No
     return [*files]
 
 
-def _facts(answer: Any, path: Path | None) -> dict[str, Any]:
+def _values(result: Any, path: Path | None) -> dict[str, Any]:
     """Answer as JSON, and its file written if there is a proof."""
     from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 
-    if isinstance(answer, QuakedesignError):
-        return {"verdict": "refused", "reason": str(answer), "certificate": None}
-    written = path if answer.proved else None
+    if isinstance(result, QuakedesignError):
+        return {"verdict": "refused", "reason": str(result), "certificate": None}
+    written = path if result.proved else None
     if written is not None:
         with made_folder(written.parent):
-            save_guarantee(answer.proof, written)
-    return {**answer.to_dict(), "certificate": written and str(written)}
+            save_guarantee(result.proof, written)
+    return {**result.to_dict(), "certificate": written and str(written)}
 
 
 @app.command
@@ -257,13 +257,13 @@ def blocks(
         hold(out)
     for path in files.values() if out is not None and out.exists() else ():
         new_file(path, "certificate file", force=force)
-    answer = one_block(loaded, range(least, most + 1), wells=wells, coupling=coupling, step=step)
-    for count, found in answer.proofs.items():
-        if files and found.proved:
+    result = one_block(loaded, range(least, most + 1), wells=wells, coupling=coupling, step=step)
+    for count, proof in result.proofs.items():
+        if files and proof.proved:
             with made_folder(files[count].parent):
-                save_guarantee(found, files[count])
-    output.show(answer.to_dict(), answer.lines())
-    return 0 if answer.proved else 1
+                save_guarantee(proof, files[count])
+    output.show(result.to_dict(), result.lines())
+    return 0 if result.proved else 1
 
 
 @app.command
@@ -310,8 +310,8 @@ def limits(
     from quakedesign.cli.block_commands import chain_at_step, chain_limits, several_blocks
     from quakedesign.fault import load_fault
 
-    spreads, known = around.diffusivity, ("step", "stress", "pressure", "diffusivity")
-    if (chain := several_blocks(fault, globals()["limits"], options, known, box)) is not None:
+    spreads, accepted = around.diffusivity, ("step", "stress", "pressure", "diffusivity")
+    if (chain := several_blocks(fault, globals()["limits"], options, accepted, box)) is not None:
         rock = None if spreads is None else float(rational(spreads))
         chain = chain_at_step(chain, replace(around, diffusivity=None).setup())
         return chain_limits(chain, output, stress=stress, pressure=pressure, diffusivity=rock)
@@ -325,7 +325,7 @@ def limits(
     from quakedesign.report.limits_table import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits
 
-    answer = all_limits(
+    result = all_limits(
         loaded,
         replace(around, diffusivity=(spreads or "1") if around.well else None).setup(measured=measured),
         pressure=pressure,
@@ -334,7 +334,7 @@ def limits(
         spread=spread,
     )
     if out is not None:
-        write_limits(answer, out, format)
+        write_limits(result, out, format)
     written = [] if out is None else [f"written: {out}/ ({file_names('limits', format)}, results.json)"]
-    output.show(answer.to_dict(), [*limits_lines(answer), *written])
+    output.show(result.to_dict(), [*limits_lines(result), *written])
     return 0

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.app import given, hush, print_json, print_lines, refuse
+from quakedesign.cli.app import hush, print_json, print_lines, refuse, specified
 from quakedesign.errors import ParameterError, UnitError
 from quakedesign.exact import rational
 from quakedesign.fault.equilibrium import by_equilibrium
@@ -212,14 +212,14 @@ class Output:
         if (self.quiet, self.log_level) != (False, "warning"):
             hush(quiet=self.quiet, level=self.log_level)
 
-    def show(self, facts: dict[str, Any], said: Iterable[str] | Callable[[], object]) -> None:
+    def show(self, values: dict[str, Any], text: Iterable[str] | Callable[[], object]) -> None:
         """Print facts as JSON, or else what is said for people: lines, or a call that prints them."""
         if self.json:
-            print_json(facts)
-        elif callable(said):
-            said()
+            print_json(values)
+        elif callable(text):
+            text()
         else:
-            print_lines(said)
+            print_lines(text)
 
 
 PLAIN = Output()
@@ -278,10 +278,10 @@ class LawOptions:
         if self.certificate is None:
             return optional_choice(fault, self.controller, self.gains, **entries, step=step, path=path)
         usual, own = type(self)(), {"gains": " ".join(self.gains)}
-        given = {"controller": self.controller, **own, **entries}
+        values = {"controller": self.controller, **own, **entries}
         unlike = [
             f"--{name} {value}"
-            for name, value in given.items()
+            for name, value in values.items()
             if getattr(self, name) != getattr(usual, name) and (name, value) != ("controller", "elqr")
         ]
         if unlike:
@@ -431,8 +431,8 @@ class WellOptions:
 
     def setup(self, **more: Any) -> LoopSetup:
         """Loop setup of the options, with further fields of `LoopSetup`."""
-        known = quantities()
-        entries = {name: value for name, value in vars(self).items() if name in known}
+        names = quantities()
+        entries = {name: value for name, value in vars(self).items() if name in names}
         entries["diffusion"] = rock(entries["diffusion"], self.well, self.diffusivity)
         return IDEAL.with_given(**entries, **more)
 
@@ -453,8 +453,8 @@ _SENSORS = Group("Sensors (schemes that sample)")
 
 def _asks_every_stage(options: type[Options]) -> type[Options]:
     """Frozen dataclass with the options that the stages of the package declare."""
-    asked = [option for stage in stages().values() for option in stage.options]
-    fields = [(option.name, _annotation(option), option.default) for option in asked]
+    declared = [option for stage in stages().values() for option in stage.options]
+    fields = [(option.name, _annotation(option), option.default) for option in declared]
     doc = {"__doc__": options.__doc__, "__module__": options.__module__}
     return make_dataclass(options.__name__, fields, bases=(options,), namespace=doc, frozen=True, kw_only=True)
 
@@ -470,14 +470,14 @@ def _annotation(option: Option) -> Any:
 class ActuatorOptions:
     """Stages between law and fault, for schemes that sample: what each declares where it is defined."""
 
-    def told(self) -> dict[str, Any]:
+    def values(self) -> dict[str, Any]:
         """Values in SI units, by the names of the options."""
         return dict(vars(self))
 
     def path(self) -> dict[str, float]:
         """Delay, lag and diffusion [s] that are given: what a law can be designed for."""
-        told = self.told()
-        return {name: told[name] for name in ("delay", "lag", "diffusion") if told[name]}
+        values = self.values()
+        return {name: values[name] for name in ("delay", "lag", "diffusion") if values[name]}
 
     def build(self, step: float, seed: int = 0) -> Actuator:
         """Stages of an actuator in the order of the signal, for a sampling period [s] and a seed of the jitter.
@@ -487,24 +487,24 @@ class ActuatorOptions:
         ParameterError
             For values that a stage refuses, or for a part of a stage that is not there.
         """
-        chosen = (_stage(stage, self.told(), step) for stage in stages().values() if stage.options)
+        chosen = (_stage(stage, self.values(), step) for stage in stages().values() if stage.options)
         chain = Actuator(stages=tuple(stage for stage in chosen if stage is not None))
-        if not self.told()["jitter"]:
+        if not self.values()["jitter"]:
             return chain
         from quakedesign.simulation.campaign.problem import reseeded
 
         return reseeded(chain, seed)
 
 
-def _stage(stage: type[Stage], told: Mapping[str, Any], step: float) -> Stage | None:
+def _stage(stage: type[Stage], values: Mapping[str, Any], step: float) -> Stage | None:
     """One stage; None where it is not asked for."""
     first, *others = stage.options
-    if told[first.name] != first.default:
-        return stage.asked(step, **{option.name: told[option.name] for option in stage.options})
+    if values[first.name] != first.default:
+        return stage.asked(step, **{option.name: values[option.name] for option in stage.options})
     for other in others:
-        if told[other.name] is not None and other.default is None:
+        if values[other.name] is not None and other.default is None:
             raise ParameterError(
-                f"{other.name} needs {first.name}. Received {other.name} {told[other.name]:g} {other.unit} alone. "
+                f"{other.name} needs {first.name}. Received {other.name} {values[other.name]:g} {other.unit} alone. "
                 f"Add {first.name}, or omit {other.name}."
             )
     return None
@@ -542,7 +542,7 @@ class EstimateOptions:
             return None
         return in_unit(self.differentiator_bound, f"m/s^{self.differentiator_order + 1}", "differentiator bound")
 
-    def told(self) -> dict[str, Any]:
+    def values(self) -> dict[str, Any]:
         """Options in SI units."""
         return asdict(self) | {"differentiator_bound": self.bound}
 
@@ -603,11 +603,11 @@ def surroundings(
     """
     from quakedesign.simulation.run_settings import own_path
 
-    told, seen = actuator.build(step, seed), sensors.build(step, seed)
+    chain, seen = actuator.build(step, seed), sensors.build(step, seed)
     if chosen is None:
-        return run.substeps, told, seen
+        return run.substeps, chain, seen
     meant, substeps = own_path(chosen.controller, None, run.substeps)
-    return substeps, told.completed(meant) if meant else told, seen if seen.noisy else chosen.noise(seed)
+    return substeps, chain.completed(meant) if meant else chain, seen if seen.noisy else chosen.noise(seed)
 
 
 # ----------------------------------------------------------------------
@@ -660,7 +660,7 @@ class StateOptions:
                 "--pressure, --start, --hold and --share are for runs without a controller. Received one of them with "
                 "a controller. Omit these options."
             )
-        return given({"stress": self.stress, "stress_period": self.stress_period})
+        return specified({"stress": self.stress, "stress_period": self.stress_period})
 
     def of_free(self) -> dict[str, Any]:
         """Those of a run without control that are given."""
@@ -668,8 +668,8 @@ class StateOptions:
 
         if self.stress is not None or self.stress_period is not None:
             raise ParameterError("--stress needs a controller. Received none. Give --controller elqr.")
-        told = given({"start": self.start, "hold": self.hold, "share": self.share})
-        return told | ({} if self.pressure is None else {"pressure": pressure_course(self.pressure)})
+        values = specified({"start": self.start, "hold": self.hold, "share": self.share})
+        return values | ({} if self.pressure is None else {"pressure": pressure_course(self.pressure)})
 
 
 NO_STATE = StateOptions()
@@ -687,27 +687,27 @@ def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
 def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int:
     """Run a fault whose friction has a state as `simulate` was asked to, and print what it comes to."""
     from quakedesign.report.sentences import sliding_run_lines, state_run_lines
-    from quakedesign.studies.single_runs import run_held, run_state
+    from quakedesign.studies.single_runs import run_sliding, run_state
 
-    asked, changed = _single(options), changed_options(command, options)
-    trajectory: Trajectory
+    single, changed = _single(options), changed_options(command, options)
+    run: Trajectory
     certificate = changed.pop("certificate", None)
     if certificate is not None:
-        told = _as_proved(fault, certificate, changed, options)
-        more, (trajectory, answer) = told["stress"] > told["claim"].task.stress, run_held(fault, **told)
+        entries = _as_proved(fault, certificate, changed, options)
+        more, (run, result) = entries["stress"] > entries["claim"].task.stress, run_sliding(fault, **entries)
         outside = [*(["stress"] if more else []), *(name for name in changed if name in (*_PUMP, *_READING, "plant"))]
-        answer |= {"outside": [n for n in outside if n != "seed"]}
+        result |= {"outside": [n for n in outside if n != "seed"]}
         lines = sliding_run_lines
     elif "controller" in changed:
-        _require_designed(asked)
-        trajectory, answer = run_held(fault, **_instruments(fault, changed, options), **options["state"].of_control())
+        _require_designed(single)
+        run, result = run_sliding(fault, **_instruments(fault, changed, options), **options["state"].of_control())
         lines = sliding_run_lines
     else:
-        trajectory, answer = run_state(fault, **_told(fault, changed, _FREE), **options["state"].of_free())
+        run, result = run_state(fault, **_named(fault, changed, _FREE), **options["state"].of_free())
         lines = state_run_lines
     if options["out"] is not None:
-        trajectory.save(Path(options["out"]))
-    options["output"].show(answer, [trajectory.name, *(f"  {line}" for line in lines(answer))])
+        run.save(Path(options["out"]))
+    options["output"].show(result, [run.name, *(f"  {line}" for line in lines(result))])
     return 0
 
 
@@ -824,14 +824,14 @@ def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any
     from quakedesign.loop.sensing import Transducer
 
     others = {name: value for name, value in changed.items() if name not in (*_PUMP, *_READING)}
-    told = _told(fault, others, _HELD, (*_PUMP, *_READING))
-    chain = options["actuator"].build(told.get("step", fault.sampling_time), options["seed"])
+    entries = _named(fault, others, _HELD, (*_PUMP, *_READING))
+    chain = options["actuator"].build(entries.get("step", fault.sampling_time), options["seed"])
     reading: dict[str, Any] = {_READING[name]: value for name, value in changed.items() if name in _READING}
     transducer = Transducer(**reading) if set(reading) - {"seed"} else None
-    return told | {"stages": chain.sampled, "transducer": transducer}
+    return entries | {"stages": chain.sampled, "transducer": transducer}
 
 
-def _told(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: tuple[str, ...] = ()) -> dict[str, Any]:
+def _named(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()) -> dict[str, Any]:
     """What was asked for, by the name that a run has for it; refuses what does not apply."""
     if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
         kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"

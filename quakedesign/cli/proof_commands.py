@@ -85,13 +85,13 @@ def _certify_for_rate(
     """Verdict on a sliding mode, or how far its gains reach."""
     from quakedesign.studies.certified import certified
 
-    answer = certified(law, gains, lipschitz=lipschitz, maximize=maximize, gain_range=gain_range)
-    if answer.certificate is not None and out is not None:
-        answer.certificate.save(out)
+    result = certified(law, gains, lipschitz=lipschitz, maximize=maximize, gain_range=gain_range)
+    if result.certificate is not None and out is not None:
+        result.certificate.save(out)
     output.show(
-        {**answer.facts, "certificate": str(out) if answer.certificate is not None and out else None}, answer.lines
+        {**result.facts, "certificate": str(out) if result.certificate is not None and out else None}, result.lines
     )
-    return 0 if str(answer.verdict) == "proved" else 1
+    return 0 if str(result.verdict) == "proved" else 1
 
 
 def _certify_on_fault(
@@ -150,9 +150,9 @@ def check(
     if out is not None and not rocq:
         raise ParameterError("--out needs --rocq. Received --out alone. Add --rocq, or omit --out.")
     verdicts = check_files(files, fault)
-    kept = [path for path in dict.fromkeys(files) if verdicts[str(path)][0] in ("proved", "refuted")]
-    written = _write_rocq(kept, out or Path("quakedesign-rocq"), force) if rocq else {}
-    said = (
+    decided = [path for path in dict.fromkeys(files) if verdicts[str(path)][0] in ("proved", "refuted")]
+    written = _write_rocq(decided, out or Path("quakedesign-rocq"), force) if rocq else {}
+    text = (
         line
         for path, (verdict, statement) in verdicts.items()
         for line in (f"{path}: {verdict}", *(f"    {line}" for line in (*statement, *written.get(path, ())[1:])))
@@ -160,7 +160,7 @@ def check(
     entries: dict[str, Any] = {"files": {path: verdict for path, (verdict, _) in verdicts.items()}}
     if rocq:
         entries["rocq"] = {path: written[path][0] if path in written else None for path in verdicts}
-    output.show(entries, said)
+    output.show(entries, text)
     complete = not rocq or None not in entries["rocq"].values()
     return 0 if complete and all(verdict == "proved" for verdict, _ in verdicts.values()) else 1
 
@@ -226,33 +226,33 @@ def sos(
     from quakedesign.sos.exact.words import sentences
 
     new_file(out, "proof file", force=force)
-    asked = (polynomial, on, multiplier, margin, degree, products)
-    if gram is not None and asked != (None, (), None, "0", None, None):
+    entered = (polynomial, on, multiplier, margin, degree, products)
+    if gram is not None and entered != (None, (), None, "0", None, None):
         raise PolynomialError(
             "--gram FILE contains the polynomial and its options. Received --gram with a polynomial or options. "
             "Give --gram alone."
         )
     if gram is not None:
-        answer = read_gram(gram).verify()
+        result = read_gram(gram).verify()
     elif polynomial is None:
         raise PolynomialError("sos needs a polynomial, or --gram FILE. Received neither. Give for example 'x^2 + 1'.")
     else:
-        answer = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
-    if out is not None and answer.proof is not None:
-        answer.save(out)
+        result = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
+    if out is not None and result.proof is not None:
+        result.save(out)
     entries: dict[str, Any] = {
-        "verdict": str(answer.verdict),
-        "variables": list(answer.statement.variables),
-        "degree": answer.statement.degree,
-        "blocks": dict(answer.blocks),
-        "witness": proof_entries(answer.proof) if answer.proof is not None else None,
-        "file": str(out) if out is not None and answer.proof is not None else None,
-        "remark": answer.remark or None,
-        "empty_set": answer.set_is_empty,
-        "seconds": answer.seconds,
-        "versions": dict(answer.versions),
+        "verdict": str(result.verdict),
+        "variables": list(result.statement.variables),
+        "degree": result.statement.degree,
+        "blocks": dict(result.blocks),
+        "witness": proof_entries(result.proof) if result.proof is not None else None,
+        "file": str(out) if out is not None and result.proof is not None else None,
+        "remark": result.remark or None,
+        "empty_set": result.set_is_empty,
+        "seconds": result.seconds,
+        "versions": dict(result.versions),
     }
-    output.show(entries, sentences(answer, verbose=verbose))
+    output.show(entries, sentences(result, verbose=verbose))
     return 0 if entries["verdict"] == "sos" else 1
 
 

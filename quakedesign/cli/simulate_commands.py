@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quakedesign.cli.app import app, console, given, new_file, print_lines, progress
+from quakedesign.cli.app import app, console, new_file, print_lines, progress, specified
 from quakedesign.cli.options import (
     NO_STATE,
     PLAIN,
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Commands about one closed loop: simulate it, see what sampling does to it, export its controller.
 
-_DIRECT, _EXACT, _TOLD = ActuatorOptions(), SensorOptions(), EstimateOptions()
+_DIRECT, _EXACT, _MEASURED = ActuatorOptions(), SensorOptions(), EstimateOptions()
 _BESIDE = ("scheme", "plant", "drift", "perturbation", "initial_slip", "initial_slip_rate", "weight", "authority")
 _NONE, _LAW, _USUAL, _REST = NoLawOptions(), LawOptions(), RunOptions(), StartOptions()
 
@@ -93,10 +93,10 @@ def simulate(
     from quakedesign.simulation import Load
     from quakedesign.studies.single_runs import run_single
 
-    known = ("duration", "out", "controller", "certificate", "plant", "drift", "stress", "stress_period", "state")
-    if (blocks := several_blocks(fault, simulate, options, known)) is not None:
+    accepted = ("duration", "out", "controller", "certificate", "plant", "drift", "stress", "stress_period", "state")
+    if (blocks := several_blocks(fault, simulate, options, accepted)) is not None:
         kind = block_law(law.controller, "none", law.certificate)
-        loads = given({"stress": state.stress, "stress_period": state.stress_period})
+        loads = specified({"stress": state.stress, "stress_period": state.stress_period})
         if state != StateOptions(**loads):
             raise ParameterError(
                 "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these."
@@ -122,13 +122,13 @@ def simulate(
         return run_chain(blocks, out, force, output, duration=run.duration, **of_law)
     new_file(out, "output file", force=force)
 
-    def run_loop(found: "Fault") -> int:
-        require_no_state_options(state, found)
-        loaded = start.task(found)
+    def run_loop(loaded_fault: "Fault") -> int:
+        require_no_state_options(state, loaded_fault)
+        loaded = start.task(loaded_fault)
         chosen, load = law.choose(loaded, run.step, actuator.path()), run.load()
         way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
         period = loaded.sampling_time if step is None else step
-        substeps, chain, told = surroundings(chosen, period, run, actuator, sensors, seed)
+        substeps, chain, sensor = surroundings(chosen, period, run, actuator, sensors, seed)
         with progress() as tell:
             tell("compiling", 0.0)
             trajectory, premises = run_single(
@@ -143,9 +143,9 @@ def simulate(
                 plant=run.plant,
                 substeps=substeps,
                 actuator=chain,
-                noise=told,
+                noise=sensor,
                 initial=start.state(),
-                tuning=given({"weight": weight, "authority": authority}),
+                tuning=specified({"weight": weight, "authority": authority}),
             )
         if out is not None:
             trajectory.save(out)
@@ -155,36 +155,36 @@ def simulate(
             proved, outside = chosen.claim.sentence(), _outside(changed, chosen.claim, trajectory.provenance["plant"])
             pressures = getattr(chosen.claim.claims, "pressures", ())
             exceeded = exceeded_line(trajectory.metrics, *pressures[-1]) if trajectory.metrics and pressures else ""
-        answer = _answer(trajectory, loaded, premises) | {
+        result = _values(trajectory, loaded, premises) | {
             "guarantee": {"sentence": proved} if proved else None,
             "outside": outside,
         }
         warning = chosen.controller.warning_at_rest if chosen else ""
         output.show(
-            answer, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside, exceeded), warning)
+            result, lambda: _print_run(trajectory, loaded, premises, proved_line(proved, outside, exceeded), warning)
         )
         return 0
 
-    def run_with_state(found: "Fault") -> int:
-        return show_state_run(found, simulate, options)
+    def run_with_state(loaded_fault: "Fault") -> int:
+        return show_state_run(loaded_fault, simulate, options)
 
     return by_equilibrium(rest=run_loop, sliding=run_with_state)(load_fault(fault))
 
 
 def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
     """Options of a run of a law that what is proved of it does not know, its plant among them."""
-    held, changed = claim.held, changed | {"plant": plant}
-    known = {name: float(time) for name, time in held.path.items()}
-    starts = zip(("initial_slip", "initial_slip_rate"), map(float, held.start), strict=True)
+    sampled, changed = claim.held, changed | {"plant": plant}
+    times = {name: float(time) for name, time in sampled.path.items()}
+    starts = zip(("initial_slip", "initial_slip_rate"), map(float, sampled.start), strict=True)
     within = {name for name, most in starts if abs(changed.get(name, 0.0)) <= most}
-    within |= {name for name, time in known.items() if changed.get(name) == time}
+    within |= {name for name, time in times.items() if changed.get(name) == time}
     within |= {"plant"} if plant == claim.plant else set()
     kinds: tuple[Any, ...] = (ActuatorOptions, SensorOptions)
     groups = (option.name for kind in kinds for option in fields(kind))
     return [name for name in (*_BESIDE, *groups) if name in changed and name not in within]
 
 
-def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
+def _values(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
     from quakedesign.simulation.earthquake import waiting
     from quakedesign.studies.comparison import shortfall
 
@@ -205,14 +205,14 @@ def _answer(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
     }
 
 
-def _print_run(trajectory: Any, fault: Any, premises: Any, *said: str) -> None:
+def _print_run(trajectory: Any, fault: Any, premises: Any, *texts: str) -> None:
     from quakedesign.report.terminal import print_run
 
     print_run(trajectory, fault, premises, console())
     if trajectory.energy:
         lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
         print_lines([f"  energy that the integration loses: {lost}"])
-    print_lines([f"  {line}" for line in said if line])
+    print_lines([f"  {line}" for line in texts if line])
 
 
 @app.command
@@ -272,11 +272,11 @@ def sampling(
         report = sampling_report(loaded, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
         results = write_sampling(report, folder, format)
 
-    def told() -> None:
+    def printed() -> None:
         print_sampling(report, console())
         print_lines(["", f"written: {folder}/ (results.json, figures)"])
 
-    output.show(results, told)
+    output.show(results, printed)
     return 0
 
 
@@ -288,7 +288,7 @@ def export(
     law: LawOptions = _LAW,
     step: Seconds | None = None,
     scheme: str | None = None,
-    sensors: EstimateOptions = _TOLD,
+    sensors: EstimateOptions = _MEASURED,
     fmu: bool = False,
     out: Path | None = None,
     force: Force = False,
@@ -311,7 +311,7 @@ def export(
     from quakedesign.cli.block_commands import export_chain, several_blocks
     from quakedesign.fault import load_fault
     from quakedesign.report.plain_text import export_lines
-    from quakedesign.studies.exporting import export_answer
+    from quakedesign.studies.exporting import export_result
 
     if (
         chain := several_blocks(fault, globals()["export"], options, ("controller", "certificate", "fmu", "out"))
@@ -322,18 +322,18 @@ def export(
     if chosen is None:
         raise ParameterError("export needs a controller. Received none. Give --controller.")
     folder = out or Path(f"quakedesign-{loaded.name}-{chosen.controller.name}")
-    answer = export_answer(
+    values = export_result(
         loaded,
         chosen.controller,
         folder,
         step=step,
         scheme=scheme,
-        **sensors.told(),
+        **sensors.values(),
         remarks=(f"proved: {chosen.claim.sentence()}" if chosen.claim else _WITHOUT_CLAIM,),
         fmu=fmu,
         force=force,
     )
-    output.show(answer, export_lines(answer))
+    output.show(values, export_lines(values))
     return 0
 
 
@@ -411,11 +411,11 @@ def campaign(
     if rerun is not None and rerun.isdecimal() and int(rerun) >= samples:
         raise ParameterError(f"rerun must be an index below {samples}, or search-N. Received {rerun}.")
     loaded = load_fault(fault, box=box)
-    chosen, told = state.choose(loaded, law, run.step, actuator.path())
+    chosen, variation = state.choose(loaded, law, run.step, actuator.path())
     controller = chosen.controller if chosen else None
     way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
-    around = surroundings(None if told else chosen, period, run, actuator, sensors, 0)
+    around = surroundings(None if variation else chosen, period, run, actuator, sensors, 0)
     problem = campaign_problem(
         loaded,
         controller,
@@ -428,7 +428,7 @@ def campaign(
         initial_slip=initial_slip,
         initial_slip_rate=initial_rate,
         seed=seed,
-        **told,
+        **variation,
     )
     folder = out or Path(f"quakedesign-{loaded.name}-campaign")
     hold(folder, make=True)
@@ -438,8 +438,8 @@ def campaign(
         done = run_campaign(problem, samples, folder, tell=tell, **options)
         drawn = done.plot()
         done.save(folder, {f"distribution.{kind}": figure_bytes(drawn, kind, "distribution") for kind in format})
-        answer = done.to_dict() | _again(done, rerun, folder)
-    output.show(answer, lambda: _print(problem, done, answer, f"{folder}/ ({_written(answer, format)})"))
+        values = done.to_dict() | _again(done, rerun, folder)
+    output.show(values, lambda: _print(problem, done, values, f"{folder}/ ({_written(values, format)})"))
     return 1 if done.failures else 0
 
 
@@ -453,7 +453,7 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
     return {"rerun": {"index": index, "file": str(path), **entries}}
 
 
-def _print(problem: "CampaignProblem", done: "Campaign", answer: dict[str, Any], written: str) -> None:
+def _print(problem: "CampaignProblem", done: "Campaign", result: dict[str, Any], written: str) -> None:
     from rich.table import Table
 
     from quakedesign.simulation.recorder import Metrics
@@ -461,7 +461,7 @@ def _print(problem: "CampaignProblem", done: "Campaign", answer: dict[str, Any],
     out = console()
     happened = ", ".join(f"{len(indices)} {name.replace('_', ' ')}" for name, indices in done.events.items() if indices)
     law = problem.controller.title if problem.controller else "no control"
-    out.print(f"{problem.fault.name}, {law}: {answer['samples']} samples, {answer['resumed']} of them from files")
+    out.print(f"{problem.fault.name}, {law}: {result['samples']} samples, {result['resumed']} of them from files")
     came_to = ", ".join(f"{len(indices)} {kind}" for kind, indices in done.kinds.items() if indices)
     out.print(f"outcomes (samples): {came_to or 'none'}")
     out.print(f"events (samples): {happened or 'none'}")
@@ -469,23 +469,23 @@ def _print(problem: "CampaignProblem", done: "Campaign", answer: dict[str, Any],
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0))
     for column in ("metric", "unit", "5 %", "50 %", "95 %", "worst", "samples"):
         table.add_column(column, no_wrap=column != "samples")
-    for name, quantiles in answer["quantiles"].items():
+    for name, quantiles in result["quantiles"].items():
         values = ("diverges" if quantiles[level] is None else f"{quantiles[level]:.2g}" for level in levels)
-        worst = ", ".join(str(entry["index"]) for entry in answer["worst"][name][:3])
+        worst = ", ".join(str(entry["index"]) for entry in result["worst"][name][:3])
         table.add_row(name, Metrics.unit(name) or "-", *values, worst)
     out.print(table, soft_wrap=False)
-    for told in (answer["search"],) if answer["search"] else ():
-        value = "diverges" if told["value"] is None else f"{told['value']:.6g} {Metrics.unit(told['metric'])}"
-        out.print(f"search: {told['metric']} = {value} in {told['index']} of {told['looked_at']} samples")
-    for failure in answer["failures"]:
+    for search in (result["search"],) if result["search"] else ():
+        value = "diverges" if search["value"] is None else f"{search['value']:.6g} {Metrics.unit(search['metric'])}"
+        out.print(f"search: {search['metric']} = {value} in {search['index']} of {search['looked_at']} samples")
+    for failure in result["failures"]:
         span = f"{failure['samples'][0]} … {failure['samples'][-1]}"
         out.print(f"failed: samples {span}: {failure['reason']}")
     out.print(f"written: {written}")
 
 
-def _written(answer: dict[str, Any], formats: Sequence[str]) -> str:
+def _written(values: dict[str, Any], formats: Sequence[str]) -> str:
     """Names of the files in the folder."""
     from quakedesign.report.drawing import file_names
 
-    again = [Path(answer["rerun"]["file"]).name] if "rerun" in answer else []
+    again = [Path(values["rerun"]["file"]).name] if "rerun" in values else []
     return ", ".join(["results.json", "samples.csv", file_names("distribution", formats), *again])

@@ -1,4 +1,4 @@
-"""Proved peaks of sampled loops: norms of the nominal loop, and a robust small-gain theorem."""
+"""Proved peaks of sampled loops: norms of the nominal loop, robust small-gain theorem."""
 
 from quakedesign.arguments import attach
 

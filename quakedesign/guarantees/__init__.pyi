@@ -4,7 +4,7 @@ from .exact.guarantee_files import read_guarantee as read_guarantee
 from .exact.guarantee_files import save_guarantee as save_guarantee
 from .exact.proof import NoProof as NoProof
 from .exact.proof import Proof as Proof
-from .exact.sampled_loop import Held as Held
+from .exact.sampled_loop import SampledLoop as SampledLoop
 from .exact.sliding_proof import SlidingProof as SlidingProof
 from .exact.sliding_small_gain import SlidingClaims as SlidingClaims
 from .exact.sliding_small_gain import cell_bounds as cell_bounds
@@ -39,8 +39,8 @@ from .search.linear_design import longest_delay as longest_delay
 from .search.linear_design import longest_step as longest_step
 from .search.linear_design import tightened as tightened
 from .search.worst_case import WorstCase as WorstCase
-from .search.worst_case import worst_found as worst_found
+from .search.worst_case import worst_tracking as worst_tracking
 from .sliding_result import guarantee_sliding as guarantee_sliding
 from .stick_slip_result import StickSlipGuarantee as StickSlipGuarantee
 from .tracking_result import TrackingGuarantee as TrackingGuarantee
-from .tracking_result import attacked as attacked
+from .tracking_result import with_worst_case as with_worst_case

@@ -1,4 +1,4 @@
-"""Interface of all results of `quakedesign.guarantee`, and the result for an uncertain plant."""
+"""Base class of all results of `quakedesign.guarantee`; result for an uncertain plant."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -16,7 +16,7 @@ from quakedesign.lyapunov.exact.claim import Verdict
 
 
 class Guarantee:
-    """What is guaranteed of a loop, or the reason why nothing is; base of the results for each plant.
+    """Guarantee of a loop, or the reason why there is none; base class of all results.
 
     Attributes
     ----------
@@ -71,7 +71,7 @@ class Guarantee:
 
     @property
     def worst_case(self) -> dict[str, float]:
-        """Largest values that the search reaches by name, in SI units: lower bounds of the worst case; else empty."""
+        """Worst case found by quantity, SI (lower bounds); empty if none was searched for."""
         return {} if self.worst is None else {k: size for k, size in asdict(self.worst).items() if size is not None}
 
     @property
@@ -81,7 +81,7 @@ class Guarantee:
 
     @property
     def stick_slip_gap(self) -> str:
-        """What is neither proved nor searched on the stick–slip plant."""
+        """Quantities that are neither proved nor searched on the stick–slip plant."""
         return ""
 
     @property
@@ -90,7 +90,7 @@ class Guarantee:
         return None
 
     def sentence(self) -> str:
-        """What is guaranteed and for what, or why nothing is."""
+        """Statement of the guarantee, or the reason why there is none."""
         return str(self.proof.sentence())
 
     def lines(self) -> list[str]:
@@ -102,7 +102,7 @@ class Guarantee:
         return []
 
     def task_lines(self) -> list[str]:
-        """What is said of the task, whatever law it is for."""
+        """Lines about the task alone, for every law."""
         return []
 
     def check(self) -> Verdict:
@@ -111,12 +111,12 @@ class Guarantee:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        found = {"verdict": str(self.verdict), "sentence": self.sentence()}
-        return found | (self.proof.to_dict() if self.proved else {"reason": self.reason})
+        result = {"verdict": str(self.verdict), "sentence": self.sentence()}
+        return result | (self.proof.to_dict() if self.proved else {"reason": self.reason})
 
     @property
     def controller(self) -> Any:
-        """The law for `simulate`, `export_controller` and `loop_transfer`; of an uncertain plant its state space.
+        """Controller for `simulate`, `export_controller` and `loop_transfer`.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Guarantee:
         return proof.controller if sliding is None else sliding.limited
 
     def save(self, path: str | Path) -> None:
-        """Write the certificate for `load_guarantee`, ``quakedesign check`` and ``proofs/check.py``.
+        """Write the certificate file for `load_guarantee` and ``quakedesign check``.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Results of `quakedesign.guarantee` in slow sliding: search, proof, worst case found, and remedies."""
+"""Results of `quakedesign.guarantee` in slow sliding: search, proof, worst case, remedies."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
 from quakedesign.guarantees.exact.limit_theorems import SlidingPush, longest_diffusion
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, Held
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.result import Guarantee
 from quakedesign.guarantees.search.lqg import sliding_model
@@ -41,7 +41,7 @@ from quakedesign.text import quantity
 
 Tell = Callable[[str, float], None]
 """Of what is being done, and the fraction done [-]."""
-_TRIFLE = Fraction(1)  # stress [Pa] that is tried where a law is estimated to stand none: another law may stand more
+_TRIFLE = Fraction(1)  # stress [Pa] to try where the estimate is 0: a search may find another law
 _SEARCHED = 0.8  # of the work, when a law of a search is proved
 _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
 
@@ -54,13 +54,13 @@ class SlidingGuarantee(Guarantee):
     ----------
     proof : SlidingProof or NoProof
     task : SlidingPlant
-    held : Held or None
-        The law as it runs; None where no law was found.
+    held : SampledLoop or None
+        The sampled law in its loop setup; None where no law was found.
     """
 
     proof: SlidingProof | NoProof
     task: SlidingPlant
-    held: Held | None
+    held: SampledLoop | None
     compensation: None = None
 
     @cached_property
@@ -101,17 +101,13 @@ def guarantee_sliding(
     step : Fraction, optional
         T_s [s]; the fault's unless given.
     stress : Fraction, optional
-        Bound of the shear stress disturbance [Pa]; the largest that the design is seen to stand unless given.
+        Bound of the shear stress disturbance [Pa]; by default the largest that is proved.
     spread : Fraction
-        By how much of their values a, b and D_c may be off [-].
+        Relative uncertainty of a, b and D_c [-].
     tell : callable, optional
         Called with what is being done and the fraction done [-].
     setup : ExactSetup
         With a lag or a diffusion path. All pressures of a proof are within the limits of its pump.
-
-    Raises
-    ------
-    ParameterError, UnsupportedError
     """
     box = fault.box
     if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
@@ -132,7 +128,7 @@ def guarantee_sliding(
             "slow sliding needs a diffusion path or a lag between well and fault. Received neither. Give --diffusion, "
             "such as '833 s', or --lag."
         )
-    held_over = rational(fault.sampling_time) if step is None else step
+    period = rational(fault.sampling_time) if step is None else step
     task = slow_sliding_plant(fault, stress or _TRIFLE, spread)
     pump, setup = setup.pump, replace(setup, pump=None)
     if pump is not None and pump.rate is not None:
@@ -140,36 +136,36 @@ def guarantee_sliding(
             "slow sliding has no guarantee with the rate limit of a pump. Received the rate limit "
             f"{shortly(pump.rate)} Pa/s. Omit the rate limit."
         )
-    prove = _proof(pump, tell, given=stress is not None)
+    prove = _proof(pump, tell, with_stress=stress is not None)
     tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
-    answer, reach, remedy = _answer(task, held_over, LOG_RATES[0], setup, prove), WellReach(share=Fraction(1)), ""
-    if answer.held is None:
+    result, reach, remedy = _designed(task, period, LOG_RATES[0], setup, prove), WellReach(share=Fraction(1)), ""
+    if result.held is None:
         tell("how far the well may be", 0.3)
-        reach = farthest(task, suitable(task, held_over), setup, stressed=stress is not None)
-        remedy = _remedy(fault, task, held_over, reach, setup, prove, spread)
+        reach = farthest(task, suitable(task, period), setup, stressed=stress is not None)
+        remedy = _remedy(fault, task, period, reach, setup, prove, spread)
     for log_rate in LOG_RATES[1:]:
-        if (answer.proved and (stress or answer.task.stress > _TRIFLE)) or reach.share < 1:
+        if (result.proved and (stress or result.task.stress > _TRIFLE)) or reach.share < 1:
             break
         tell(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
-        smaller = _answer(task, held_over, log_rate, setup, prove, reach.numbers)
-        more = smaller.proved and (not answer.proved or smaller.task.stress > answer.task.stress)
-        answer = smaller if more else answer
-    if not answer.proof.proved and not remedy and stress:
+        smaller = _designed(task, period, log_rate, setup, prove, reach.numbers)
+        more = smaller.proved and (not result.proved or smaller.task.stress > result.task.stress)
+        result = smaller if more else result
+    if not result.proof.proved and not remedy and stress:
         pumped = replace(setup, pump=pump)
         remedy = _under_less(guarantee_sliding(fault, step=step, spread=spread, tell=tell, setup=pumped))
-        if remedy and answer.held is None:
+        if remedy and result.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
-            answer = replace(answer, proof=NoProof(reason=none))
-    if not answer.proof.proved and not remedy:
-        remedy = _with_less_noise(task, held_over, setup, prove)
-    if not answer.proof.proved:
-        why = (stress and _beyond(fault, stress, setup)) or answer.proof.reason
-        return replace(answer, proof=replace(answer.proof, reason="; ".join(filter(None, (why, remedy)))))
-    return answer
+            result = replace(result, proof=NoProof(reason=none))
+    if not result.proof.proved and not remedy:
+        remedy = _with_less_noise(task, period, setup, prove)
+    if not result.proof.proved:
+        why = (stress and _beyond(fault, stress, setup)) or result.proof.reason
+        return replace(result, proof=replace(result.proof, reason="; ".join(filter(None, (why, remedy)))))
+    return result
 
 
 def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
-    """Why no controller holds the fault under a stress [Pa] through its rock; empty where that is not proved."""
+    """Reason why the diffusion path is infeasible under a stress [Pa]; empty if not proved."""
     most = rational(fault.effective_normal_stress)
     push = SlidingPush(model=sliding_model(fault), amplitude=stress)
     far = longest_diffusion(push, most, Fraction(0))
@@ -182,18 +178,18 @@ def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
     )
 
 
-def _under_less(answer: SlidingGuarantee) -> str:
-    """The stress for which a proof was found that is not for the one that was asked for; empty without one."""
-    if not answer.proved:
+def _under_less(result: SlidingGuarantee) -> str:
+    """Remedy: a smaller stress that has a proof; empty without one."""
+    if not result.proved:
         return ""
-    most = LowerBound(answer.task.stress).quantity("Pa")
+    most = LowerBound(result.task.stress).quantity("Pa")
     return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
 
 
 def _with_less_noise(task: SlidingPlant, step: Fraction, setup: ExactSetup, prove: Prove) -> str:
-    """A bound of the slip noise for which a proof was found, all else as it is; empty without one."""
+    """Remedy: a smaller slip noise that has a proof; empty without one."""
     for noise in quieter(setup):
-        if _answer(task, step, LOG_RATES[0], replace(setup, slip_noise=noise), prove).proved:
+        if _designed(task, step, LOG_RATES[0], replace(setup, slip_noise=noise), prove).proved:
             return f"a proof was found {with_noise(noise, setup).rstrip()}"
     return ""
 
@@ -207,7 +203,7 @@ def _remedy(
     prove: Prove,
     spread: Fraction,
 ) -> str:
-    """Which T_s, V or path would do; empty where a law was followed through all of the path at the T_s asked for."""
+    """Remedy: another T_s, V or diffusion path that has a proof; empty if none is needed."""
     if reach.share < 1:
         return what_would_do(fault, task, reach, setup, prove, spread=spread)
     suits = suitable(task, step)
@@ -215,29 +211,29 @@ def _remedy(
     return "" if suits == step else near
 
 
-def _proof(pump: Pump | None, tell: Tell, *, given: bool) -> Prove:
-    """Proofs whose pressures the pump can hold, under the task's stress if that is given, or about the largest."""
+def _proof(pump: Pump | None, tell: Tell, *, with_stress: bool) -> Prove:
+    """Proof within the pump limits, under the task's stress or near the largest stress."""
 
-    def tried(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingProof | NoProof:
+    def tried(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
         tell(f"{under}: proof", _SEARCHED)
-        found = _held_by(pump, proved_sliding(task, held, log_rate=log_rate))
-        tell(f"{under}: {'proved' if found.proved else 'not proved'}", _SEARCHED)
-        return found
+        proof = _within_pump(pump, proved_sliding(task, held, log_rate=log_rate))
+        tell(f"{under}: {'proved' if proof.proved else 'not proved'}", _SEARCHED)
+        return proof
 
-    def about_the_largest(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingProof | NoProof:
+    def about_the_largest(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
         most = largest_stress(task, held, log_rate=log_rate)
-        found: SlidingProof | NoProof
+        proof: SlidingProof | NoProof
         for share in _SHARES if most else _SHARES[:1]:
-            found = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
-            if found.proved:
+            proof = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
+            if proof.proved:
                 break
-        return found
+        return proof
 
-    return tried if given else about_the_largest
+    return tried if with_stress else about_the_largest
 
 
-def _answer(
+def _designed(
     task: SlidingPlant,
     step: Fraction,
     log_rate: Fraction,
@@ -245,7 +241,7 @@ def _answer(
     prove: Prove,
     near: np.ndarray | None = None,
 ) -> SlidingGuarantee:
-    """With |ln(v/V)| at most `log_rate`, searched near the numbers of a law as well if they are told."""
+    """Guarantee of a designed law with |ln(v/V)| ≤ `log_rate`; `near` is a further start."""
     design = designed_sliding(task, step, log_rate=log_rate, near=near, setup=setup)
     if isinstance(design, NoProof):
         return SlidingGuarantee(proof=design, task=task, held=None)
@@ -253,9 +249,9 @@ def _answer(
     return SlidingGuarantee(proof=proved, task=proved.task if proved.proved else task, held=design)
 
 
-def _held_by(pump: Pump | None, found: SlidingProof | NoProof) -> SlidingProof | NoProof:
+def _within_pump(pump: Pump | None, proof: SlidingProof | NoProof) -> SlidingProof | NoProof:
     """A guarantee whose pressures at the valve the pump can hold."""
-    if pump is None or not found.proved:
-        return found
-    too_much = pump.exceeded(*found.valve_pressures)
-    return NoProof(reason=too_much) if too_much else found
+    if pump is None or not proof.proved:
+        return proof
+    too_much = pump.exceeded(*proof.valve_pressures)
+    return NoProof(reason=too_much) if too_much else proof

@@ -1,4 +1,4 @@
-"""Results of `quakedesign.guarantee` on the stick–slip plant: proof, worst case found, limits."""
+"""Results of `quakedesign.guarantee` on the stick–slip plant: proof, worst case, limits."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -42,7 +42,7 @@ class StickSlipGuarantee(Guarantee):
 
     @property
     def least_slip_rate(self) -> LowerBound | None:
-        """Slip rate [m/s] that the fault reaches at this T_s under every controller; None without a guarantee."""
+        """Performance limit of the slip rate [m/s] at this T_s; None without a guarantee."""
         if not self.proof.proved:
             return None
         task = replace(self.proof.task, amplitude=self.proof.disturbance)  # which healing does not enlarge
@@ -146,8 +146,8 @@ def guarantee_stick_slip(
 
 
 def stick_slip_with_worst_case(
-    fault: Fault, found: StickSlipProof | NoProof, compensation: Compensation | None = None
+    fault: Fault, proof: StickSlipProof | NoProof, compensation: Compensation | None = None
 ) -> StickSlipGuarantee:
     """A guarantee with the worst case found on its loop."""
-    worst = worst_stick_slip(found) if found.proved else None
-    return StickSlipGuarantee(fault=fault, proof=found, worst=worst, compensation=compensation)
+    worst = worst_stick_slip(proof) if proof.proved else None
+    return StickSlipGuarantee(fault=fault, proof=proof, worst=worst, compensation=compensation)

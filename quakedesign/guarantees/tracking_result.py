@@ -1,4 +1,4 @@
-"""Results of `quakedesign.guarantee` on the plant without stick: proof, worst case found, limits, nearest setup."""
+"""Results of `quakedesign.guarantee` on the plant without stick."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -15,7 +15,7 @@ from quakedesign.guarantees.result import Guarantee
 from quakedesign.guarantees.search.compensated_search import Compensation
 from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATION
 from quakedesign.guarantees.search.lqg import measured_by
-from quakedesign.guarantees.search.worst_case import WorstCase, worst_found
+from quakedesign.guarantees.search.worst_case import WorstCase, worst_tracking
 from quakedesign.laws import LinearLaw, RestLimit
 from quakedesign.laws.sampled_controller import growth_at_rest, warning_at_rest
 from quakedesign.loop.loop_setup import MEASURED
@@ -24,7 +24,7 @@ from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.sos.exact.strict import written
 from quakedesign.text import quantity
 
-_TOLD = (
+_SETUP_KEYS = (
     "step",
     "slip_noise",
     "rate_noise",
@@ -49,7 +49,7 @@ class TrackingGuarantee(Guarantee):
         Of a search on the same loop, and on the stick–slip plant; None without a guarantee.
     shorter : TrackingProof or None
         For a design without a guarantee at its step: one near the longest step that has one.
-    asked_step : Fraction or None
+    unproved_step : Fraction or None
         T_s [s] that has no guarantee where `shorter` has one.
     nearest : (str, TrackingProof) or None
         For a loop without a guarantee: another quantity of its setup and a design with the value nearest to it that
@@ -57,7 +57,7 @@ class TrackingGuarantee(Guarantee):
         times `factor`.
     factor : Fraction or None
     compensation : Compensation or None
-        Gains, scale and settings of a sliding mode that runs in the scheme ``compensated``.
+        Gains, scale and settings of a sliding mode in the scheme ``compensated``.
     notes : tuple of str or None
         Of a user's law: what was changed when its floats became exact numbers; None for others.
     not_at_rest : str
@@ -71,7 +71,7 @@ class TrackingGuarantee(Guarantee):
     worst: WorstCase | None = None
     stick_search: WorstCase | None = None
     shorter: TrackingProof | None = None
-    asked_step: Fraction | None = None
+    unproved_step: Fraction | None = None
     nearest: tuple[str, TrackingProof] | None = None
     factor: Fraction | None = None
     compensation: Compensation | None = None
@@ -81,16 +81,16 @@ class TrackingGuarantee(Guarantee):
 
     @cached_property
     def worst_with_stick(self) -> WorstCase | None:
-        """Worst case found on the stick–slip plant (lower bound); of a given law searched for here, some seconds.
+        """Worst case found on the stick–slip plant; for a given law it is searched for here.
 
         None for a law that uses the slip, the slip rate or the reference itself, or that is unstable by itself.
         """
         if not (self.given and self.proof.proved) or self.proof.held.law.of_reference or self.grows_at_rest:
             return self.stick_search
-        return worst_found(self.proof, sticks=True)
+        return worst_tracking(self.proof, sticks=True)
 
     def lines(self) -> list[str]:
-        """Lines of text: the guarantee first, then the worst case found, then what was changed in the law."""
+        """Lines of text: guarantee, worst case found, changes of the law."""
         tried = [f"not proved on the stick-slip plant: {self.not_at_rest}"] if self.not_at_rest else []
         excess = self.fault.friction.rest_excess
         healed = [
@@ -101,8 +101,8 @@ class TrackingGuarantee(Guarantee):
     def _lines(self) -> list[str]:
         if not self.proof.proved:
             lines = [self.proof.sentence()]
-            if self.asked_step is not None:
-                lines = [f"not guaranteed at T_s = {float(self.asked_step):g} s: {self.proof.reason}"]
+            if self.unproved_step is not None:
+                lines = [f"not guaranteed at T_s = {float(self.unproved_step):g} s: {self.proof.reason}"]
             if self.shorter is not None:
                 lines.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
             if self.nearest is not None:
@@ -121,7 +121,7 @@ class TrackingGuarantee(Guarantee):
                     f"worst case found{name}: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
                     f"{quantity(seen.slip_rate, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
-        lines += [*filter(None, [self.stick_slip_gap]), *self._told(), *self.task_lines()]
+        lines += [*filter(None, [self.stick_slip_gap]), *self._differentiator_lines(), *self.task_lines()]
         if self.leaves_with_stick:
             lines.append(
                 "on the stick-slip plant a course was found that exceeds the bounds, which are those of the plant "
@@ -131,7 +131,7 @@ class TrackingGuarantee(Guarantee):
 
     @property
     def stick_slip_gap(self) -> str:
-        """What is neither proved nor searched on the stick–slip plant; empty without a guarantee, and of a design."""
+        """Quantities neither proved nor searched on the stick–slip plant; empty for a design."""
         seen = self.worst_with_stick
         if not self.proof.proved or (seen is not None and not (self.given and seen.pressures is None)):
             return ""
@@ -143,9 +143,9 @@ class TrackingGuarantee(Guarantee):
 
     @property
     def grows_at_rest(self) -> float | None:
-        """Time [s] in which the law's states grow e-fold while friction holds the fault at rest; None if they do not.
+        """Time constant [s] of growth of the law's states while the fault is at rest, or None.
 
-        Then what is measured no longer answers to the pressure, and the law is left to itself.
+        The measurements do not respond to the pressure at rest, so that the law runs in open loop.
         """
         if not self.proof.proved:
             return None
@@ -158,7 +158,7 @@ class TrackingGuarantee(Guarantee):
             return None
         return UpperBound(least_bound(self.proof.slip_acceleration, self.proof.held.slip_noise, self.proof.held.step))
 
-    def _told(self) -> list[str]:
+    def _differentiator_lines(self) -> list[str]:
         """For people; nothing of a law without a differentiator."""
         bound = self.differentiator_bound
         if bound is None:
@@ -191,14 +191,14 @@ class TrackingGuarantee(Guarantee):
         ]
 
     def task_lines(self) -> list[str]:
-        """What is said of the task, whatever law it is for."""
+        """Lines about the task alone, for every law."""
         return self.limit_lines() + self._narrower_class()
 
     def _narrower_class(self) -> list[str]:
-        """That the fault's own disturbance belongs to the class ``rate`` as well, for people."""
-        given = self.fault.disturbance
+        """Note that the fault's own disturbance is also of the class ``rate``."""
+        disturbance = self.fault.disturbance
         own = self.proof.proved and self.proof.task.change is None
-        if not own or given.constant or not given.largest_rate:
+        if not own or disturbance.constant or not disturbance.largest_rate:
             return []
         change = UpperBound(self.fault.disturbance_bounds[1])
         return [
@@ -218,7 +218,7 @@ class TrackingGuarantee(Guarantee):
 
     @property
     def least_slip_rate(self) -> LowerBound | None:
-        """Slip-rate error [m/s] that no controller goes below at the same T_s; None if unknown."""
+        """Performance limit of the slip-rate error [m/s] at the same T_s; None if unknown."""
         return None if self.limit is None else self.limit.slip_rate_error
 
     @property
@@ -262,7 +262,7 @@ class TrackingGuarantee(Guarantee):
             "limit": _limit(self.limit),
             "measured": measured_by(held.law),
             "differentiator_bound": None if self.differentiator_bound is None else self.differentiator_bound.exact,
-            **{name: str(getattr(held, name)) for name in _TOLD},
+            **{name: str(getattr(held, name)) for name in _SETUP_KEYS},
             "pump": None if held.pump is None else held.pump.to_dict(),
             "law": _law(held.law),
             **({} if self.notes is None else {"notes": list(self.notes)}),
@@ -284,12 +284,12 @@ _QUANTITIES = {
 }
 
 
-def _with_nearest(name: str, found: TrackingProof) -> str:
+def _with_nearest(name: str, proof: TrackingProof) -> str:
     """For people."""
     if name == GAINS:
         return "with designed gains"
     if name in _QUANTITIES:
-        (title, unit), value = _QUANTITIES[name], getattr(found.held, name)
+        (title, unit), value = _QUANTITIES[name], getattr(proof.held, name)
         if not value:
             return f"without any {title}"
         if name not in ("delay", "lag", "diffusion"):
@@ -297,12 +297,12 @@ def _with_nearest(name: str, found: TrackingProof) -> str:
         text = shortly(value)  # one value: nothing is proved of smaller ones
         return f"with a {title} of {text if Fraction(text) == value else exact_text(value)} {unit}"
     if name == BOX:
-        pairs = zip(found.task.spreads, ("k", "eta", "N"), strict=True)
+        pairs = zip(proof.task.spreads, ("k", "eta", "N"), strict=True)
         widths = (f"{LowerBound(100 * width):.3g} % of {of}" for width, of in pairs if width)
-        return f"with the box of +-{', '.join(widths)}" if any(found.task.spreads) else "with the box paper"
+        return f"with the box of +-{', '.join(widths)}" if any(proof.task.spreads) else "with the box paper"
     if name == AMPLITUDE:
-        return f"with a disturbance of at most {LowerBound(found.task.amplitude):.3g} m/s^2"
-    pump = found.held.pump
+        return f"with a disturbance of at most {LowerBound(proof.task.amplitude):.3g} m/s^2"
+    pump = proof.held.pump
     if name == SATURATION and pump is not None and pump.limits is not None:
         low, high = pump.limits
         return f"with a pump from {LowerBound(low).quantity('Pa')} or less to {UpperBound(high).quantity('Pa')} or more"
@@ -311,52 +311,52 @@ def _with_nearest(name: str, found: TrackingProof) -> str:
     return f"with a pump of at least {UpperBound(pump.rate or 0).quantity('Pa/s')}"
 
 
-def _nearest(name: str, found: TrackingProof, factor: Fraction | None) -> dict[str, Any]:
+def _nearest(name: str, proof: TrackingProof, factor: Fraction | None) -> dict[str, Any]:
     """Plain values, SI; exact numbers as texts, of a box and of a pump's pressures several."""
-    pump, value = found.held.pump, None
+    pump, value = proof.held.pump, None
     if name == FACTOR:
         value = str(factor)
     elif name == AMPLITUDE:
-        value = str(found.task.amplitude)
+        value = str(proof.task.amplitude)
     elif name in (BOX, SATURATION):
-        several = found.task.spreads if name == BOX else (pump and pump.limits) or ()
-        return {"quantity": name, "value": [str(v) for v in several], **found.claims.to_dict()}
+        several = proof.task.spreads if name == BOX else (pump and pump.limits) or ()
+        return {"quantity": name, "value": [str(v) for v in several], **proof.claims.to_dict()}
     else:
-        one = getattr(found.held, name, None) if name in _QUANTITIES else pump and pump.rate
+        one = getattr(proof.held, name, None) if name in _QUANTITIES else pump and pump.rate
         value = None if one is None else str(one)
-    return {"quantity": name, "value": value, **found.claims.to_dict()}
+    return {"quantity": name, "value": value, **proof.claims.to_dict()}
 
 
-def attacked(fault: Fault, found: TrackingProof | NoProof) -> TrackingGuarantee:
+def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGuarantee:
     """A guarantee with the worst case found on its loop; about a second.
 
-    Where a course with stick leaves a claim of a slow input gain, that of any gain takes its place if it is wider than
-    the course.
+    If a trajectory with stick exceeds a claim with a slowly varying input gain, the guarantee with an arbitrary gain
+    replaces it, provided that its claims contain the trajectory.
     """
-    if not found.proved:
-        return TrackingGuarantee(fault=fault, proof=found)
+    if not proof.proved:
+        return TrackingGuarantee(fault=fault, proof=proof)
     seen = TrackingGuarantee(
-        fault=fault, proof=found, worst=worst_found(found), stick_search=worst_found(found, sticks=True)
+        fault=fault, proof=proof, worst=worst_tracking(proof), stick_search=worst_tracking(proof, sticks=True)
     )
-    return seen if found.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, found)
+    return seen if proof.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, proof)
 
 
-def given_with_worst_case(
-    fault: Fault, found: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
+def given_law_with_worst_case(
+    fault: Fault, proof: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
 ) -> TrackingGuarantee:
     """The guarantee of a given law with the worst case found, for a law of the errors alone."""
-    worst = worst_found(found) if found.proved and not found.held.law.of_reference else None
-    return TrackingGuarantee(fault=fault, proof=found, worst=worst, notes=notes, given=True)
+    worst = worst_tracking(proof) if proof.proved and not proof.held.law.of_reference else None
+    return TrackingGuarantee(fault=fault, proof=proof, worst=worst, notes=notes, given=True)
 
 
-def _with_room(seen: TrackingGuarantee, found: TrackingProof) -> TrackingGuarantee:
-    anyhow, worst = guarantee(found.task, found.held), seen.worst_with_stick
+def _with_room(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
+    anyhow, worst = guarantee(proof.task, proof.held), seen.worst_with_stick
     if not anyhow.proved or worst is None:
         return seen
-    left = ["slip_error"] if worst.slip_error > found.claims.slip_error else []
-    left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate > found.claims.slip_rate_error else []
-    claims = replace(found.claims, **{name: getattr(anyhow.claims, name) for name in left})
-    wider = replace(seen, proof=replace(found, claims=claims))
+    left = ["slip_error"] if worst.slip_error > proof.claims.slip_error else []
+    left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate > proof.claims.slip_rate_error else []
+    claims = replace(proof.claims, **{name: getattr(anyhow.claims, name) for name in left})
+    wider = replace(seen, proof=replace(proof, claims=claims))
     return seen if wider.leaves_with_stick or wider.proof.check() is not Verdict.PROVED else wider
 
 

@@ -189,8 +189,8 @@ class Law(ABC):
             When there are none for the law.
         """
         data = tomllib.loads((files("quakedesign.laws") / "families.toml").read_text(encoding="utf-8"))
-        if cls.name not in (known := {group["law"] for group in data.values()}):
-            raise UnknownNameError(f"base gains exist for {', '.join(sorted(known))}. Received {cls.name!r}.")
+        if cls.name not in (laws := {group["law"] for group in data.values()}):
+            raise UnknownNameError(f"base gains exist for {', '.join(sorted(laws))}. Received {cls.name!r}.")
         return tuple(
             BaseGains(
                 law=cls.from_values(tuple(gains)),

@@ -20,8 +20,8 @@ BARE = "custom"
 @cache
 def laws() -> dict[str, type[Law]]:
     """Every law of the package by name, those included that act on other plants than a fault and are only proved."""
-    found = discovered(__package__, Law)
-    return {name: law for name, law in found.items() if name not in _OF_MATRICES}
+    classes = discovered(__package__, Law)
+    return {name: law for name, law in classes.items() if name not in _OF_MATRICES}
 
 
 def law(name: str) -> type[Law]:

@@ -79,8 +79,8 @@ class ExtendedLQR(Controller):
             "error": (signals.slip_error, signals.slip_rate_error),
             "state": (signals.slip, signals.slip_rate),
         }[self.feedback]
-        asked = -sum(k * x for k, x in zip(self._exact_gains(), (*ends, *signals.integrals), strict=True))
-        return asked + to_sympy(self.offset) if self.offset else asked
+        commanded = -sum(k * x for k, x in zip(self._exact_gains(), (*ends, *signals.integrals), strict=True))
+        return commanded + to_sympy(self.offset) if self.offset else commanded
 
     def _driven_back(self) -> tuple[sp.Expr, sp.Expr]:
         """l1, l2 for which ξ' = (l1, l2)(k3ξ1 + k4ξ2) + (0, ξ1) has the double pole −1/τ."""

@@ -106,13 +106,13 @@ def root_of(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
     after, before = (deadbeat - rate + pulled(terms, way * _TINY, deadbeat) for way in (1, -1))
     first = -rate + pulled(terms, slip, 0 * rate)
     low, high = (first > 0) * -first, (first < 0) * -first
-    held = (before <= 0) & (after >= 0)
-    if not (held | (low == high)).all():
+    at_zero = (before <= 0) & (after >= 0)
+    if not (at_zero | (low == high)).all():
         for _ in range(_HALVINGS):
             middle = (low + high) / 2
             above = middle - rate + pulled(terms, slip + step * middle, middle) > 0
             low, high = low + (middle - low) * ~above, high + (middle - high) * above
-    return deadbeat * held + (low + high) / 2 * ~held
+    return deadbeat * at_zero + (low + high) / 2 * ~at_zero
 
 
 def _all_terms(terms: tuple[Power, ...]) -> Iterator[Power]:

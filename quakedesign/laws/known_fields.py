@@ -35,15 +35,15 @@ def field_of(subject: "Subject") -> tuple[str, FieldTerms]:
     CertificateError
         For parts that certificates cannot express.
     """
-    if isinstance(subject, str) and subject in _kept():
-        return subject, _kept()[subject]
+    if isinstance(subject, str) and subject in _stored():
+        return subject, _stored()[subject]
     name, model = laws.model_of(subject)
     return name, model.terms
 
 
 def is_law(name: str) -> bool:
     """Whether the package has a law of a name."""
-    return name in _kept() or name in laws.laws()
+    return name in _stored() or name in laws.laws()
 
 
 def derived_again() -> str:
@@ -53,7 +53,7 @@ def derived_again() -> str:
 
 
 @cache
-def _kept() -> Mapping[str, FieldTerms]:
+def _stored() -> Mapping[str, FieldTerms]:
     return {name: _read(raw) for name, raw in shipped(FILE).items()}
 
 

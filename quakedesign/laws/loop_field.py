@@ -57,13 +57,13 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
 
 
 def sound_field(
-    field: Mapping[sp.Symbol, sp.Expr], known: Iterable[sp.Symbol], states: Iterable[sp.Symbol]
+    field: Mapping[sp.Symbol, sp.Expr], symbols: Iterable[sp.Symbol], states: Iterable[sp.Symbol]
 ) -> dict[sp.Symbol, sp.Expr]:
     """Rate of every state, in the order of the states; SymPy's own signs and absolute values as signed powers.
 
     Parameters
     ----------
-    known : iterable of Symbol
+    symbols : iterable of Symbol
         Everything that a rate may hold.
 
     Raises
@@ -71,7 +71,7 @@ def sound_field(
     ParameterError
         When a rate is missing or one too many, or holds a float, an infinity or an unknown symbol.
     """
-    order, allowed = tuple(states), set(known)
+    order, allowed = tuple(states), set(symbols)
     if set(order) != set(field):
         raise ParameterError(
             f"a field needs one rate for each of {', '.join(map(str, order))}. "
@@ -80,7 +80,7 @@ def sound_field(
     rates = {s: _signed(sp.sympify(field[s])) for s in order}
     for state, rate in rates.items():
         _require_exact(rate, f"the rate of {state}")
-        _require_known(rate, allowed, f"the rate of {state}")
+        _require_symbols(rate, allowed, f"the rate of {state}")
     return rates
 
 
@@ -102,12 +102,12 @@ def _require_exact(expression: sp.Expr, what: str) -> None:
         )
 
 
-def _require_known(expression: sp.Expr, known: set[sp.Symbol], what: str) -> None:
-    unknown = sorted(expression.free_symbols - known, key=str)
+def _require_symbols(expression: sp.Expr, symbols: set[sp.Symbol], what: str) -> None:
+    unknown = sorted(expression.free_symbols - symbols, key=str)
     if unknown:
-        twin = " Another symbol of this name has other assumptions." * (str(unknown[0]) in map(str, known))
+        twin = " Another symbol of this name has other assumptions." * (str(unknown[0]) in map(str, symbols))
         raise ParameterError(
-            f"{what} must hold only {', '.join(sorted(map(str, known))) or 'numbers'}. "
+            f"{what} must hold only {', '.join(sorted(map(str, symbols))) or 'numbers'}. "
             f"Received {unknown[0]}.{twin} Declare every symbol once."
         )
 
@@ -126,9 +126,9 @@ def require_names(symbols: Iterable[sp.Symbol]) -> None:
 
 def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Symbol]) -> None:
     """Reject a root of anything but a gain or constant."""
-    known = set(numbers)
+    symbols = set(numbers)
     for root, of in roots.items():
-        if of not in known:
+        if of not in symbols:
             raise ParameterError(f"the root {root} must be that of a gain or constant. Received {of}.")
 
 
@@ -136,12 +136,12 @@ def require_units(
     units: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol], numbers: Iterable[sp.Symbol]
 ) -> None:
     """Reject a unit that is not of a state, or contains more than gains, constants and roots."""
-    order, known = tuple(states), set(numbers)
+    order, symbols = tuple(states), set(numbers)
     for state, unit in units.items():
         if state not in order:
             raise ParameterError(f"units belong to states, {', '.join(map(str, order))}. Received a unit of {state}.")
         _require_exact(sp.sympify(unit), f"the unit of {state}")
-        _require_known(sp.sympify(unit), known, f"the unit of {state}")
+        _require_symbols(sp.sympify(unit), symbols, f"the unit of {state}")
 
 
 # ----------------------------------------------------------------------
@@ -185,12 +185,12 @@ class LoopField:
 
     def __post_init__(self) -> None:
         numbers = (*self.gains, *self.constants)
-        known = (*self.states, *numbers, *self.uncertain, *self.roots)
+        symbols = (*self.states, *numbers, *self.uncertain, *self.roots)
         object.__setattr__(self, "states", sound_states(self.states, self.domain))
-        require_names(known)
+        require_names(symbols)
         require_roots(self.roots, numbers)
         require_units(self.units, self.states, (*numbers, *self.roots))
-        object.__setattr__(self, "field", sound_field(self.field, known, self.states))
+        object.__setattr__(self, "field", sound_field(self.field, symbols, self.states))
 
     @property
     def degree(self) -> int:

@@ -51,7 +51,7 @@ def law_expressions(controller: Controller) -> tuple[sp.Expr, tuple[sp.Expr, ...
 
 
 def cut_off(
-    asked: sp.Expr,
+    commanded: sp.Expr,
     states: tuple[sp.Expr, ...],
     slip: sp.Expr,
     reference: sp.Expr,
@@ -65,7 +65,7 @@ def cut_off(
 
     Parameters
     ----------
-    asked : Expr
+    commanded : Expr
         [Pa].
     states : tuple of Expr
         `RestLimit.STATES` before it.
@@ -78,8 +78,8 @@ def cut_off(
     """
     highest, last = states
     moved = per_slip * reference
-    short = sp.Max(highest - moved - width - asked, 0)
-    applied = asked + sp.Piecewise((short, slip <= last + resolution), (0, True))
+    short = sp.Max(highest - moved - width - commanded, 0)
+    applied = commanded + sp.Piecewise((short, slip <= last + resolution), (0, True))
     if within is not None:
         least, largest, fastest = within
         inside = sp.Max(least, sp.Min(largest, applied)) - applied
@@ -159,8 +159,8 @@ class SampledController(Controller):
         object.__setattr__(self, "gains", MappingProxyType(dict(zip(self.gain_units, values, strict=True))))
 
     def __reduce__(self) -> tuple[Any, tuple[()]]:
-        told = {part.name: getattr(self, part.name) for part in fields(self) if part.init}
-        return partial(type(self), **told), ()
+        values = {part.name: getattr(self, part.name) for part in fields(self) if part.init}
+        return partial(type(self), **values), ()
 
     @property
     def sampling(self) -> Sampling:
@@ -209,24 +209,24 @@ class SampledController(Controller):
         """(Fz + Gy − z)/T_s, of what the limit cuts off what the law makes of it besides, and of the limit's states."""
         cut, after = self._decided(signals)[1:]
         z, seen, period = signals.integrals, self._read(signals), to_sympy(self.step)
-        told = self.law.applied or (Fraction(0),) * len(self.law.states)
-        rows = zip(self.law.update, self.law.measured, told, z, strict=False)
+        applied = self.law.applied or (Fraction(0),) * len(self.law.states)
+        rows = zip(self.law.update, self.law.measured, applied, z, strict=False)
         rates = [(_combined((*own, *fed), seen) - state) / period + to_sympy(h) * cut for own, fed, h, state in rows]
         rates = [rate + added / period for rate, added in zip(rates, self._of_reference(signals)[:-1], strict=True)]
         return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
 
     def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
         """The pressure that is applied, what that is more than is asked for, over T_s, and the limit's states after."""
-        asked = _combined((*self.law.output, *self.law.feedback), self._read(signals))
-        asked += self._of_reference(signals)[-1]
+        commanded = _combined((*self.law.output, *self.law.feedback), self._read(signals))
+        commanded += self._of_reference(signals)[-1]
         if self.rest_limit is None:
-            return asked, sp.S.Zero, ()
+            return commanded, sp.S.Zero, ()
         states = signals.integrals[len(self.law.states) :]
         limit, reference = self.rest_limit, signals.slip - signals.slip_error
         numbers = (to_sympy(v) for v in (limit.width, limit.per_slip, limit.resolution))
         within = None if limit.range is None else tuple(to_sympy(v) for v in limit.range)
-        applied, *after = cut_off(asked, states, signals.slip, reference, *numbers, within=within)
-        return applied, (applied - asked) / to_sympy(self.step), tuple(after)
+        applied, *after = cut_off(commanded, states, signals.slip, reference, *numbers, within=within)
+        return applied, (applied - commanded) / to_sympy(self.step), tuple(after)
 
     def _read(self, signals: Signals) -> tuple[Any, ...]:
         return (*signals.integrals[: len(self.law.states)], signals.slip_error, signals.slip_rate_error)
@@ -291,12 +291,12 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
         received, _ = apart(weight, Fraction(1))
         raise ParameterError(f"weight of a compensated step must be above 0 and at most 1. Received {received}.")
     require_gain(gain)
-    known = before, pushed, estimate, _, rate_error, end_rate = sp.symbols("before pushed estimate e1 e2 w")
+    symbols = before, pushed, estimate, _, rate_error, end_rate = sp.symbols("before pushed estimate e1 e2 w")
     share, size = to_sympy(weight), to_sympy(gain)
     level = followed(rate_error, before, pushed / size, estimate / size, share, size)
     pressure = compensation_answered(rate_error, end_rate, level, size)
-    rows = [_coefficients(expression, known) for expression in (rate_error, size * pressure, size * level)]
-    output = _coefficients(pressure, known)
+    rows = [_coefficients(expression, symbols) for expression in (rate_error, size * pressure, size * level)]
+    output = _coefficients(pressure, symbols)
     return LinearLaw(
         states=_STATES,
         update=tuple(row[:3] for row in rows),
@@ -309,7 +309,7 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
     )
 
 
-def _coefficients(expression: sp.Expr, known: tuple[sp.Symbol, ...]) -> tuple[Fraction, ...]:
+def _coefficients(expression: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> tuple[Fraction, ...]:
     """Of a linear expression."""
     expanded = sp.expand(expression)
-    return tuple(fraction_of(sp.Rational(expanded.coeff(symbol))) for symbol in known)
+    return tuple(fraction_of(sp.Rational(expanded.coeff(symbol))) for symbol in symbols)

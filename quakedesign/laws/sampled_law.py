@@ -244,18 +244,18 @@ def compensator(
     gains, corrections = _exact([feedback]), _exact(estimator)
     closed = _exact(update) - _exact([command]).transpose() * gains
     of_prediction = fmpq_mat([[fmpq(i == j) for j in range(n)] for i in range(n)]) - corrections * _exact(measured)
-    kept = [j for j in range(n) if any(of_prediction[i, j] != 0 for i in range(n))]
+    used = [j for j in range(n) if any(of_prediction[i, j] != 0 for i in range(n))]
 
     def rows(matrix: fmpq_mat, of_rows: Sequence[int], columns: Sequence[int] = range(seen)) -> Matrix:
         return tuple(tuple(fraction_of(matrix[i, j]) for j in columns) for i in of_rows)
 
     return LinearLaw(
-        states=tuple(states[j] for j in kept),
-        update=rows(closed * of_prediction, kept, kept),
-        measured=rows(closed * corrections, kept),
-        output=rows(-gains * of_prediction, [0], kept)[0],
+        states=tuple(states[j] for j in used),
+        update=rows(closed * of_prediction, used, used),
+        measured=rows(closed * corrections, used),
+        output=rows(-gains * of_prediction, [0], used)[0],
         feedback=rows(-gains * corrections, [0])[0],
-        applied=tuple(command[j] for j in kept),
+        applied=tuple(command[j] for j in used),
     )
 
 

@@ -78,9 +78,9 @@ class SlidingMode(Controller):
     def numbers(self) -> dict[str, Fraction]:
         """Gains, ``scale``, ``divisor``, a feed-forward that is on, and numbers of the scheme of a law of samples."""
         added = {} if self.feedforward == NONE else self.feedforward.coefficients
-        known = {f"feedforward_{name}": value for name, value in added.items()}
+        gains = {f"feedforward_{name}": value for name, value in added.items()}
         settings = self.sampling.settings if self.sampling else ()
-        return {**self.gains, "scale": self.scale, "divisor": self.divisor, **known, **dict(settings)}
+        return {**self.gains, "scale": self.scale, "divisor": self.divisor, **gains, **dict(settings)}
 
     @classmethod
     def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:
@@ -104,8 +104,8 @@ class SlidingMode(Controller):
         nu = self.virtual_control(
             signals.slip_error, signals.slip_rate_error, signals.integrals[0], self._exact_gains(), self._exact_scale()
         )
-        known = self.feedforward.acceleration(signals.slip, signals.slip_rate, signals.reference_acceleration)
-        return (nu + known) / sp.Rational(self.divisor.numerator, self.divisor.denominator)
+        predicted = self.feedforward.acceleration(signals.slip, signals.slip_rate, signals.reference_acceleration)
+        return (nu + predicted) / sp.Rational(self.divisor.numerator, self.divisor.denominator)
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
         """ξ1' as one entry."""

@@ -145,8 +145,8 @@ class SampledLaw(SampledController):
                 f"gains of a law must be one to four numbers, k1 to k4. Received {len(values)}. "
                 "Use SampledLaw.from_statespace for other laws."
             )
-        known = (("slip_error", "slip"), ("slip_rate_error", "slip_rate"))
-        if len(inputs) != 2 or any(name not in pair for name, pair in zip(inputs, known, strict=True)):
+        errors = (("slip_error", "slip"), ("slip_rate_error", "slip_rate"))
+        if len(inputs) != 2 or any(name not in pair for name, pair in zip(inputs, errors, strict=True)):
             raise ParameterError(
                 "inputs of gains must be slip_error or slip, then slip_rate_error or slip_rate. "
                 f"Received {', '.join(map(str, inputs))}."
@@ -157,8 +157,8 @@ class SampledLaw(SampledController):
         one, size = Fraction(1), len(rest)
         update = [[one * (i == j) + time * (i == j + 1) for j in range(size)] for i in range(size)]
         seen = [[time * (i == 0), Fraction(0), Fraction(0)] for i in range(size)]
-        given = ["slip_error", *inputs]
-        return cls._of_matrices((update, seen, [[-k for k in rest]], [[0, -k1, -k2]]), time, given, OUTPUT, label)
+        names = ["slip_error", *inputs]
+        return cls._of_matrices((update, seen, [[-k for k in rest]], [[0, -k1, -k2]]), time, names, OUTPUT, label)
 
     @classmethod
     def from_pid(
@@ -187,15 +187,15 @@ class SampledLaw(SampledController):
         time = _step(step)
         if rate <= 0:
             raise ParameterError(f"N of a PID must be positive. Received {shortly(rate)} 1/s.")
-        kept, zero, one = 1 / (1 + rate * time), Fraction(0), Fraction(1)
+        share, zero, one = 1 / (1 + rate * time), Fraction(0), Fraction(1)
         states = [  # own, of the error, output: the sum, and what the filter keeps, N·w with D = N(e − w)
             ([one, zero], time, -i),
-            ([zero, kept], 1 - kept, d * rate * kept),
+            ([zero, share], 1 - share, d * rate * share),
         ]
         used = [place for place, k in enumerate((i, d)) if k]
         update = [[states[a][0][b] for b in used] for a in used]
         output = [[states[a][2] for a in used]]
-        feed = -p - d * rate * kept
+        feed = -p - d * rate * share
         seen = [[states[a][1]] for a in used]
         return cls._of_matrices((update, seen, output, [[feed]]), time, ("slip_error",), OUTPUT, label)
 
@@ -218,11 +218,11 @@ class SampledLaw(SampledController):
         for row in (*B, D[0]):
             errors, moved = [zero, zero], [zero, zero]
             for name, v in zip(inputs, row, strict=True):
-                error, told = _PLACES[name]
+                error, of_reference_input = _PLACES[name]
                 if error is not None:
                     errors[error] += v
-                if told is not None:
-                    moved[told] += v
+                if of_reference_input is not None:
+                    moved[of_reference_input] += v
             of_errors.append(tuple(errors))
             of_reference.append(tuple(moved))
         law = LinearLaw(
@@ -275,32 +275,32 @@ class SampledLaw(SampledController):
             For a law that cannot be built.
         """
         content = read_bytes(path, "law", largest=_LARGEST, refusal=ScenarioError)
-        given = _of_npz(content, path) if str(path).endswith(".npz") else _of_json(content, path)
-        step = given.pop("step", given.pop("dt", None))
-        label = str(given.pop("label", Path(path).stem))[:60]
+        entries = _of_npz(content, path) if str(path).endswith(".npz") else _of_json(content, path)
+        step = entries.pop("step", entries.pop("dt", None))
+        label = str(entries.pop("label", Path(path).stem))[:60]
         if step is None:
             raise ScenarioError(f"law {path} must have the key step, its sampling time [s]. Received none.")
-        if "pid" in given:
-            pid = dict(given.pop("pid")) if isinstance(given["pid"], dict) else {}
+        if "pid" in entries:
+            pid = dict(entries.pop("pid")) if isinstance(entries["pid"], dict) else {}
             named = {name: pid.pop(name) for name in ("kp", "ki", "kd", "N") if name in pid}
-            if pid or given or "kp" not in named:
+            if pid or entries or "kp" not in named:
                 raise ScenarioError(
                     f"pid of law {path} must have the keys kp, ki, kd and N, kp at least, and nothing but step beside "
                     'it: {"step": "50 ms", "pid": {"kp": 4e8, "ki": 1e8, "kd": 3e8, "N": 50}}.'
                 )
             return cls.from_pid(**named, step=step, label=label)
-        if set(given) in ({"gains"}, {"gains", "inputs"}):
-            return cls.from_gains(**given, step=step, label=label)
-        if set(given) - {"output"} != {"A", "B", "C", "D", "inputs"}:
-            keys = ", ".join(sorted(map(str, given)))[:100] or "none"
+        if set(entries) in ({"gains"}, {"gains", "inputs"}):
+            return cls.from_gains(**entries, step=step, label=label)
+        if set(entries) - {"output"} != {"A", "B", "C", "D", "inputs"}:
+            keys = ", ".join(sorted(map(str, entries)))[:100] or "none"
             raise ScenarioError(
                 f"law {path} must have the key step and, besides label, either A, B, C, D and inputs, or gains, or "
                 f"pid. Received besides step: {keys}. Omit keys of other names."
             )
-        parts, inputs = [given[name] for name in "ABCD"], given["inputs"]
+        parts, inputs = [entries[name] for name in "ABCD"], entries["inputs"]
         if not isinstance(inputs, list) or not all(isinstance(name, str) for name in inputs):
             raise ScenarioError(f"inputs of law {path} must be a list of names.")
-        return cls._of_matrices(parts, _step(step), inputs, str(given.get("output", OUTPUT)), label)
+        return cls._of_matrices(parts, _step(step), inputs, str(entries.get("output", OUTPUT)), label)
 
 
 def _step(value: Any) -> Fraction:
@@ -353,10 +353,10 @@ def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
     place = int(np.argmin(np.abs(poles - 1)))
     if abs(poles[place] - 1) > _NEAR:
         return A, ()
-    v, answer = vectors[:, place].real, np.array([float(c) for c in C])
-    if abs(answer @ v) <= 1e-12 * (np.abs(answer) @ np.abs(v)):
+    v, response = vectors[:, place].real, np.array([float(c) for c in C])
+    if abs(response @ v) <= 1e-12 * (np.abs(response) @ np.abs(v)):
         return A, ()
-    v = v / (answer @ v)
+    v = v / (response @ v)
     left_poles, rows = np.linalg.eig(table.T)
     q = rows[:, int(np.argmin(np.abs(left_poles - 1)))].real
     strongest = int(np.argmax(np.abs(q * v)))
@@ -370,10 +370,10 @@ def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
     others = sum((a * b for i, (a, b) in enumerate(zip(share, exact, strict=True)) if i != strongest), Fraction(0))
     share[strongest] = (1 - others) / exact[strongest]
     off = [sum((a * x for a, x in zip(row, exact, strict=True)), -x) for row, x in zip(A, exact, strict=True)]
-    found = tuple(tuple(a - d * s for a, s in zip(row, share, strict=True)) for row, d in zip(A, off, strict=True))
+    changed = tuple(tuple(a - d * s for a, s in zip(row, share, strict=True)) for row, d in zip(A, off, strict=True))
     moved = max(abs(d * s) for d in off for s in share)
     pole = f"{poles[place].real:.12g}"
-    return found, (
+    return changed, (
         f"a pole at {pole} is taken for an integrator that rounding has moved and made exactly 1: entries of A change "
         f"by at most {float(moved):.1g}",
     )
@@ -387,12 +387,12 @@ _LARGEST = 1 << 20
 
 def _of_json(content: bytes, path: str | Path) -> dict[str, Any]:
     try:
-        given = json.loads(content.decode("utf-8-sig"))
+        entries = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"law {path} must be JSON. Received {str(error)[:80]}.") from None
-    if not isinstance(given, dict):
-        raise ScenarioError(f"law {path} must be an object with keys. Received {type(given).__name__}.")
-    return given
+    if not isinstance(entries, dict):
+        raise ScenarioError(f"law {path} must be an object with keys. Received {type(entries).__name__}.")
+    return entries
 
 
 def _of_npz(content: bytes, path: str | Path) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from .actuators.sampled_stages import Quantisation as Quantisation
 from .actuators.sampled_stages import RateLimit as RateLimit
 from .actuators.sampled_stages import Saturation as Saturation
 from .diffusion_layer import Layer as Layer
-from .diffusion_layer import with_known_area as with_known_area
+from .diffusion_layer import with_response_area as with_response_area
 from .error_loop import SHORTEST as SHORTEST
 from .error_loop import ContinuousLaw as ContinuousLaw
 from .error_loop import SlidingModel as SlidingModel

@@ -101,7 +101,7 @@ class Layer:
 #   in v, and |Y| ≤ max|u′|·(|ĉ_N|/λ̂_N² + 6Nδτ²). ∎
 
 
-def with_known_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
+def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
     """A loop of `held_loop` through a layer, with x2 in place of e2 and Y in place of R times β0.
 
     ``awaited`` is bY over what bounds it, so that it is at most the output ``left_out`` (times its weight, where the
@@ -118,7 +118,7 @@ def with_known_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Periodi
     size, slip_rate = len(loop.states), loop.states.index("e2")
     *others, last = loop.segments
     if loop.fading:
-        share, fading = _held(loop, layer)
+        share, fading = _share_and_fading(loop, layer)
         step = last.jump[loop.states.index("stepped")]
         kicked = [list(row) for row in last.jump]
         kicked[slip_rate] = [v - gain * layer.area * d for v, d in zip(kicked[slip_rate], step, strict=True)]
@@ -131,20 +131,20 @@ def with_known_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Periodi
         flow[slip_rate][behind] -= gain * layer.area * flow[behind][behind]
         loop = replace(loop, flow=tuple(map(tuple, flow)))
     segments = (*others, last)
-    told = tuple(row[slip_rate] - (i == slip_rate) for i, row in enumerate(segments[0].jump))
+    measured = tuple(row[slip_rate] - (i == slip_rate) for i, row in enumerate(segments[0].jump))
     own = gain * share
     entry = unit_row(size, {loop.states.index("e1"): own, slip_rate: own * loop.flow[slip_rate][slip_rate]})
     return replace(
         loop,
         segments=segments,
         inputs=loop.inputs if fading else {**loop.inputs, "awaited": entry},
-        sampled={**loop.sampled, "awaited_told": tuple(own * late * v for v in told)},
+        sampled={**loop.sampled, "awaited_told": tuple(own * late * v for v in measured)},
         fading={**loop.fading, "awaited": replace(fading, entry=entry)} if fading else {},
         at_once={("slip_rate_error", "awaited"): own},
     )
 
 
-def _held(loop: PeriodicLoop, layer: Layer) -> tuple[Fraction, Fading]:
+def _share_and_fading(loop: PeriodicLoop, layer: Layer) -> tuple[Fraction, Fading]:
     """Largest |bY| over the bound of |b·R|, and how it fades."""
     (own,) = loop.fading.values()
     height, rate, floor = layer.left_out(loop.period)

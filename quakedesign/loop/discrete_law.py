@@ -20,9 +20,9 @@ step = sp.Symbol("T_s", positive=True)
 authority = sp.Symbol("B_0", positive=True)
 
 
-def values(expressions: tuple[sp.Expr, ...], known: Values) -> list[Any]:
+def values(expressions: tuple[sp.Expr, ...], numbers: Values) -> list[Any]:
     """Expressions as CasADi SX."""
-    return to_casadi(list(expressions), known)
+    return to_casadi(list(expressions), numbers)
 
 
 @dataclass(frozen=True)
@@ -61,23 +61,23 @@ class Lifted:
     @classmethod
     def of(cls, expressions: tuple[sp.Expr, ...]) -> "Lifted":
         """Replace every number but 0, ±1 and exponents."""
-        found: dict[sp.Expr, sp.Symbol] = {}
-        lifted = tuple(_lift(sp.sympify(expression), found) for expression in expressions)
-        return cls(lifted, tuple(found.values()), tuple(float(number.evalf(30)) for number in found))
+        symbols: dict[sp.Expr, sp.Symbol] = {}
+        lifted = tuple(_lift(sp.sympify(expression), symbols) for expression in expressions)
+        return cls(lifted, tuple(symbols.values()), tuple(float(number.evalf(30)) for number in symbols))
 
 
-def _lift(node: Any, found: dict[sp.Expr, sp.Symbol]) -> Any:
+def _lift(node: Any, symbols: dict[sp.Expr, sp.Symbol]) -> Any:
     if node.is_number:
         if node in (0, 1, -1):
             return node
-        return sp.sign(node) * found.setdefault(abs(node), sp.Symbol(f"number_{len(found)}", positive=True))
+        return sp.sign(node) * symbols.setdefault(abs(node), sp.Symbol(f"number_{len(symbols)}", positive=True))
     if node.is_Add or node.is_Mul:
         numbers = node.func(*(arg for arg in node.args if arg.is_number))
         rest = sorted((arg for arg in node.args if not arg.is_number), key=_structure)
-        return node.func(_lift(numbers, found), *(_lift(arg, found) for arg in rest))
+        return node.func(_lift(numbers, symbols), *(_lift(arg, symbols) for arg in rest))
     if not node.args:
         return node
-    return node.func(_lift(node.args[0], found), *node.args[1:])
+    return node.func(_lift(node.args[0], symbols), *node.args[1:])
 
 
 def _structure(node: sp.Expr) -> Any:

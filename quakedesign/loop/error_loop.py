@@ -128,9 +128,9 @@ def starts(
     """
     made = list(zip(*law.first, strict=True)) or [(Fraction(0),) * len(law.states)] * 2
     rest = [Fraction(0)] * (size - 2 - len(law.states))
-    found = [(error, [Fraction(k == 0), Fraction(k == 1), *made[k], *rest]) for k, error in enumerate(errors)]
-    found += [(off, [Fraction(0), Fraction(0), *made[k], *rest]) for k, off in enumerate(noise)]
-    return tuple(tuple(bound * v for v in column) for bound, column in found if bound and any(column))
+    columns = [(error, [Fraction(k == 0), Fraction(k == 1), *made[k], *rest]) for k, error in enumerate(errors)]
+    columns += [(off, [Fraction(0), Fraction(0), *made[k], *rest]) for k, off in enumerate(noise)]
+    return tuple(tuple(bound * v for v in column) for bound, column in columns if bound and any(column))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,8 +189,8 @@ def _connected(
     # the law
     own, measured = tuple(f"law {i}" for i in range(len(law.states))), ("slip", "slip_rate", "implicit")
     made = zip((*law.measured, law.feedback), (*law.update, law.output), strict=True)
-    *updates, asked = (dict(zip((*measured[: len(fed)], *own), (*fed, *kept), strict=True)) for fed, kept in made)
-    for signal, (_, moved) in zip((*updates, asked), law.of_reference, strict=False):
+    *updates, output = (dict(zip((*measured[: len(fed)], *own), (*fed, *now), strict=True)) for fed, now in made)
+    for signal, (_, moved) in zip((*updates, output), law.of_reference, strict=False):
         signal["reference_rate"] = moved
     # the path: delay line, valve, well, layer, and the last step of the valve
     line = tuple(f"waiting{i}" for i in range(int(times.delay // step) + (part > 0)))
@@ -204,7 +204,7 @@ def _connected(
             "slip": {"e1": _ONE, "slip_noise": _ONE},
             "slip_rate": {"e2": _ONE, "rate_noise": _ONE},
             "implicit": {} if law.root is None else {"slip": -law.root.middle / step, "root": _ONE},
-            "asked": {name: authority * v for name, v in asked.items()},
+            "asked": {name: authority * v for name, v in output.items()},
             "push": {"valve": _ONE}
             | ({"behind": _ONE} if lag else {})
             | {name: layer.share(n) for name, n in modes.items()},
@@ -347,7 +347,7 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
     steady = steady_states(law.rates, law.output, still, _ONE)
     own = tuple(f"law {i}" for i in range(len(law.states)))
     made = (law.feedback, *law.measured), (law.output, *law.rates)
-    push, *moved = (dict(zip(("e1", "e2", *own), (*fed, *kept), strict=True)) for fed, kept in zip(*made, strict=True))
+    push, *moved = (dict(zip(("e1", "e2", *own), (*fed, *row), strict=True)) for fed, row in zip(*made, strict=True))
     system = Interconnection(("e1", "e2", *own), {"push": {name: authority * v for name, v in push.items()}})
     plant = {"e1": model.slip, "e2": -model.rate, "push": model.gain / authority}
     inputs = {

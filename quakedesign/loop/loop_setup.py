@@ -50,10 +50,10 @@ class Pump:
 
     def __post_init__(self) -> None:
         if (self.least is None) != (self.largest is None):
-            given = "largest" if self.least is None else "least"
+            present = "largest" if self.least is None else "least"
             raise ParameterError(
                 "the least pressure of a pump must be given with the largest. "
-                f"Received the {given} pressure alone. Give both."
+                f"Received the {present} pressure alone. Give both."
             )
         if self.limits and not (self.limits[0] <= 0 <= self.limits[1] and self.limits[0] < self.limits[1]):
             low, high = map(shortly, self.limits)
@@ -93,8 +93,8 @@ class Pump:
 
     def to_dict(self) -> dict[str, str]:
         """Exact numbers as texts."""
-        given = {part.name: getattr(self, part.name) for part in fields(self)}
-        return {name: str(value) for name, value in given.items() if value is not None}
+        values = {part.name: getattr(self, part.name) for part in fields(self)}
+        return {name: str(value) for name, value in values.items() if value is not None}
 
     def words(self) -> str:
         """Sentence part for people."""
@@ -261,7 +261,7 @@ class LoopSetup:
         """Fields that differ from their default, by name, in SI units."""
         return {part.name: value for part in fields(self) if (value := getattr(self, part.name)) != part.default}
 
-    def with_given(self, **given: Quantity | None) -> Self:
+    def with_given(self, **entered: Quantity | None) -> Self:
         """The setup with those fields that are not None.
 
         Raises
@@ -269,9 +269,9 @@ class LoopSetup:
         ParameterError
             For another name, with the nearest valid one.
         """
-        for name in given:
+        for name in entered:
             require_known(name, [part.name for part in fields(self)], "quantity of the loop setup")
-        values: Any = {name: value for name, value in given.items() if value is not None}
+        values: Any = {name: value for name, value in entered.items() if value is not None}
         return replace(self, **values) if values else self
 
     def at_step(self, fault: "Fault") -> tuple["Fault", Self]:

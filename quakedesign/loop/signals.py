@@ -20,12 +20,12 @@ class Interconnection:
 
     def resolved(self, signal: Signal) -> dict[str, Fraction]:
         """A signal as a combination of states and inputs alone."""
-        found: dict[str, Fraction] = {}
+        whole: dict[str, Fraction] = {}
         for name, share in signal.items():
             parts = self.resolved(self.signals[name]) if name in self.signals else {name: _ONE}
             for part, factor in parts.items():
-                found[part] = found.get(part, _ZERO) + share * factor
-        return found
+                whole[part] = whole.get(part, _ZERO) + share * factor
+        return whole
 
     def row(self, signal: Signal) -> Row:
         """Entries of a signal for the states."""

@@ -9,7 +9,7 @@ from quakedesign.laws import Controller
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.report.figures import figures
 from quakedesign.report.page import table_html
-from quakedesign.report.sentences import headline, remarks, said
+from quakedesign.report.sentences import brief, headline, remarks
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
 from quakedesign.synthesis import Design, assess
 
@@ -42,7 +42,7 @@ class Comparison(Compared):
         return figures(self)
 
     def __repr__(self) -> str:
-        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {said(e)}" for e in self.entries)))
+        return "\n".join((f"Comparison on {self.fault.name}:", *(f"  {e.label}: {brief(e)}" for e in self.entries)))
 
     def _repr_html_(self) -> str:
         return table_html(self)
@@ -59,7 +59,7 @@ def compare(
     whole_task: bool = False,
     plant: str | None = None,
     progress: Callable[[str, float], None] | None = None,
-    **given: Quantity | None,
+    **entered: Quantity | None,
 ) -> Comparison:
     """Run all controllers of a fault over the whole task, step T_s; of a slow one with a state over 500 D_c/V.
 
@@ -83,7 +83,7 @@ def compare(
         Of the runs of friction without a state: ``stick-slip`` unless given, or ``printed``, as of `simulate`.
     progress : callable, optional
         Called with what is being done and the fraction done [-].
-    **given : str, float or Fraction
+    **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
@@ -95,7 +95,7 @@ def compare(
     ParameterError
         For a loop setup without a given law.
     """
-    setup, laws = setup.with_given(**given), [one for one in designs if not isinstance(one, Design)]
+    setup, laws = setup.with_given(**entered), [one for one in designs if not isinstance(one, Design)]
     if setup != IDEAL and not laws:
         raise ParameterError(
             f"a loop setup of a comparison is that of given laws. Received {setup!r} without one. Give it to design."
@@ -134,10 +134,10 @@ def designed_comparison(
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
-    given = {**(options or {}), "plant": plant}
-    made = ((one, False) for one in designs_of(fault, names, tell, given))
+    options_of_all = {**(options or {}), "plant": plant}
+    made = ((one, False) for one in designs_of(fault, names, tell, options_of_all))
     how: dict[str, Any] = {"whole_task": whole_task, "plant": plant, "schemes": _schemes(**schemes)}
-    how["with_published"] = not given.get("setup", IDEAL).path
+    how["with_published"] = not options_of_all.get("setup", IDEAL).path
     return Comparison(**vars(compared(fault, made, tell, **how)))
 
 

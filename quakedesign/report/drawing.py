@@ -45,8 +45,8 @@ def colour(name: str) -> str:
 
     From the palette of Okabe and Ito (https://jfly.uni-koeln.de/color/): told apart with every common colour vision.
     """
-    known = sorted(control_laws())
-    return _PALETTE[min(known.index(name), len(_PALETTE) - 1)] if name in known else _PALETTE[-1]
+    names = sorted(control_laws())
+    return _PALETTE[min(names.index(name), len(_PALETTE) - 1)] if name in names else _PALETTE[-1]
 
 
 def style(entry: "Entry") -> dict[str, Any]:
@@ -94,9 +94,9 @@ def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *,
     """Give a figure its title above, and below the legend of one axis (three columns) and how the runs were made."""
     drawing.suptitle(title, fontsize=SMALL + 2)
     whole = "; ".join(part for part in (note, made(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
-    told = wrap(whole, _NOTE, break_on_hyphens=False)
-    height, bottom = drawing.get_figheight(), 0.05 + _LINE * len(told)
-    drawing.text(0.5, 0.03 / height, "\n".join(told), ha="center", va="bottom", fontsize=SMALL - 1, color="#444444")
+    rows = wrap(whole, _NOTE, break_on_hyphens=False)
+    height, bottom = drawing.get_figheight(), 0.05 + _LINE * len(rows)
+    drawing.text(0.5, 0.03 / height, "\n".join(rows), ha="center", va="bottom", fontsize=SMALL - 1, color="#444444")
     if legend is not None:
         handles, labels = legend.get_legend_handles_labels()
         place = (0.5, bottom / height)
@@ -160,12 +160,12 @@ def runs_of(entries: Iterable["Entry"]) -> "list[tuple[Entry, Trajectory]]":
 
 def with_diverged(entries: "Iterable[Entry]", note: str = "") -> str:
     """Note that also names the runs which diverged: their last values would leave no room for all others."""
-    found = [(e.label, e.run.events["diverged"]) for e in entries if e.run and "diverged" in e.run.events]
-    lines = [f"{label} diverges at {time:.3g} s and is not drawn" for label, time in found]
+    diverged = [(e.label, e.run.events["diverged"]) for e in entries if e.run and "diverged" in e.run.events]
+    lines = [f"{label} diverges at {time:.3g} s and is not drawn" for label, time in diverged]
     return "; ".join([*([note] if note else []), *lines])
 
 
-def known(values: np.ndarray | None) -> np.ndarray:
+def present(values: np.ndarray | None) -> np.ndarray:
     """Values of a controlled run, which always has a reference."""
     assert values is not None
     return values
@@ -215,9 +215,9 @@ def write_figures(folder: Path, drawn: Mapping[str, Any], formats: Sequence[str]
             (folder / f"{name}.{kind}").write_bytes(figure_bytes(drawing, kind, name))
 
 
-def write_results(folder: Path, facts: Mapping[str, Any]) -> None:
+def write_results(folder: Path, values: Mapping[str, Any]) -> None:
     """Write ``results.json`` into a folder that exists."""
-    write_whole(folder / "results.json", json.dumps(facts, indent=1, allow_nan=False) + "\n")
+    write_whole(folder / "results.json", json.dumps(values, indent=1, allow_nan=False) + "\n")
 
 
 def file_names(name: str, formats: Sequence[str]) -> str:
@@ -233,7 +233,7 @@ _INKS = {"#000000": "var(--ink)", "#444444": "var(--soft)", "#b0b0b0": "var(--li
 _PAPER = "#ffffff"
 
 
-def inline_svg(drawn: str, drawing: Any, name: str, told: str) -> Markup:
+def inline_svg(drawn: str, drawing: Any, name: str, description: str) -> Markup:
     """SVG element of a figure, with names of its own, that tells what it shows.
 
     Parameters
@@ -242,12 +242,12 @@ def inline_svg(drawn: str, drawing: Any, name: str, told: str) -> Markup:
         SVG file of the figure.
     name : str
         Unique in its page.
-    told : str
+    description : str
         For readers who do not see it.
     """
     body = drawn[drawn.index("<defs>", drawn.index("</metadata>") if "</metadata>" in drawn else 0) :]
     width, height = (72 * float(size) for size in drawing.get_size_inches())
-    head = f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(told)}" '
+    head = f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(description)}" '
     return Markup(f'{head}data-axes="{escape(json.dumps(_axes(drawing, height)))}">{_tightened(body, name)}')
 
 
@@ -296,14 +296,14 @@ def _side(axis: Any, label: str) -> dict[str, Any]:
 Drawn = tuple[bytes, Markup]
 
 
-def drawn_once(draw: Callable[[], Mapping[str, Any]], told: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
+def drawn_once(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
     """SVG files of figures by name, and their elements for a page; from the cache if the same were drawn before.
 
     Parameters
     ----------
     draw : callable
         Gives figures of matplotlib by name, not drawn yet, that depend on what they show alone.
-    told : mapping of str to str
+    alt : mapping of str to str
         For readers who do not see a figure, by its name.
     shown : Any
         All that is shown, but for how long it took.
@@ -311,14 +311,14 @@ def drawn_once(draw: Callable[[], Mapping[str, Any]], told: Mapping[str, str], s
 
     def texts() -> bytes:
         drawn = {name: (drawing, figure_bytes(drawing, "svg", name).decode()) for name, drawing in draw().items()}
-        return json.dumps({n: [v, inline_svg(v, drawing, n, told[n])] for n, (drawing, v) in drawn.items()}).encode()
+        return json.dumps({n: [v, inline_svg(v, drawing, n, alt[n])] for n, (drawing, v) in drawn.items()}).encode()
 
-    asked = _stated(told, shown) if cache.in_use() else None
-    known = texts() if asked is None else cache.once("figures", texts, asked)
-    return {name: (vector.encode(), Markup(inside)) for name, (vector, inside) in json.loads(known).items()}
+    statement = _stated(alt, shown) if cache.in_use() else None
+    vectors = texts() if statement is None else cache.once("figures", texts, statement)
+    return {name: (vector.encode(), Markup(inside)) for name, (vector, inside) in json.loads(vectors).items()}
 
 
-def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
+def _stated(alt: Mapping[str, str], shown: Any) -> bytes | None:
     """All that drawings depend on: contents, settings and fonts; None if they cannot be told."""
     import matplotlib as mpl
     from matplotlib.font_manager import fontManager
@@ -328,7 +328,7 @@ def _stated(told: Mapping[str, str], shown: Any) -> bytes | None:
     except OSError:
         return None
     settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # which would be loaded
-    return cache.stated((dict(told), shown, settings, fonts), _Untimed)
+    return cache.stated((dict(alt), shown, settings, fonts), _Untimed)
 
 
 class _Untimed(cache.CachedStatement):
@@ -339,7 +339,7 @@ class _Untimed(cache.CachedStatement):
         self.fast = True  # what is equal is written the same, be it one value or two
 
     def field(self, value: Any, name: str) -> Any:
-        given = super().field(value, name)
+        stated = super().field(value, name)
         if name == "provenance":
-            return {k: v for k, v in given.items() if not (k.startswith("backend") or k.endswith("_seconds"))}
-        return None if name == "seconds" else given
+            return {k: v for k, v in stated.items() if not (k.startswith("backend") or k.endswith("_seconds"))}
+        return None if name == "seconds" else stated

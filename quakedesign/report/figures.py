@@ -22,9 +22,9 @@ from quakedesign.report.drawing import (
     colour,
     figure,
     finish,
-    known,
     length,
     named,
+    present,
     runs_of,
     scaled,
     style,
@@ -47,9 +47,9 @@ _ROOM = 0.9  # for the insets above the data, over the height of the data
 
 def grid(comparison: "Compared") -> tuple[list[str], list[str], dict[tuple[str, str], "Entry"]]:
     """Laws and origins that have a run, in order, and the entry of each pair."""
-    found = {(e.design.name, e.origin): e for e, _ in runs_of(comparison.entries)}
-    laws = list(dict.fromkeys(name for name, _ in found))
-    return laws, [o for o in ORIGINS if any(origin == o for _, origin in found)], found
+    entries = {(e.design.name, e.origin): e for e, _ in runs_of(comparison.entries)}
+    laws = list(dict.fromkeys(name for name, _ in entries))
+    return laws, [o for o in ORIGINS if any(origin == o for _, origin in entries)], entries
 
 
 def states(comparison: "Compared") -> Any:
@@ -57,17 +57,17 @@ def states(comparison: "Compared") -> Any:
 
     The rate is on a scale that is linear below the largest reference rate and logarithmic beyond it.
     """
-    laws, origins, found = grid(comparison)
+    laws, origins, by_law = grid(comparison)
     rows = 1 + len(laws)
     drawing, axes = figure(rows, 0.95 + 1.1 * rows, len(origins), sharex=True, sharey="row")
     runs = runs_of(comparison.entries)
     divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
-    size, name = length(float(known(runs[0][1].reference).max()))
+    size, name = length(float(present(runs[0][1].reference).max()))
     for column, origin in enumerate(origins):
         _slips(axes[0, column], comparison, origin, (divisor, size))
         axes[0, column].set_ylabel(f"slip [{name}]")
         for row, law in enumerate(laws, 1):
-            entry = found.get((law, origin))
+            entry = by_law.get((law, origin))
             if entry is None:
                 drawing.delaxes(axes[row, column])
                 continue
@@ -92,7 +92,7 @@ def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, f
         width = 1.5 * (len(runs) - place)
         look = style(entry) | {"linewidth": width, "linestyle": "solid", "label": entry.design.title}
         axis.plot(run.time / divisor, run.slip / size, **look)
-    axis.plot(runs[0][1].time / divisor, known(runs[0][1].reference) / size, color="black", linestyle=":", linewidth=1)
+    axis.plot(runs[0][1].time / divisor, present(runs[0][1].reference) / size, color="black", ls=":", lw=1)
     axis.legend(loc="lower right", fontsize=SMALL - 1)
     named(axis, f"{' and '.join(dict.fromkeys(entry.kind for entry, _ in runs))} gains")
 
@@ -100,7 +100,7 @@ def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, f
 def _rate(axis: Any, entry: "Entry", comparison: "Compared", divisor: float) -> None:
     run = entry.run
     assert run is not None
-    reference, peak = known(run.reference_rate), comparison.uncontrolled.metrics.peak_slip_rate
+    reference, peak = present(run.reference_rate), comparison.uncontrolled.metrics.peak_slip_rate
     middle, low, high = band(run.time / divisor, run.slip_rate)
     axis.fill_between(middle, low, high, color=colour(entry.design.name), alpha=0.6, linewidth=0.4)
     axis.plot(run.time / divisor, reference, color="black", linestyle=":", linewidth=1, label="reference")
@@ -144,7 +144,7 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
     close_ups : mapping of str to Trajectory, optional
         Short runs by label of the entry.
     """
-    laws, origins, found = grid(comparison)
+    laws, origins, by_law = grid(comparison)
     drawing, axes = figure(
         len(laws), 0.9 + (2.1 if close_ups else 1.15) * len(laws), len(origins), sharex=True, sharey=True
     )
@@ -153,7 +153,7 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
     size, name = scaled(comparison.fault.effective_normal_stress / 10, "Pa")
     for column, origin in enumerate(origins):
         for row, law in enumerate(laws):
-            entry = found.get((law, origin))
+            entry = by_law.get((law, origin))
             if entry is None or entry.run is None:
                 drawing.delaxes(axes[row, column])
                 continue
@@ -199,8 +199,8 @@ _PER_BAND = 16  # instants at least, four periods
 def state_figures(comparison: "Compared") -> dict[str, Any]:
     """``cycle``, where it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law that ran."""
     drawn = {} if comparison.uncontrolled.failed else {"cycle": cycle(comparison)}
-    for held in runs_of(comparison.entries)[:1]:
-        drawn |= {"slow-sliding": slow_sliding(*held), "sliding-errors": errors(*held)}
+    for one in runs_of(comparison.entries)[:1]:
+        drawn |= {"slow-sliding": slow_sliding(*one), "sliding-errors": errors(*one)}
     return drawn
 
 
@@ -226,16 +226,16 @@ def slow_sliding(entry: "Entry", run: "Trajectory") -> Any:
     fault, shade = entry.design.fault, colour(entry.design.name)
     drawing, ((slip,), (rate,), (pressure,), (state,)) = figure(4, 6.6)
     divisor, unit = clock(float(run.time[-1]))
-    time, speed = run.time / divisor, known(run.reference_rate)
+    time, speed = run.time / divisor, present(run.reference_rate)
     size, name = length(float(run.slip.max()))
     slip.plot(time, run.slip / size, color=shade, linewidth=2.5)
-    slip.plot(time, known(run.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
+    slip.plot(time, present(run.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
     slip.set_ylabel(f"slip [{name}]")
     first = float(speed[0])
     _filled(rate, time, run.slip_rate / first, shade)
     rate.plot(time, speed / first, color="black", linestyle=":", linewidth=1, label="reference")
-    if entry.guaranteed is not None:
-        never = float(entry.guaranteed.peak_slip_rate) / first
+    if entry.proof is not None:
+        never = float(entry.proof.peak_slip_rate) / first
         rate.axhline(never, color=PROVED, linestyle=(0, (10, 3)), label="never exceeded, proved")
     rate.set_ylabel("slip rate / V [-]")
     largest, pascal = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
@@ -255,7 +255,7 @@ def errors(entry: "Entry", run: "Trajectory") -> Any:
     """Slip and slip rate less their references."""
     drawing, axes = figure(2, 3.6)
     divisor, unit = clock(float(run.time[-1]))
-    shown = ((known(run.slip_error), "m", "slip error"), (known(run.slip_rate_error), "m/s", "slip-rate error"))
+    shown = ((present(run.slip_error), "m", "slip error"), (present(run.slip_rate_error), "m/s", "slip-rate error"))
     for (axis,), (values, si, name) in zip(axes, shown, strict=True):
         size, scale = scaled(float(np.abs(values).max()) or 1.0, si)
         _filled(axis, run.time / divisor, values / size, colour(entry.design.name))
@@ -309,10 +309,10 @@ def overview(comparison: "Compared") -> Any:
     free = comparison.uncontrolled
     best, own = min(
         runs_of(comparison.of("designed")),
-        key=lambda pair: float(pair[0].guaranteed.peak_slip_rate) if pair[0].guaranteed else np.inf,
+        key=lambda pair: float(pair[0].proof.peak_slip_rate) if pair[0].proof else np.inf,
     )
     drawing, ((rate,), (slip,)) = figure(2, 5.0, height_ratios=(3, 2))
-    floor = 1e-3 * float(known(own.reference_rate).max())
+    floor = 1e-3 * float(present(own.reference_rate).max())
     speed = np.abs(free.slip_rate)
     moves = free.time[int(np.argmax(speed > 2 * max(floor, float(speed[0]))))]
     rate.plot(free.time, np.where(speed > floor, speed, np.nan), color=NATURAL, label="without control")
@@ -337,10 +337,10 @@ def overview(comparison: "Compared") -> Any:
         near = (place, min(level[0] for level in levels) if number else value)
         rate.annotate(text, near, xytext=(5, 10 - 11 * number if number else 1), **look)
     rate.tick_params(labelbottom=True)
-    size, unit = length(max(float(known(own.reference).max()), float(free.slip.max())))
+    size, unit = length(max(float(present(own.reference).max()), float(free.slip.max())))
     slip.plot(free.time, free.slip / size, color=NATURAL)
     slip.plot(own.time, own.slip / size, **(style(best) | {"linewidth": 2.4}))
-    slip.plot(own.time, known(own.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
+    slip.plot(own.time, present(own.reference) / size, color="black", linestyle=":", linewidth=1, label="reference")
     slip.legend(loc="upper left", fontsize=SMALL)
     rate.set(yscale="log", ylabel="slip rate [m/s]", ylim=(floor, 3 * max(float(speed.max()), floor)))
     slip.set_ylabel(f"slip [{unit}]")
@@ -352,14 +352,14 @@ def overview(comparison: "Compared") -> Any:
 
 def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
     """Proved bound of the slip rate, worst case found, and performance limit, as far as they are known."""
-    if entry.guaranteed is None or entry.answer is None:
+    if entry.proof is None or entry.guarantee is None:
         return
-    peak = entry.guaranteed.peak_slip_rate
+    peak = entry.proof.peak_slip_rate
     yield float(peak), f"proved: at most {peak.quantity('m/s')}", (0, (10, 3)), PROVED
-    if entry.answer.worst is not None:
-        worst = entry.answer.worst.slip_rate
+    if entry.guarantee.worst is not None:
+        worst = entry.guarantee.worst.slip_rate
         yield worst, f"worst case found: {quantity(worst, 'm/s')}", "dotted", INDUCED
-    least = entry.answer.least_slip_rate
+    least = entry.guarantee.least_slip_rate
     if least is not None:
         yield float(least), f"limit of every controller: {least.quantity('m/s')}", "dashdot", "#777777"
 
@@ -404,7 +404,7 @@ def error_figure(comparison: "Compared") -> Any:
     divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
     for entry, run in runs:
         for axis, values in ((slip, run.slip_error), (rate, run.slip_rate_error)):
-            middle, _, largest = band(run.time / divisor, np.abs(known(values)))
+            middle, _, largest = band(run.time / divisor, np.abs(present(values)))
             axis.plot(middle, np.maximum(largest, 1e-300), **style(entry))
     _proved_bounds(slip, rate, [entry for entry, _ in runs])
     for axis, label in ((slip, "|slip error| [m]"), (rate, "|slip-rate error| [m/s]")):
@@ -419,10 +419,10 @@ def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
     """Lines at the proved bounds of both errors; laws with the same bounds share a line."""
     bounds: dict[tuple[float, float], tuple[str, str]] = {}
     for entry in entries:
-        found = entry.guaranteed
-        if found is not None and found.slip_rate_error is not None:
-            label = f"proved {found.scope}".rstrip()
-            ends = float(found.claims.slip_error), float(found.slip_rate_error)
+        proof = entry.proof
+        if proof is not None and proof.slip_rate_error is not None:
+            label = f"proved {proof.scope}".rstrip()
+            ends = float(proof.claims.slip_error), float(proof.slip_rate_error)
             bounds.setdefault(ends, (colour(entry.design.name), label))
     named = set[str]()
     for (of_slip, of_rate), (shade, label) in bounds.items():

@@ -47,15 +47,15 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
     results = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
     for origin, group in (("designed", "controllers"), ("published", "published")) if stored else ():
         for entry in comparison.of(origin):
-            told = results[group][entry.design.name]
+            entry_values = results[group][entry.design.name]
             if entry.design.certificate is not None:
-                told["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
-            if entry.guaranteed is not None:
+                entry_values["certificate"] = f"certificates/{_file(origin, entry.design.name)}"
+            if entry.proof is not None:
                 path = f"certificates/{entry.design.name}-guarantee.json"
-                told["guarantee"]["certificate"] = path
-                told["certificate"] = told["certificate"] or path
+                entry_values["guarantee"]["certificate"] = path
+                entry_values["certificate"] = entry_values["certificate"] or path
             for kind in entry.peaks:
-                told["peaks"][kind]["certificate"] = f"certificates/{entry.design.name}-peaks-{kind}.json"
+                entry_values["peaks"][kind]["certificate"] = f"certificates/{entry.design.name}-peaks-{kind}.json"
     results["versions"] = versions()
     return results
 
@@ -63,7 +63,7 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
 def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> dict[str, Any]:
     """Results of the comparison, and of a study: ``induced``, ``figures``, ``numbers`` and ``printed``."""
     induced = study.induced
-    told = induced and {
+    induced_values = induced and {
         "outcome": induced.outcome.to_dict(),
         "metrics": induced.metrics.to_dict(),
         "events": dict(induced.events),
@@ -73,7 +73,7 @@ def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> dict
     compared = study.comparison
     return {
         **results(compared),
-        "induced": told,
+        "induced": induced_values,
         "figures": drawn,
         "numbers": table(compared, {"induced": induced} if induced else {}),
         "printed": printed(compared),
@@ -115,7 +115,7 @@ def write_folder(
         What ``results.json`` holds.
     """
     prepare(out, force=force)
-    found = study_results(study, formats) if study else results(comparison)
+    values = study_results(study, formats) if study else results(comparison)
     shown = study or comparison
     with whole_folder(out) as partial:
         _write_certificates(partial, comparison)
@@ -123,10 +123,10 @@ def write_folder(
         page = page_html(comparison, inside, reproduction(comparison.fault, command))
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "fault.toml").write_text(fault_toml(comparison.fault), encoding="utf-8")
-        write_results(partial, found)
+        write_results(partial, values)
         if study:
-            (partial / "numbers.csv").write_text(csv_text(found["numbers"]), encoding="utf-8")
-    return found
+            (partial / "numbers.csv").write_text(csv_text(values["numbers"]), encoding="utf-8")
+    return values
 
 
 def _write_certificates(folder: Path, comparison: Comparison) -> None:
@@ -135,9 +135,9 @@ def _write_certificates(folder: Path, comparison: Comparison) -> None:
         if entry.design.certificate is not None:
             path = folder / "certificates" / _file(entry.origin, entry.design.name)
             path.write_text(certificate_text(entry.design.certificate), encoding="utf-8")
-        found = entry.guaranteed
-        if found is not None:
-            write_whole(folder / "certificates" / f"{entry.design.name}-guarantee.json", guarantee_text(found))
+        proof = entry.proof
+        if proof is not None:
+            write_whole(folder / "certificates" / f"{entry.design.name}-guarantee.json", guarantee_text(proof))
         for kind, peaks in entry.peaks.items():
             path = folder / "certificates" / f"{entry.design.name}-peaks-{kind}.json"
             path.write_text(guarantee_text(peaks), encoding="utf-8")

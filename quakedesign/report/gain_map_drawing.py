@@ -167,7 +167,7 @@ def gain_map_units(drawn: GainMap) -> dict[str, str]:
     return dict(model.gain_units)
 
 
-def gain_map_facts(drawn: GainMap) -> dict[str, Any]:
+def gain_map_values(drawn: GainMap) -> dict[str, Any]:
     """What a map says in numbers: exact quantities as texts."""
     sheet, top = drawn.sheet, len(drawn.sheet.levels)
     return {
@@ -209,12 +209,12 @@ def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png"
     dict
         What ``results.json`` holds.
     """
-    facts = gain_map_facts(drawn)
+    values = gain_map_values(drawn)
     with whole_folder(folder) as partial:
         (partial / "certificates").mkdir()
         for place, text in drawn.certificates.items():
             write_whole(partial / _file(place), text)
         write_figures(partial, {"map": gain_map_figure(drawn)}, formats)
         write_whole(partial / "map.csv", csv_text(gain_map_rows(drawn)))
-        write_results(partial, facts)
-    return facts
+        write_results(partial, values)
+    return values

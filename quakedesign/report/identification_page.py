@@ -29,35 +29,35 @@ _SYMBOLS = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "$D_
 _SHORT, _LONG = 2e-7, 0.01  # D_c [m] that no gouge of a laboratory has
 
 
-def identification_lines(found: Identification | Steps, *, verbose: bool = False) -> list[str]:
+def identification_lines(result: Identification | Steps, *, verbose: bool = False) -> list[str]:
     """For people, within 80 columns: the answer, a table, and what to do next; with `verbose` all that was tested."""
-    if isinstance(found, Steps):
-        each = [line for step in found.steps for line in identification_lines(step, verbose=True)]
-        table = [_STEP_HEAD, *(_step_row(i, step) for i, step in enumerate(found.steps, start=1))][: 1 + _MOST_STEPS]
-        left = len(found.steps) - _MOST_STEPS
+    if isinstance(result, Steps):
+        each = [line for step in result.steps for line in identification_lines(step, verbose=True)]
+        table = [_STEP_HEAD, *(_step_row(i, step) for i, step in enumerate(result.steps, start=1))][: 1 + _MOST_STEPS]
+        left = len(result.steps) - _MOST_STEPS
         table += [f"and {left} more: --verbose"] * (left > 0)
-        common = identification_lines(found.common)
+        common = identification_lines(result.common)
         head = common.index(_HEAD) - 1
-        text = f"All together: {found.common.assessment.checks[0].sentence}."
+        text = f"All together: {result.common.assessment.checks[0].sentence}."
         return [*common[:head], "", *table, "", *_wrapped([text]), *common[head:], *(each if verbose else [])]
-    assessment, answer = found.assessment, f"{found.record.name}: {found.law.name}"
+    assessment, summary = result.assessment, f"{result.record.name}: {result.law.name}"
     unclear, refused = (assessment.verdict == each for each in (CANNOT_TELL, EXPLAINS_NOT))
-    answer += f", {assessment}: {assessment.open[0]}." if unclear else f" {assessment}."
+    summary += f", {assessment}: {assessment.open[0]}." if unclear else f" {assessment}."
     sign = next((check for check in assessment.checks if check.name == "sign" and check.passed), None)
-    if sign is not None and not refused and found.difference is not None:
-        does, (value, ends, _) = "weakens" if found.difference.value < 0 else "strengthens", _cells(found.difference)
-        answer += f" Friction {does} with rate: a - b = {value} ({ends})."
+    if sign is not None and not refused and result.difference is not None:
+        does, (value, ends, _) = "weakens" if result.difference.value < 0 else "strengthens", _cells(result.difference)
+        summary += f" Friction {does} with rate: a - b = {value} ({ends})."
     but = [f"But {each}." for each in assessment.cautions]
     more = [f"open too: {each}" for each in assessment.open[1:4] if unclear]
     more += [f"would tell: {each}" for each in assessment.experiments if unclear]
-    more += [*(f"- {each}" for each in found.untold()), f"try: {'; '.join(found.to_try())}"] if refused else []
+    more += [*(f"- {each}" for each in result.untold()), f"try: {'; '.join(result.to_try())}"] if refused else []
     failed = [check.sentence for check in assessment.checks if not check.passed]
     more += [f"not passed: {each}" for each in failed if each not in (*assessment.open, *assessment.cautions)]
-    shown = [each for each in found.estimates.values() if verbose or not each.name.startswith(DELAY)]
-    shown += [found.difference] if found.difference else []
-    notes = [each for each in found.record.remarks if verbose or " is read as " not in each]
-    more += [*_warnings(found), *([f"read: {'; '.join(notes)}"] if notes else []), *(_more(found) if verbose else [])]
-    return [*_wrapped([answer, *but, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
+    shown = [each for each in result.estimates.values() if verbose or not each.name.startswith(DELAY)]
+    shown += [result.difference] if result.difference else []
+    notes = [each for each in result.record.remarks if verbose or " is read as " not in each]
+    more += [*_warnings(result), *([f"read: {'; '.join(notes)}"] if notes else []), *(_more(result) if verbose else [])]
+    return [*_wrapped([summary, *but, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
 
 
 _HEAD = f"{'parameter':22}{'value':>13}{'95 % interval':>27}  unit"
@@ -78,23 +78,23 @@ def _step_row(number: int, step: Identification) -> str:
     return f"{number:<5}{''.join(cells)}  {step.assessment.verdict.replace(' the record', '')}"
 
 
-def _more(found: Identification) -> list[str]:
+def _more(result: Identification) -> list[str]:
     """Tests that passed, noise and searches, what was assumed."""
-    fit, rate = found.fit, getattr(found.law, "reference_rate", None)
+    fit, rate = result.fit, getattr(result.law, "reference_rate", None)
     means, all_ = len(fit.counts), round(float(np.sum(fit.counts)))
     samples = f"{int(fit.used.sum())} samples" if all_ == means else f"{all_} samples averaged to {means}"
     return [
-        *(f"passed: {check.sentence}" for check in found.assessment.checks if check.passed),
-        f"noise per sample {fit.noise:.3g}; {samples}; {fit.agreeing} of {fit.starts} searches "
-        f"(seed {found.seed}) ended in this fit{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
-        *([str(found.rival)] if found.rival else []),
+        *(f"passed: {check.sentence}" for check in result.assessment.checks if check.passed),
+        f"noise per sample {fit.noise:.3g}; {samples}; {fit.agreeing} of {fit.starts} searches (seed "
+        f"{result.seed}) ended in this fit{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
+        *([str(result.rival)] if result.rival else []),
         *([] if rate is None else [f"reference_coefficient is that of steady sliding at {quantity(rate, 'm/s', 4)}"]),
-        f"assumed: {'; '.join(found.notes)}",
+        f"assumed: {'; '.join(result.notes)}",
     ]
 
 
-def _wrapped(told: list[str]) -> list[str]:
-    return [line for said in told for line in (wrap(said, 80, subsequent_indent="  ") or [""])]
+def _wrapped(paragraphs: list[str]) -> list[str]:
+    return [line for paragraph in paragraphs for line in (wrap(paragraph, 80, subsequent_indent="  ") or [""])]
 
 
 def _row(estimate: ParameterEstimate) -> str:
@@ -109,8 +109,8 @@ def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
     """Value, interval and unit with its prefix, in as many digits as the interval calls for."""
     power = power_of(estimate.value) if estimate.unit in _PREFIXED else 0
     wide = estimate.high - estimate.low
-    told = math.isfinite(wide) and wide > 0
-    digits = min(max(2 + math.ceil(math.log10(max(abs(estimate.value), wide) / wide)), 3), 6) if told else 3
+    finite = math.isfinite(wide) and wide > 0
+    digits = min(max(2 + math.ceil(math.log10(max(abs(estimate.value), wide) / wide)), 3), 6) if finite else 3
     value, low, high = (
         plain(end / 10.0**power, digits) if math.isfinite(end) else "?"
         for end in (estimate.value, estimate.low, estimate.high)
@@ -120,32 +120,32 @@ def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
 
 def _warnings(identification: Identification) -> list[str]:
     """What looks wrong, noise that is not white, and outliers."""
-    told, critical = [], identification.estimates.get("critical_slip")
+    notes, critical = [], identification.estimates.get("critical_slip")
     evolves = "evolution_effect" in identification.law.quantities()
     if critical is not None and evolves and not _SHORT <= critical.value <= _LONG:
         size = critical.value
         long = f"{1e9 * size:.3g} nm is far shorter" if size < _SHORT else f"{100 * size:.3g} cm is far longer"
-        told.append(f"D_c of {long} than the some 1 to 100 µm of laboratories: check the unit of the displacement")
+        notes.append(f"D_c of {long} than the some 1 to 100 µm of laboratories: check the unit of the displacement")
     if (correlated := identification.fit.correlated) is not None and correlated.share:
         size = identification.fit.noise * correlated.share**0.5
         length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
-        told.append(f"noise that neighbours share: {size:.2g} of friction, fading over {length}; regions include it")
+        notes.append(f"noise that neighbours share: {size:.2g} of friction, fading over {length}; regions include it")
     outliers = identification.outliers
     if outliers:
         largest = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in outliers[:_MOST_OUTLIERS])
         more = f", and {len(outliers) - _MOST_OUTLIERS} smaller" if len(outliers) > _MOST_OUTLIERS else ""
-        told.append(f"outliers left out: {largest}{more}")
-    return told
+        notes.append(f"outliers left out: {largest}{more}")
+    return notes
 
 
-def steps_figure(found: Steps) -> Any:
+def steps_figure(steps: Steps) -> Any:
     """A panel a step with its own fit and the common one, and the regions of a and b of all."""
-    joint: Any = found.common.fit.experiment
-    at, count = found.common.fit.fitted, len(found.steps)
+    joint: Any = steps.common.fit.experiment
+    at, count = steps.common.fit.fitted, len(steps.steps)
     names = [f"step {i}" for i in range(count)] + ["."] * (count % 2)
     rows = [names[i : i + 2] for i in range(0, len(names), 2)] + [["region", "region"]]
     drawing, axes = figure(0, 1.7 * len(rows) + 1.2, mosaic=rows)
-    for i, step in enumerate(found.steps):
+    for i, step in enumerate(steps.steps):
         axis, path = axes[f"step {i}"], step.record.load_point
         way = step.record.time[step.used] if path is None else path[step.used] * 1e6
         _friction(axis, step, way, slice(None))
@@ -154,10 +154,10 @@ def steps_figure(found: Steps) -> Any:
         axis.set_title(f"{i + 1}: {step.record.name}", fontsize=SMALL)
         axis.set_xlabel("time [s]" if path is None else "displacement of the load point [µm]", fontsize=SMALL)
         _region(axes["region"], step, f"{i + 1}", f"C{i}")
-    _region(axes["region"], found.common, "all", "black")
+    _region(axes["region"], steps.common, "all", "black")
     axes["region"].legend(fontsize=SMALL - 1, frameon=False, ncols=4)
-    said = next(check.sentence for check in found.common.assessment.checks if check.name == "common")
-    return finish(drawing, said, [], "regions of 95 % of two parameters", legend=axes["step 0"])
+    title = next(check.sentence for check in steps.common.assessment.checks if check.name == "common")
+    return finish(drawing, title, [], "regions of 95 % of two parameters", legend=axes["step 0"])
 
 
 def identification_figure(identification: Identification) -> Any:
@@ -307,8 +307,8 @@ def _region(axis: Any, identification: Identification, label: str = "", colour: 
     axis.plot(x, y, color=colour, linewidth=1.0, label=label)
     axis.plot(*(identification.estimates[name].value for name in pair), "+", color=colour)
     axis.locator_params(axis="x", nbins=4)
-    for name, told in zip(pair, (axis.set_xlabel, axis.set_ylabel), strict=True):
-        told(f"{name} [{identification.estimates[name].unit or '-'}]", fontsize=SMALL)
+    for name, set_label in zip(pair, (axis.set_xlabel, axis.set_ylabel), strict=True):
+        set_label(f"{name} [{identification.estimates[name].unit or '-'}]", fontsize=SMALL)
 
 
 def require_format(path: Path) -> None:

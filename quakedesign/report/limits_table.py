@@ -34,12 +34,12 @@ def limits_lines(limits: Limits) -> list[str]:
         for limit in limits.named().values()
     ]
     lines = [*_meaning(limits), *_undecided(limits)]
-    return [*head, *rows, "", *(line for said in lines for line in wrap(said, 80, subsequent_indent="  "))]
+    return [*head, *rows, "", *(line for note in lines for line in wrap(note, 80, subsequent_indent="  "))]
 
 
 def _delay(limits: Limits) -> str:
     """Delay of the loop; limits of slow sliding have none."""
-    late = 0 if isinstance(limits, SlidingLimits) else ExactSetup.of(limits.told.setup).delay
+    late = 0 if isinstance(limits, SlidingLimits) else ExactSetup.of(limits.sensing.setup).delay
     return f", delay {quantity(float(late), 's')}" if late else ""
 
 
@@ -49,14 +49,14 @@ def _meaning(limits: Limits) -> list[str]:
     if limits.peak_slip_rate_error.impossible_beyond is None:
         return ["without a disturbance no limit is known: give amplitude in [disturbance] of the fault file"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
-    known = "knows slip, slip rate and disturbance"
-    if limits.told.noisy:
-        known = f"measures {limits.told.words()}"
+    signals = "knows slip, slip rate and disturbance"
+    if limits.sensing.noisy:
+        signals = f"measures {limits.sensing.words()}"
     lines = [
         "infeasible: every controller, linear or not, fails for some friction of the box and some disturbance of the "
         "stated size, which may jump",
         f"slip-rate error: for controllers that keep the slip error {within}, on the plant without stick; it holds "
-        f"even for one that {known} up to each sample",
+        f"even for one that {signals} up to each sample",
         "proved, slip-rate error: the smaller of the designs for the objectives tracking and peak, on the plant "
         "without stick",
     ]
@@ -107,9 +107,9 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     ]
 
 
-def _constants(found: SlidingProof) -> str:
+def _constants(proof: SlidingProof) -> str:
     """Whether the design is for a spread of a, b and D_c."""
-    low, high = found.task.ranges["direct_effect"]
+    low, high = proof.task.ranges["direct_effect"]
     spread = LowerBound((high - low) / (high + low))  # a covered range: rounded inward
     return f"for a, b and D_c within {spread:.3g} of their values" if spread else "for a, b and D_c as they are given"
 
@@ -119,9 +119,9 @@ def _box(limits: Limits) -> str:
     return "" if isinstance(limits, SlidingLimits) else f"box {limits.fault.box.name}, "
 
 
-def _path(found: SlidingProof) -> str:
+def _path(proof: SlidingProof) -> str:
     """What the design that is proved stands behind."""
-    ways = {"a lag of": found.held.lag, "rock of L^2/D =": found.held.diffusion}
+    ways = {"a lag of": proof.held.lag, "rock of L^2/D =": proof.held.diffusion}
     lines = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
     return f" behind {' and '.join(lines)}" if lines else ""
 
@@ -159,10 +159,10 @@ def limits_figure(limits: Limits) -> Any:
         axis.fill_between(steps, peaks[0] / 3, peaks, color=_FORBIDDEN, lw=0, label="infeasible for every controller")
         if last is not None:
             axis.axvspan(float(last), 2 * steps[-1], color=_FORBIDDEN, lw=0)
-        if limits.told.noisy:
-            exact = [float(peak) for _, peak in limits.smallest_peaks(told=False)]
+        if limits.sensing.noisy:
+            exact = [float(peak) for _, peak in limits.smallest_peaks(measured=False)]
             axis.fill_between(
-                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and with measurements of {limits.told.words()}"
+                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and with measurements of {limits.sensing.words()}"
             )
         axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
     if limits.achieved:
@@ -177,8 +177,8 @@ def limits_figure(limits: Limits) -> Any:
 
 def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
     """Write the figure ``limits`` and ``results.json`` into a folder that appears whole; return its content."""
-    facts = limits.to_dict()
+    values = limits.to_dict()
     with whole_folder(folder) as partial:
         write_figures(partial, {"limits": limits_figure(limits)}, formats)
-        write_results(partial, facts)
-    return facts
+        write_results(partial, values)
+    return values

@@ -124,11 +124,11 @@ class Account:
     law: list[Markup]  # Equations with the numbers of the design
     python: list[str]  # Lines of the sampled linear law for python-control; none for others
     gains: list[tuple[str, str, Markup]]  # Name, value, unit
-    # premises, base_premises, known: Rows of their tables: premises of what is proved first, of the certificate of base
-    # gains in continuous time, and what is certified with a feed-forward
+    # Rows of the tables: premises of the first proof, premises of the certificate of the base gains in continuous time,
+    # and certified values with a feed-forward
     premises: list[tuple[str, ...]]
     base_premises: list[tuple[str, ...]]
-    known: list[tuple[str, ...]]
+    feedforward: list[tuple[str, ...]]
 
 
 def accounts(comparison: "Compared") -> list[Account]:
@@ -136,13 +136,13 @@ def accounts(comparison: "Compared") -> list[Account]:
     return [_account(entry) for origin in ("designed", "published") for entry in comparison.of(origin)]
 
 
-def _cards(told: Iterable[Account]) -> list[Account]:
+def _cards(every: Iterable[Account]) -> list[Account]:
     """Accounts; controllers of which everything is the same share one."""
     cards: dict[tuple[Any, ...], Account] = {}
-    for one in told:
+    for one in every:
         key = (tuple(one.guarantee), tuple(one.run), tuple(one.verdict))
-        known = cards.get(key)
-        label = one.label if known is None else f"{known.label.removesuffix(' (designed)')}, {one.label}"
+        card = cards.get(key)
+        label = one.label if card is None else f"{card.label.removesuffix(' (designed)')}, {one.label}"
         cards[key if one.guarantee else (one.label,)] = replace(one, label=label)
     return list(cards.values())
 
@@ -150,16 +150,16 @@ def _cards(told: Iterable[Account]) -> list[Account]:
 def _account(entry: "Entry") -> Account:
     design = entry.design
     run = run_sentences(entry.run, design.fault) if entry.run else []
-    said, limits = guarantee_lines(entry), limit_lines(entry)
-    compensated = [entry.answer.compensation.sentence()] if entry.answer and entry.answer.compensation else []
+    guaranteed, limits = guarantee_lines(entry), limit_lines(entry)
+    compensated = [entry.guarantee.compensation.sentence()] if entry.guarantee and entry.guarantee.compensation else []
     domain = [domain_sentence(design.domain)] if design.domain else []
     # How a law of samples runs; nothing for a law in continuous time.
     sampling = design.controller.sampling if design.controller else None
     return Account(
         label=entry.label,
         badge=badge(entry),
-        good=entry.guaranteed is not None or grade(entry) == "proved for this loop and task",
-        guarantee=[line for line in said if line not in (*limits, *compensated)],
+        good=entry.proof is not None or grade(entry) == "proved for this loop and task",
+        guarantee=[line for line in guaranteed if line not in (*limits, *compensated)],
         run=run,
         limits=limits,
         verdict=beside_guarantee([sentence for sentence in sentences(entry) if sentence not in run], entry),
@@ -175,36 +175,36 @@ def _account(entry: "Entry") -> Account:
         gains=_gains(entry),
         premises=[_row(p) for p in design.conditions],
         base_premises=[_row(p) for p in design.premises if p not in design.conditions],
-        known=feedforward_rows(entry.variants) if entry.variants else [],
+        feedforward=feedforward_rows(entry.variants) if entry.variants else [],
     )
 
 
 def _slowly(entry: "Entry") -> list[str]:
     """How a guarantee of slow sliding is found; nothing for others."""
-    found = entry.guaranteed
-    if found is None or not found.cells:
+    proof = entry.proof
+    if proof is None or not proof.cells:
         return []
-    cells = "one cell" if len(found.cells) == 1 else f"{len(found.cells)} cells"
+    cells = "one cell" if len(proof.cells) == 1 else f"{len(proof.cells)} cells"
     return [
         "The pressure at the well is p plus a plan: what the nominal fault needs along its reference, kV/(μ*A) per "
         "second.",
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
         "except for exponentials, inertia and diffusion modes that the model omits. The exponentials lie in sectors "
         "for |y| ≤ Y; the others are bounded. L1 norms of the linear loop then bound all errors in terms of the "
-        f"claimed bounds, and the claims imply themselves (small gain). They hold {found.lasts}. The box of constants "
+        f"claimed bounds, and the claims imply themselves (small gain). They hold {proof.lasts}. The box of constants "
         f"is divided into {cells}.",
     ]
 
 
 def _linear_law(entry: "Entry") -> "LinearLaw | None":
     """The sampled linear law of a guarantee; None for laws with an implicit step, and without a guarantee."""
-    law = getattr(getattr(entry.guaranteed, "held", None), "law", None)
+    law = getattr(getattr(entry.proof, "held", None), "law", None)
     return law if isinstance(law, LinearLaw) and law.root is None else None
 
 
 def _at_samples(entry: "Entry") -> list[str]:
     """What the difference equations of the stick–slip plant stand for; nothing for other laws."""
-    law = getattr(getattr(entry.guaranteed, "held", None), "law", None)
+    law = getattr(getattr(entry.proof, "held", None), "law", None)
     if not isinstance(law, StickSlipLaw):
         return []
     root = " (within the proved errors, where the implicit step of the sliding mode is deadbeat)" if law.pull else ""
@@ -217,11 +217,11 @@ def _at_samples(entry: "Entry") -> list[str]:
 
 def _equations(entry: "Entry") -> list[Markup]:
     """The law in continuous time, where it has one, and that of the stick–slip plant at its samples."""
-    held: Any = getattr(entry.guaranteed, "held", None)
-    controller, law = entry.design.controller, getattr(held, "law", None)
+    sampled: Any = getattr(entry.proof, "held", None)
+    controller, law = entry.design.controller, getattr(sampled, "law", None)
     latex = [] if isinstance(controller, StickSlipController) else law_latex(controller)
     if isinstance(law, StickSlipLaw):
-        latex += stick_slip_latex(law, float(held.step))
+        latex += stick_slip_latex(law, float(sampled.step))
     return [mathml(equation) for equation in latex]
 
 
@@ -244,12 +244,12 @@ def _difference(entry: "Entry") -> list[Markup]:
 def _python(entry: "Entry") -> list[str]:
     """Lines for python-control."""
     law = _linear_law(entry)
-    if law is None or entry.guaranteed is None:
+    if law is None or entry.proof is None:
         return []
     floats = [
         [[float(v) for v in row] for row in rows] for rows in (law.update, law.measured, [law.output], [law.feedback])
     ]
-    step = float(entry.guaranteed.held.step)
+    step = float(entry.proof.held.step)
     return [
         "import control",
         "",
@@ -262,11 +262,11 @@ def _python(entry: "Entry") -> list[str]:
 
 def badge(entry: "Entry") -> str:
     """Verdict in two or three words."""
-    if entry.guaranteed is not None:
+    if entry.proof is not None:
         step = entry.design.fault.sampling_time
         return f"not guaranteed at T_s = {step:g} s" if entry.design.other_step else "guaranteed as it runs"
-    found = entry.design.verdict
-    return "proved in continuous time only" if found is Verdict.PROVED else str(found)
+    verdict = entry.design.verdict
+    return "proved in continuous time only" if verdict is Verdict.PROVED else str(verdict)
 
 
 def _row(premise: "Premise") -> tuple[str, ...]:
@@ -308,11 +308,11 @@ def parameter_rows(fault: Fault) -> list[Row]:
     """
     refused = fault.friction.equilibrium.refused
     rows = [
-        *_told(fault, PLANT, "fault"),
-        *_told(fault.friction, fault.friction.quantities(), "friction"),
-        *_told(fault.reference, [name for name in TASK if name != _STEP], "task"),
-        *_told(fault, [_STEP], "task"),
-        *_told(fault.disturbance, () if "disturbance" in refused else DISTURBANCE, "disturbance"),
+        *_field_rows(fault, PLANT, "fault"),
+        *_field_rows(fault.friction, fault.friction.quantities(), "friction"),
+        *_field_rows(fault.reference, [name for name in TASK if name != _STEP], "task"),
+        *_field_rows(fault, [_STEP], "task"),
+        *_field_rows(fault.disturbance, () if "disturbance" in refused else DISTURBANCE, "disturbance"),
     ]
     rows += [
         _parameter_row(f"half-width of {name}", float(getattr(fault.box, name)), "", "uncertainty", "±")
@@ -324,11 +324,11 @@ def parameter_rows(fault: Fault) -> list[Row]:
     return [row for row in rows if row[2] is not None]
 
 
-def _told(part: Any, names: Iterable[str], where: str) -> Iterator[Row]:
+def _field_rows(part: Any, names: Iterable[str], where: str) -> Iterator[Row]:
     """Rows of the fields of a dataclass with these names."""
-    known = {each.name: each.metadata for each in fields(part)}
+    metadata = {each.name: each.metadata for each in fields(part)}
     for name in names:
-        yield _parameter_row(name, getattr(part, name), known[name]["unit"], where, known[name].get("symbol"))
+        yield _parameter_row(name, getattr(part, name), metadata[name]["unit"], where, metadata[name].get("symbol"))
 
 
 def _parameter_row(name: str, value: float | None, unit: str, where: str, symbol: str | None = None) -> Row:
@@ -359,8 +359,8 @@ def versions() -> dict[str, str]:
 
 def reproduction(fault: Fault, command: str = "") -> Reproduction:
     """How a report of a fault is made now."""
-    given = os.environ.get("SOURCE_DATE_EPOCH", "")
-    now = datetime.fromtimestamp(int(given), UTC) if given.isdecimal() else datetime.now(UTC)
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    now = datetime.fromtimestamp(int(epoch), UTC) if epoch.isdecimal() else datetime.now(UTC)
     return Reproduction(
         date=f"{now:%Y-%m-%d %H:%M} UTC",
         command=command,
@@ -431,26 +431,26 @@ def table_html(comparison: "Compared") -> str:
 
 def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Reproduction) -> str:
     """Whole report as HTML with its figures, SVG elements by name, inside."""
-    told, said = accounts(comparison), summary(comparison)
+    every, first = accounts(comparison), summary(comparison)
     page: str = (
         _environment()
         .get_template("page.html")
         .render(
             fault=comparison.fault,
             natural=_natural(comparison),
-            said=said,
+            first=first,
             overview=_figure("overview", figures["overview"]) if "overview" in figures else None,
             facts=fault_sentences(comparison.fault),
             coordinates=comparison.fault.friction.equilibrium.coordinates,
             plant=[mathml(equation) for equation in plant_latex(comparison.fault)],
             **_tables(comparison),
-            accounts=told,
-            cards=_cards(told),
+            accounts=every,
+            cards=_cards(every),
             schemes=scheme_sentence(comparison),
-            limits=_limits(comparison, told),
-            known_columns=FEEDFORWARD_COLUMNS,
+            limits=_limits(comparison, every),
+            feedforward_columns=FEEDFORWARD_COLUMNS,
             glossary=[(mathml(s, display="inline") if s else "", *rest) for s, *rest in _terms(comparison.fault)],
-            asked=[(name, ASKED[name]) for name in ASKED if any(name == row[0] for a in told for row in a.premises)],
+            asked=[(name, ASKED[name]) for name in ASKED if any(name == row[0] for a in every for row in a.premises)],
             figures=[_figure(name, drawn) for name, drawn in figures.items() if name != "overview"],
             parameters=parameter_rows(comparison.fault),
             parameter_headings=HEADINGS,
@@ -469,8 +469,8 @@ def _figure(name: str, drawn: Markup) -> dict[str, str]:
 def _natural(comparison: "Compared") -> str:
     """What the fault does without control."""
     fault, run = comparison.fault, comparison.uncontrolled
-    if said := cycle_sentences(comparison):
-        return said[0]
+    if cycle := cycle_sentences(comparison):
+        return cycle[0]
     size = (
         f" of magnitude {fault.magnitude:.2f}" if run.outcome.kind == "earthquake" and fault.seismic_moment > 0 else ""
     )
@@ -480,10 +480,10 @@ def _natural(comparison: "Compared") -> str:
     )
 
 
-def _limits(comparison: "Compared", told: list[Account]) -> list[str]:
+def _limits(comparison: "Compared", every: list[Account]) -> list[str]:
     """What cannot be had, each said once with whom it is about, and what the model leaves out."""
     about: dict[str, list[str]] = {}
-    for account in told:
+    for account in every:
         for line in account.limits:
             about.setdefault(line, []).append(account.label)
     own = [f"{', '.join(labels)}: {line}" for line, labels in about.items()]
@@ -508,8 +508,8 @@ _of_runs = by_equilibrium(
 def _way(comparison: "Compared") -> str:
     """What the pressure of the runs goes through."""
     paths = (e.design.setup.path.items() for e in comparison.of("designed"))
-    told = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
-    return f"the pressure in the runs acts {'through ' + ', '.join(told) if told else 'at once'}"
+    stages = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
+    return f"the pressure in the runs acts {'through ' + ', '.join(stages) if stages else 'at once'}"
 
 
 def _tables(comparison: "Compared") -> dict[str, Any]:

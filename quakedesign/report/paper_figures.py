@@ -156,7 +156,7 @@ def errors_and_power(comparison: "Compared") -> Any:
     basis = baseline(comparison)
     assert basis is not None
     ratios = [(entry, relative(entry.run, basis.run)) for entry, _ in runs_of(comparison.entries)]
-    shown = [(entry, found) for entry, found in ratios if all(found[name] is not None for name in BARS)]
+    shown = [(entry, values) for entry, values in ratios if all(values[name] is not None for name in BARS)]
     drawing, axes = figure(2, 4.6, 3, sharey=True)
     for axis, (name, title) in zip(axes.ravel(), BARS.items(), strict=False):
         _bars(axis, shown, name, title)
@@ -172,7 +172,7 @@ def errors_and_power(comparison: "Compared") -> Any:
 
 def _bars(axis: Any, shown: "list[tuple[Entry, dict[str, Any]]]", name: str, title: str) -> None:
     """One panel; on a logarithmic axis bars start at 1, so that better and worse point to different sides."""
-    values = [found[name] for _, found in shown]
+    values = [entry_ratios[name] for _, entry_ratios in shown]
     logarithmic = name != "rms_pressure" and min(values) > 0
     start = 1.0 if logarithmic else 0.0
     for place, ((entry, _), value) in enumerate(zip(shown, values, strict=True)):

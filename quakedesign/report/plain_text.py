@@ -14,25 +14,25 @@ _THREE_DIGITS = 0.005
 _KEYS = {"scale_factors", "title", "from", "to", "source_gains", "gains", "published", "exponents", "unrounded"}
 
 
-def scale_lines(answer: Mapping[str, Any]) -> list[str]:
+def scale_lines(result: Mapping[str, Any]) -> list[str]:
     """The answer of `scale_answer` for people."""
-    if lacking := _KEYS - answer.keys():
+    if lacking := _KEYS - result.keys():
         raise ParameterError(f"answer must be one of scale_answer. Received one without {', '.join(sorted(lacking))}.")
-    factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in answer["scale_factors"].items())
-    lines = [f"{answer['title']}: {answer['from']} → {answer['to']}"]
-    lines += _gain_lines(answer["source_gains"], answer["gains"], answer["published"], answer["exponents"])
-    if "divisor" in answer:
-        same = answer["divisor"] == answer["source_divisor"]
-        before = "" if same else f" (source: {_short(answer['source_divisor'])})"
-        lines.append(f"with λ = {_short(answer['scale'])} and divisor μ0N̂0 = {_short(answer['divisor'])} m²/kg{before}")
-    if _rounded(answer["published"]):
+    factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in result["scale_factors"].items())
+    lines = [f"{result['title']}: {result['from']} → {result['to']}"]
+    lines += _gain_lines(result["source_gains"], result["gains"], result["published"], result["exponents"])
+    if "divisor" in result:
+        same = result["divisor"] == result["source_divisor"]
+        before = "" if same else f" (source: {_short(result['source_divisor'])})"
+        lines.append(f"with λ = {_short(result['scale'])} and divisor μ0N̂0 = {_short(result['divisor'])} m²/kg{before}")
+    if _rounded(result["published"]):
         lines.append("where a printed gain is off, gains were rounded in print (ERRATA 25)")
-    if answer["unrounded"]:
-        more = answer["unrounded"]
+    if result["unrounded"]:
+        more = result["unrounded"]
         lines.append("from the laboratory gains before they were rounded for print (ERRATA 25):")
-        lines += _gain_lines(more["source_gains"], more["gains"], more["published"], answer["exponents"])
+        lines += _gain_lines(more["source_gains"], more["gains"], more["published"], result["exponents"])
     lines.append(f"scale factors: {factors}")
-    return [*lines, *_similarity_lines(answer)]
+    return [*lines, *_similarity_lines(result)]
 
 
 def _rounded(printed: Mapping[str, Any] | None) -> bool:
@@ -54,20 +54,20 @@ def _gain_lines(
     return [f"  {n} = {_short(after[n])} from {_short(before[n])} ({exponents[n]}{comment(n)})" for n in after]
 
 
-def _similarity_lines(answer: Mapping[str, Any]) -> list[str]:
-    percent = float(Fraction(answer["tolerance"])) * 100
-    far = [g for g in answer["differing"] if g["group"] in answer["violations"]]
-    if answer["similar"]:
-        if not answer["differing"]:
+def _similarity_lines(result: Mapping[str, Any]) -> list[str]:
+    percent = float(Fraction(result["tolerance"])) * 100
+    far = [g for g in result["differing"] if g["group"] in result["violations"]]
+    if result["similar"]:
+        if not result["differing"]:
             return ["similar exactly: every π-group has the same value"]
-        worst = max(abs(group["ratio"] - 1) for group in answer["differing"])
-        count = len(answer["differing"])
+        worst = max(abs(group["ratio"] - 1) for group in result["differing"])
+        count = len(result["differing"])
         return [f"similar within {percent:g} %: {count} π-groups differ, by at most {100 * worst:.2g} %"]
     lines = [
         f"NOT similar within {percent:g} %: the two loops are no copies of each other, because these groups differ:"
     ]
     lines += [f"  {g['formula']}: {_short(g['source'])} and {_short(g['target'])}{_ratio(g)}" for g in far]
-    return lines + [f"  {name} is not the same quantity in both faults" for name in answer["unmatched"]]
+    return lines + [f"  {name} is not the same quantity in both faults" for name in result["unmatched"]]
 
 
 def _ratio(group: Mapping[str, Any]) -> str:
@@ -78,18 +78,18 @@ def _short(text: str) -> str:
     return f"{float(Fraction(text)):.6g}"
 
 
-def export_lines(answer: dict[str, Any]) -> list[str]:
+def export_lines(result: dict[str, Any]) -> list[str]:
     """The same for people."""
-    measured = ", ".join(f"{name} [{unit}]" for name, unit in answer["measurement"].items())
+    measured = ", ".join(f"{name} [{unit}]" for name, unit in result["measurement"].items())
     lines = [
-        *answer["remarks"],
-        f"written: {', '.join(answer['files'])}",
-        f"every {answer['step']:g} s: {measured} to pressure [Pa]",
+        *result["remarks"],
+        f"written: {', '.join(result['files'])}",
+        f"every {result['step']:g} s: {measured} to pressure [Pa]",
     ]
-    lines += [f"  {name}: {value}" for name, value in answer["facts"].items()]
+    lines += [f"  {name}: {value}" for name, value in result["facts"].items()]
     lines += [
         f"premise {p['name']} {'holds' if p['holds'] else 'FAILS'}: required {p['required']:.4g} {p['unit']}, "
         f"given {p['certified']:.4g} {p['unit']}; {p['note']}"
-        for p in answer["premises"]
+        for p in result["premises"]
     ]
     return lines

@@ -44,12 +44,12 @@ FOOTNOTE = (
 
 def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
     """Write ``results.json`` and a folder ``figures`` into a folder that appears whole; return its content."""
-    facts = report.to_dict()
+    values = report.to_dict()
     with whole_folder(folder) as partial:
         (partial / "figures").mkdir()
         write_figures(partial / "figures", report.figures(), formats)
-        write_results(partial, facts)
-    return facts
+        write_results(partial, values)
+    return values
 
 
 def print_sampling(report: SamplingReport, console: Any) -> None:
@@ -105,8 +105,8 @@ def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     head = ("scheme", "error", *(f"{level:.2g}" for level in study.levels))
     rows = [
         (scheme, _quantity(name), *(f"{v:.1e}" for v in values))
-        for scheme, found in study.errors.items()
-        for name, values in found.items()
+        for scheme, errors in study.errors.items()
+        for name, values in errors.items()
     ]
     return head, rows
 
@@ -117,9 +117,9 @@ def order_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     names = list(next(iter(study.errors.values())))
     head = ("scheme", *(f"order of {QUANTITIES[n][0].removeprefix('max ')}" for n in names), *map(_quantity, names))
     rows = []
-    for scheme, found in study.errors.items():
+    for scheme, errors in study.errors.items():
         powers = (exponents[scheme][n] for n in names)
-        largest = (f"{found[n][0]:.1e}" for n in names)
+        largest = (f"{errors[n][0]:.1e}" for n in names)
         rows.append((scheme, *("–" if power is None else f"{power:.2f}" for power in powers), *largest))
     return head, rows
 

@@ -40,18 +40,18 @@ BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
 
 def grade(entry: "Entry") -> str:
     """Verdict on one controller, and what of its loop and task the proof leaves out."""
-    if entry.guaranteed is not None:
+    if entry.proof is not None:
         other = f"{entry.design.other_step_first}; " if entry.design.other_step else ""
-        return f"{other}{_guaranteed(entry.guaranteed)}{_unmet(entry)}"
+        return f"{other}{_guaranteed(entry.proof)}{_unmet(entry)}"
     if entry.design.verdict is not Verdict.PROVED:
         return str(entry.design.verdict)
-    missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _held(entry)
+    missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _hold_gaps(entry)
     reach = f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
-    return f"{reach}; UNSTABLE with zero-order hold over T_s" if _unstable_if_held(entry) else reach
+    return f"{reach}; UNSTABLE with zero-order hold over T_s" if _unstable_with_hold(entry) else reach
 
 
-def _guaranteed(found: "FaultProof") -> str:
-    return f"guaranteed: slip rate <= {found.peak_slip_rate:.3g} m/s, slip error <= {found.claims.slip_error:.3g} m"
+def _guaranteed(proof: "FaultProof") -> str:
+    return f"guaranteed: slip rate <= {proof.peak_slip_rate:.3g} m/s, slip error <= {proof.claims.slip_error:.3g} m"
 
 
 def _unmet(entry: "Entry") -> str:
@@ -60,11 +60,11 @@ def _unmet(entry: "Entry") -> str:
     return f", but {'; '.join(failing)}" if failing else ""
 
 
-def _unstable_if_held(entry: "Entry") -> bool:
+def _unstable_with_hold(entry: "Entry") -> bool:
     """Whether a run with p acting at once hides what a sampled controller would do."""
-    if entry.run is None or entry.held is None:
+    if entry.run is None or entry.zero_order_hold is None:
         return False
-    return entry.run.provenance["scheme"] == "continuous" and entry.held.runs.verdict is Verdict.REFUTED
+    return entry.run.provenance["scheme"] == "continuous" and entry.zero_order_hold.runs.verdict is Verdict.REFUTED
 
 
 def _bounded(entry: "Entry", premise: Premise) -> bool:
@@ -77,7 +77,7 @@ def _failing(premise: Premise) -> str:
     return f"{premise.name} fails {premise.ratio:.3g}-fold"
 
 
-def _held(entry: "Entry") -> list[str]:
+def _hold_gaps(entry: "Entry") -> list[str]:
     """What the way in which the run carries out the law takes from the proof."""
     if entry.run is None:
         return []
@@ -85,15 +85,15 @@ def _held(entry: "Entry") -> list[str]:
     if scheme == "continuous":
         unstable = entry.growth_per_step is not None and entry.growth_per_step >= 1
         return ["UNSTABLE at the step used"] if unstable else []
-    if entry.held is None or scheme != "explicit":
+    if entry.zero_order_hold is None or scheme != "explicit":
         return [f"zero-order hold (scheme {scheme}) is not covered"]
-    if entry.held.runs.verdict is Verdict.REFUTED:
+    if entry.zero_order_hold.runs.verdict is Verdict.REFUTED:
         return ["UNSTABLE with zero-order hold"]
-    used, longest = rational(step), entry.held.largest_step
+    used, longest = rational(step), entry.zero_order_hold.largest_step
     if longest is None:
         return ["zero-order hold is proved for no T_s"]
-    proved = used <= longest or (used == entry.held.step and entry.held.runs.verdict is Verdict.PROVED)
-    if not proved:
+    own = used == entry.zero_order_hold.step and entry.zero_order_hold.runs.verdict is Verdict.PROVED
+    if not (used <= longest or own):
         return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved"]
     return ["with zero-order hold stability is proved, but no bound of the errors"]
 
@@ -161,22 +161,22 @@ def _percent(share: float) -> str:
 # What is said about an e-LQR: certified margins, sampling and peaks, in lines for people.
 
 
-def held_sentences(held: HeldLoop) -> list[str]:
+def hold_sentences(stability: HeldLoop) -> list[str]:
     """Whether the law that runs is stable with zero-order hold, and up to which T_s."""
-    over = f"with zero-order hold over T_s = {float(held.step):.12g} s"
-    if held.runs.verdict is Verdict.REFUTED and held.runs.witness is not None:
-        return [f"UNSTABLE {over} ({_near(held.runs.witness)})", _proved_up_to(held)]
-    if held.runs.verdict is Verdict.UNDECIDED:
-        return [f"undecided {over}", _proved_up_to(held)]
+    over = f"with zero-order hold over T_s = {float(stability.step):.12g} s"
+    if stability.runs.verdict is Verdict.REFUTED and stability.runs.witness is not None:
+        return [f"UNSTABLE {over} ({_near(stability.runs.witness)})", _proved_up_to(stability)]
+    if stability.runs.verdict is Verdict.UNDECIDED:
+        return [f"undecided {over}", _proved_up_to(stability)]
     course = "any course of the parameters, integrals summed over the samples"
-    return [f"stable {over}, proved for {course}", _proved_up_to(held)]
+    return [f"stable {over}, proved for {course}", _proved_up_to(stability)]
 
 
-def _proved_up_to(held: HeldLoop) -> str:
-    if held.largest_step is None:
+def _proved_up_to(stability: HeldLoop) -> str:
+    if stability.largest_step is None:
         return "no T_s is proved"
-    proved = f"stability is proved for every T_s up to {held.largest_step:.4g} s"
-    return proved if held.refuted_step is None else f"{proved} and refuted for {held.refuted_step:.15g} s"
+    proved = f"stability is proved for every T_s up to {stability.largest_step:.4g} s"
+    return proved if stability.refuted_step is None else f"{proved} and refuted for {stability.refuted_step:.15g} s"
 
 
 def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
@@ -200,7 +200,7 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
     lines = [
         f'{judged.analysis.verdict}: elqr {gains} on "{fault.name}", box {fault.box.name}',
         *(f"  {line}" for line in margin_lines(judged.analysis)),
-        f"  {'; '.join(held_sentences(judged.held))}",
+        f"  {'; '.join(hold_sentences(judged.held))}",
     ]
     if judged.asked is None or judged.peaks is None:
         return lines
@@ -235,17 +235,17 @@ def _near(vertex: Sequence[Fraction]) -> str:
 
 def guarantee_lines(entry: "Entry") -> list[str]:
     """What is guaranteed of the loop as it runs, the worst found and what no controller can do; for designed laws."""
-    if entry.answer is None:
+    if entry.guarantee is None:
         return []
-    asked = entry.design.details.get("reason") if entry.answer.proved else None
-    too_long = [f"{entry.design.other_step_first}: {asked}"] if asked else []
-    first, *rest = entry.answer.lines()
+    reason = entry.design.details.get("reason") if entry.guarantee.proved else None
+    too_long = [f"{entry.design.other_step_first}: {reason}"] if reason else []
+    first, *rest = entry.guarantee.lines()
     return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_reach(entry)]
 
 
 def limit_lines(entry: "Entry") -> list[str]:
     """Those of `guarantee_lines` that say what cannot be had: by no controller, and by designs of this kind."""
-    return [] if entry.answer is None else [*entry.answer.limit_lines(), *_reach(entry)]
+    return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_reach(entry)]
 
 
 def _reach(entry: "Entry") -> list[str]:
@@ -260,7 +260,7 @@ def _reach(entry: "Entry") -> list[str]:
     return [f"designs have a guarantee for T_s up to at least {step:.3g} s, and {own} {late}"]
 
 
-def said(entry: "Entry") -> str:
+def brief(entry: "Entry") -> str:
     """What is guaranteed, and the headline."""
     return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
 
@@ -272,26 +272,26 @@ HEADLINE = 200
 
 def headline(entry: "Entry") -> str:
     """Outcome of the run, the verdict, and of the `sentences` that follow as many as `HEADLINE` characters hold."""
-    told = sentences(entry)
-    return "; ".join(told[: _fitting(told)])
+    every = sentences(entry)
+    return "; ".join(every[: _fitting(every)])
 
 
 def remarks(entry: "Entry") -> list[str]:
     """The `sentences` for which the headline has no place."""
-    told = sentences(entry)
-    return told[_fitting(told) :]
+    every = sentences(entry)
+    return every[_fitting(every) :]
 
 
-def beside_guarantee(told: Sequence[str], entry: "Entry") -> list[str]:
+def beside_guarantee(lines: Sequence[str], entry: "Entry") -> list[str]:
     """What is told of a controller, without a reason that its `guarantee_lines` have given."""
-    reason, said = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
-    given = bool(reason) and str(reason) in said
-    return [line for line in told if not (given and line.endswith(str(reason)))]
+    reason, guaranteed = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
+    stated = bool(reason) and str(reason) in guaranteed
+    return [line for line in lines if not (stated and line.endswith(str(reason)))]
 
 
-def _fitting(told: Sequence[str]) -> int:
+def _fitting(lines: Sequence[str]) -> int:
     """How many sentences, joined, make a headline."""
-    lengths = accumulate(len(sentence) + len("; ") for sentence in told)
+    lengths = accumulate(len(sentence) + len("; ") for sentence in lines)
     return max(1, sum(length <= HEADLINE + len("; ") for length in lengths))
 
 
@@ -350,9 +350,9 @@ def _step_verdict(entry: "Entry") -> list[str]:
     lines = []
     if entry.growth_per_step is not None:
         lines.append(f"{'stable' if entry.growth_per_step < 1 else 'UNSTABLE'} at the step used")
-    if entry.held is not None:
+    if entry.zero_order_hold is not None:
         own = entry.run is None or entry.run.provenance["scheme"] in (AS_IN_THE_PAPER, "explicit")
-        first, *others = held_sentences(entry.held)
+        first, *others = hold_sentences(entry.zero_order_hold)
         lines += [first if own else f"with scheme explicit {first}", *others]
     return lines
 
@@ -360,22 +360,22 @@ def _step_verdict(entry: "Entry") -> list[str]:
 def _premises(entry: "Entry") -> list[str]:
     """Every premise that fails, and what the proof is about besides."""
     premises = entry.design.conditions
-    design, told = (
+    design, texts = (
         entry.design,
         [_SAID[p.name].format(p.ratio) for p in premises if not p.holds and (p.proved or p.name == "along_reference")],
     )
     if design.verdict is Verdict.PROVED and design.conditions and all(p.holds for p in design.conditions):
-        told.append("every premise holds")
+        texts.append("every premise holds")
     if _sampled(design):
-        told += ["its base gains are proved in continuous time too"] if design.certificate is not None else []
+        texts += ["its base gains are proved in continuous time too"] if design.certificate is not None else []
     else:
         scheme = entry.run.provenance["scheme"] if entry.run else AS_IN_THE_PAPER
-        told += (
+        texts += (
             [] if scheme == AS_IN_THE_PAPER else [f"in this run has zero-order hold over every step, scheme {scheme}"]
         )
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
-        told.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
-    return told
+        texts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
+    return texts
 
 
 def _bounds(entry: "Entry") -> list[str]:
@@ -402,14 +402,14 @@ def domain_sentence(domain: Domain) -> str:
 
 def feedforward_rows(variants: Iterable[Variant]) -> list[tuple[str, ...]]:
     """One row a feed-forward under `FEEDFORWARD_COLUMNS`."""
-    found = []
+    rows = []
     for variant in variants:
         ratios = {p.name: p.ratio for p in variant.premises}
         values = [ratios.get("along_reference"), ratios.get("level_set")]
         domain = variant.domain
         values += [domain.slip_error, domain.slip_rate_error] if domain else [None, None]
-        found.append((variant.feedforward.name, *("–" if v is None else f"{v:.2g}" for v in values)))
-    return found
+        rows.append((variant.feedforward.name, *("–" if v is None else f"{v:.2g}" for v in values)))
+    return rows
 
 
 FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |e1| [m]", "domain |e2| [m/s]")
@@ -422,9 +422,9 @@ def scheme_sentence(comparison: "Compared") -> str:
     for entry in comparison.entries:
         if entry.run:
             runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.kind})")
-    said = "; ".join(f"{scheme}: {', '.join(labels)}" for scheme, labels in runs.items()) or "none"
+    schemes = "; ".join(f"{scheme}: {', '.join(labels)}" for scheme, labels in runs.items()) or "none"
     return (
-        f"Schemes: {said}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "
+        f"Schemes: {schemes}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "
         "step, which no certificate in continuous time covers"
     )
 
@@ -457,21 +457,21 @@ FASTEST_PLATE = 1e-8
 _LABORATORY = 10.0  # length of a fault [m] below which what loads it is a machine
 
 
-def state_run_lines(answer: dict[str, Any]) -> list[str]:
+def state_run_lines(result: dict[str, Any]) -> list[str]:
     """Lines for people, from the JSON of `run_state`: outcome, cycle, events."""
-    outcome, cycle, events = answer["outcome"], answer["cycle"], answer["slip_events"]
-    least, largest = (p / 1e6 for p in answer["pressure"])
-    state = ", ".join(f"{name} = {value:.4g} s" for name, value in answer["start"]["state"].items())
+    outcome, cycle, events = result["outcome"], result["cycle"], result["slip_events"]
+    least, largest = (p / 1e6 for p in result["pressure"])
+    state = ", ".join(f"{name} = {value:.4g} s" for name, value in result["start"]["state"].items())
     lines = [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.3g} m/s (an earthquake from "
-        f"{outcome['earthquake_from']:.3g} m/s on), {len(events)} events in {lasting(answer['duration'])}, "
-        f"slip {answer['slip']:.4g} m",
-        f"loaded at {answer['loading_rate']:.4g} m/s; starts at {answer['start']['slip_rate']:.4g} m/s with {state}",
+        f"{outcome['earthquake_from']:.3g} m/s on), {len(events)} events in {lasting(result['duration'])}, "
+        f"slip {result['slip']:.4g} m",
+        f"loaded at {result['loading_rate']:.4g} m/s; starts at {result['start']['slip_rate']:.4g} m/s with {state}",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa",
     ]
-    if answer["resting"]:
+    if result["resting"]:
         lines.append("steady sliding is unstable here, but nothing disturbs it: start late, or give a pressure")
-    if outcome["kind"] == "creep" and answer["slip"] < _LOCKED * answer["loading_rate"] * answer["duration"]:
+    if outcome["kind"] == "creep" and result["slip"] < _LOCKED * result["loading_rate"] * result["duration"]:
         lines.append(
             "it does not creep for good: it slips far less than it is loaded, and the run ends before what is stored "
             "goes; the recurrence interval that design tells, or a longer --duration, shows the event"
@@ -483,7 +483,7 @@ def state_run_lines(answer: dict[str, Any]) -> list[str]:
     lines += [_event_line(number, event) for number, event in enumerate(events[:_MOST_EVENTS], start=1)]
     if len(events) > _MOST_EVENTS:
         lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json has them all)")
-    lines.append(f"energy that the integration loses: {answer['energy']['relative_residual']:.2g} of the largest share")
+    lines.append(f"energy that the integration loses: {result['energy']['relative_residual']:.2g} of the largest share")
     return lines
 
 
@@ -559,23 +559,23 @@ def exceeded_line(metrics: "Metrics", least: Bound, largest: Bound) -> str:
     return f"its pressure EXCEEDS the proved range: {ran}, proved {least.quantity('Pa')} to {largest.quantity('Pa')}"
 
 
-def sliding_run_lines(answer: dict[str, Any]) -> list[str]:
-    """Lines for people, from the JSON of `run_held`: outcome, errors, pressure, and what is proved."""
-    outcome, found = answer["outcome"], answer["metrics"]
-    least, largest = (p / 1e6 for p in answer["pressure"])
-    path = "".join(f", through a {name.replace('_', ' ')}" for name in answer["stages"])
-    path += f", through a lag of {answer['lag']:.4g} s" if answer["lag"] else ""
-    path += f", through rock of L^2/D = {answer['diffusion']:.4g} s" if answer["diffusion"] else ""
-    shaken = f", under a shear stress of up to {answer['stress'] / 1e3:.4g} kPa" if answer["stress"] else ""
+def sliding_run_lines(result: dict[str, Any]) -> list[str]:
+    """Lines for people, from the JSON of `run_sliding`: outcome, errors, pressure, and what is proved."""
+    outcome, metrics = result["outcome"], result["metrics"]
+    least, largest = (p / 1e6 for p in result["pressure"])
+    path = "".join(f", through a {name.replace('_', ' ')}" for name in result["stages"])
+    path += f", through a lag of {result['lag']:.4g} s" if result["lag"] else ""
+    path += f", through rock of L^2/D = {result['diffusion']:.4g} s" if result["diffusion"] else ""
+    shaken = f", under a shear stress of up to {result['stress'] / 1e3:.4g} kPa" if result["stress"] else ""
     return [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "
-        f"{answer['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
-        f"held over {answer['step']:.4g} s{path}{shaken}, for {lasting(answer['duration'])}; without control errors "
-        f"grow by {answer['growth_rate']:.3g} 1/s",
-        f"|ln(V/V_r)| at most {found['max_log_rate']:.3g}, slip error at most {found['max_slip_error']:.3g} m",
+        f"{result['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
+        f"held over {result['step']:.4g} s{path}{shaken}, for {lasting(result['duration'])}; without control errors "
+        f"grow by {result['growth_rate']:.3g} 1/s",
+        f"|ln(V/V_r)| at most {metrics['max_log_rate']:.3g}, slip error at most {metrics['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law commands at most "
-        f"{found['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
-        proved_line((answer["guarantee"] or {}).get("sentence"), answer["outside"])
+        f"{metrics['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
+        proved_line((result["guarantee"] or {}).get("sentence"), result["outside"])
         or "no guarantee: what is said was seen in this run",
     ]
 

@@ -41,7 +41,7 @@ class Row:
 class Summary:
     """First part of the text of a comparison."""
 
-    answer: str  # Guarantee, relative to the natural earthquake
+    guarantee: str  # Guarantee, relative to the natural earthquake
     rows: tuple[Row, ...]
     conditions: str  # Sentence of this guarantee, or the reason why there is none
     notes: tuple[str, ...]  # Limitations of the answer
@@ -50,31 +50,31 @@ class Summary:
 def summary(comparison: "Compared") -> Summary:
     """Answer, table and notes of a comparison."""
     designed = comparison.of("designed")
-    proved = [(bool(e.design.other_step), e.guaranteed.peak_slip_rate, e) for e in designed if e.guaranteed]
+    proved = [(bool(e.design.other_step), e.proof.peak_slip_rate, e) for e in designed if e.proof]
     best = min(proved, key=lambda one: one[:2])[2] if proved else None
     rows = [_uncontrolled(comparison.uncontrolled), *map(_row, (*designed, *comparison.of("published")))]
     return Summary(
-        answer=_answer(comparison, best),
+        guarantee=_first_sentence(comparison, best),
         rows=tuple(rows),
         conditions=_conditions(designed, best),
         notes=tuple(_notes(comparison, best)),
     )
 
 
-def _answer(comparison: "Compared", best: "Entry | None") -> str:
+def _first_sentence(comparison: "Compared", best: "Entry | None") -> str:
     natural, name = comparison.uncontrolled, comparison.fault.name
-    if best is None or best.guaranteed is None:
+    if best is None or best.proof is None:
         kinds = " or ".join(dict.fromkeys(e.kind for e in comparison.of("designed"))) or "designed"
         return f"{name}: no guarantee for any {kinds} controller"
     earthquake = natural.outcome.peak_slip_rate if natural.outcome.kind == "earthquake" else None
     first = best.design.other_step_first or "guaranteed"
     magnitude = comparison.fault.magnitude
-    return guaranteed_sentence(f"{name}: {first}", best.guaranteed, earthquake, magnitude, f"with the {best.label}")
+    return guaranteed_sentence(f"{name}: {first}", best.proof, earthquake, magnitude, f"with the {best.label}")
 
 
 def guaranteed_sentence(
     first: str,
-    found: "FaultProof",
+    proof: "FaultProof",
     earthquake: float | None,
     magnitude: float,
     law: str = "",
@@ -83,24 +83,24 @@ def guaranteed_sentence(
 
     The magnitude is NaN where the fault alone does not determine it.
     """
-    rate, share = found.peak_slip_rate, ""
+    rate, share = proof.peak_slip_rate, ""
     if earthquake:
         ratio = UpperBound(100 * Fraction(rate) / Fraction(earthquake))
         size = "" if isnan(magnitude) else f", magnitude {magnitude:.1f}"
         share = f" ({ratio:.2g} % of the natural earthquake's {quantity(earthquake, 'm/s')}{size})"
-    under = ", ".join(filter(None, (found.scope, law)))
-    under = f"{under[:1].upper()}{under[1:]}{',' if found.scope else ''} the" if under else "The"
+    under = ", ".join(filter(None, (proof.scope, law)))
+    under = f"{under[:1].upper()}{under[1:]}{',' if proof.scope else ''} the" if under else "The"
     return (
-        f"{first}. {under} slip rate never exceeds {rate.quantity('m/s')}{share}{found.motion}, and the slip stays "
-        f"within {found.claims.slip_error.quantity('m')} of the reference{found.task.course}"
+        f"{first}. {under} slip rate never exceeds {rate.quantity('m/s')}{share}{proof.motion}, and the slip stays "
+        f"within {proof.claims.slip_error.quantity('m')} of the reference{proof.task.course}"
     )
 
 
 def _conditions(designed: Sequence["Entry"], best: "Entry | None") -> str:
-    if best is not None and best.guaranteed is not None:
-        return f"{best.label}, proved: {best.guaranteed.sentence()}"
-    parts = [(e.label, e.answer.lines()[0] if e.answer else str(e.design.details.get("reason", ""))) for e in designed]
-    return "; ".join(f"{label}: {reason or 'undecided'}" for label, reason in parts)
+    if best is not None and best.proof is not None:
+        return f"{best.label}, proved: {best.proof.sentence()}"
+    reasons = (e.guarantee.lines()[0] if e.guarantee else str(e.design.details.get("reason", "")) for e in designed)
+    return "; ".join(f"{e.label}: {reason or 'undecided'}" for e, reason in zip(designed, reasons, strict=True))
 
 
 def _uncontrolled(run: "Trajectory") -> Row:
@@ -115,21 +115,21 @@ def _uncontrolled(run: "Trajectory") -> Row:
 
 
 def _row(entry: "Entry") -> Row:
-    found, run = entry.guaranteed, entry.run
-    worst = entry.answer.worst if entry.answer else None
+    proof, run = entry.proof, entry.run
+    worst = entry.guarantee.worst if entry.guarantee else None
     seen = pressure_extremes(run) if run else None
-    pressure: tuple[Bound | float, Bound | float] | None = found.valve_pressures if found else seen
+    pressure: tuple[Bound | float, Bound | float] | None = proof.valve_pressures if proof else seen
     label = entry.label.removesuffix(" (designed)").removesuffix(" (given)").replace(" (published)", " published")
     return Row(
         name=label,
         outcome=run.outcome.kind if run else "not run",
         slip_rate=(
-            found.peak_slip_rate if found else None,
+            proof.peak_slip_rate if proof else None,
             worst.slip_rate if worst else None,
             run.outcome.peak_slip_rate if run else None,
         ),
         slip=(
-            found.claims.slip_error if found else None,
+            proof.claims.slip_error if proof else None,
             None if worst is None else worst.slip_error,
             run.metrics.max_slip_error if run else None,
         ),
@@ -142,60 +142,60 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     if fault.source.startswith("poor fit accepted"):
         yield f"{fault.source}"
     yield from cycle_sentences(comparison)
-    yield from (f"assumed: {said}" for said in fault.assumed)
+    yield from (f"assumed: {text}" for text in fault.assumed)
     if beyond := beyond_rates(fault.friction, mean_rate(fault.reference)):
         yield beyond
     if best is not None:
         yield from box_sentences(fault)
         yield "model: one block under a uniform pressure"
     for entry in designed:
-        if (entry.guaranteed is None and best is not None) or ", but " in grade(entry):
-            unproved = entry.given and entry.answer is not None and entry.guaranteed is None
-            yield f"{entry.label}: {entry.answer.lines()[0] if unproved and entry.answer else grade(entry)}"
+        if (entry.proof is None and best is not None) or ", but " in grade(entry):
+            unproved = entry.given and entry.guarantee is not None and entry.proof is None
+            yield f"{entry.label}: {entry.guarantee.lines()[0] if unproved and entry.guarantee else grade(entry)}"
         if assumed := entry.design.details.get("assumed"):
             yield f"{entry.label} assumes {assumed}"
-    others = [(e.design.title, e.guaranteed.scope) for e in designed if e.guaranteed and e.guaranteed.scope]
-    if others and best is not None and best.guaranteed is not None and not best.guaranteed.scope:
+    others = [(e.design.title, e.proof.scope) for e in designed if e.proof and e.proof.scope]
+    if others and best is not None and best.proof is not None and not best.proof.scope:
         yield f"{', '.join(title for title, _ in others)}: proved {others[0][1]}"
     yield from _alike(designed)
     published: dict[str, list[str]] = {}
     for entry in comparison.of("published"):
         published.setdefault(_published(grade(entry)), []).append(entry.design.title)
-    yield from (f"{', '.join(names)} (published): {said}" for said, names in published.items())
+    yield from (f"{', '.join(names)} (published): {text}" for text, names in published.items())
     if any(e.run is not None and e.run.provenance["scheme"] == "continuous" for e in comparison.of("published")):
         yield "runs of published gains are in continuous time, without zero-order hold"
     yield from left_out_lines(comparison)
-    if best is not None and best.answer is not None:
-        yield from _with_stick(best.answer)
-        yield from best.answer.limit_lines()
+    if best is not None and best.guarantee is not None:
+        yield from _with_stick(best.guarantee)
+        yield from best.guarantee.limit_lines()
 
 
-def _with_stick(answer: "Guarantee") -> Iterator[str]:
+def _with_stick(guarantee: "Guarantee") -> Iterator[str]:
     """Worst case found on the stick–slip plant, why there is no proof on it, and what is not searched there."""
-    seen, why = answer.worst_with_stick, answer.not_at_rest
+    seen, why = guarantee.worst_with_stick, guarantee.not_at_rest
     if seen is not None:
         yield (
             f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
             f"{quantity(seen.slip_rate, 'm/s')}{f'; no proof there: {why}' if why else ''}"
         )
-    if answer.stick_slip_gap:
-        yield answer.stick_slip_gap
+    if guarantee.stick_slip_gap:
+        yield guarantee.stick_slip_gap
 
 
-def _published(said: str) -> str:
+def _published(verdict: str) -> str:
     """The verdict on published gains without the names of the conditions that fail, which the report explains."""
-    if not said.startswith("proved, but "):
-        return said
-    missing = said.removeprefix("proved, but ").split("; ")
+    if not verdict.startswith("proved, but "):
+        return verdict
+    missing = verdict.removeprefix("proved, but ").split("; ")
     others = [part for part in missing if " fails" not in part]
-    said = "; ".join(["", *others]).replace("UNSTABLE", "unstable")
+    verdict = "; ".join(["", *others]).replace("UNSTABLE", "unstable")
     violated = ", and this task violates its conditions" if len(others) < len(missing) else ""
-    return f"not proved here: the proof is for continuous time{violated}{said}"
+    return f"not proved here: the proof is for continuous time{violated}{verdict}"
 
 
 def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
     """Why two sliding modes have the same bounds."""
-    sliding = [(e, e.guaranteed, e.answer.compensation) for e in designed if e.answer and e.answer.compensation]
+    sliding = [(e, e.proof, e.guarantee.compensation) for e in designed if e.guarantee and e.guarantee.compensation]
     same = [entry for entry, proof, law in sliding if proof and law.deadbeat]
     if len(same) > 1 and len({str(proof.claims) for _, proof, law in sliding if proof and law.deadbeat}) == 1:
         names = " and ".join(entry.design.title for entry in same)
@@ -218,11 +218,11 @@ def summary_cells(rows: Sequence[Row]) -> list[tuple[str, ...]]:
     def shown(value: Number, unit: str) -> str:
         return "–" if value is None else value.quantity(unit) if isinstance(value, Bound) else quantity(value, unit)
 
-    found = []
+    cells = []
     for row in rows:
         numbers = [shown(value, "m/s") for value in row.slip_rate] + [shown(value, "m") for value in row.slip]
-        found.append((row.name, row.outcome, *numbers, _range(row)))
-    return found
+        cells.append((row.name, row.outcome, *numbers, _range(row)))
+    return cells
 
 
 def _range(row: Row) -> str:
@@ -244,12 +244,12 @@ LEGEND = (
 _LAWS = "2-CTA, 2-DIA: sliding modes; e-LQR: linear feedback with disturbance estimate"
 
 
-def summary_lines(said: Summary) -> list[str]:
+def summary_lines(first: Summary) -> list[str]:
     """Lines of at most 80 characters."""
-    lines = [*wrap(f"{said.answer}.", WIDTH), "", *_table(said.rows), *LEGEND]
-    lines += [_LAWS, ""] if any(row.name.startswith("2-") for row in said.rows) else [""]
-    lines += wrap(said.conditions, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    for note in said.notes:
+    lines = [*wrap(f"{first.guarantee}.", WIDTH), "", *_table(first.rows), *LEGEND]
+    lines += [_LAWS, ""] if any(row.name.startswith("2-") for row in first.rows) else [""]
+    lines += wrap(first.conditions, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    for note in first.notes:
         lines += wrap(note, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     return lines
 
@@ -282,9 +282,9 @@ def _scale(groups: Sequence[Sequence[Number]]) -> int:
 
 def _cells(group: Sequence[Number], power: int, unit: str) -> str:
     """Three cells; a single number that is too wide has its own unit."""
-    known = [value for value in group if value is not None]
-    if len(known) == 1 and len(_cell(known[0], power)) >= _NUMBERS[-1]:
-        return f"{quantity(float(known[0]), unit):>{sum(_NUMBERS)}}"
+    numbers = [value for value in group if value is not None]
+    if len(numbers) == 1 and len(_cell(numbers[0], power)) >= _NUMBERS[-1]:
+        return f"{quantity(float(numbers[0]), unit):>{sum(_NUMBERS)}}"
     return "".join(f"{_fitted(value, power, width):>{width}}" for value, width in zip(group, _NUMBERS, strict=True))
 
 

@@ -56,8 +56,8 @@ def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True
         for line in _whole(entry):
             console.print(f"  {line}")
         if entry.variants:
-            known = zip(FEEDFORWARD_COLUMNS, (None,) * len(FEEDFORWARD_COLUMNS), "lrrrr", strict=True)
-            console.print(table(known, feedforward_rows(entry.variants), indent=2))
+            columns = zip(FEEDFORWARD_COLUMNS, (None,) * len(FEEDFORWARD_COLUMNS), "lrrrr", strict=True)
+            console.print(table(columns, feedforward_rows(entry.variants), indent=2))
     console.print()
     console.print("closed loop", style="bold", end=", ")
     console.print("errors after a quarter of the run; p < 0 is withdrawal")

@@ -86,12 +86,12 @@ def _outward(low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def _loop(period: Period) -> str:
-    task, loop, bounds, law = period.task, period.held, period.found, period.held.law
+    task, loop, bounds, law = period.task, period.held, period.plant, period.held.law
     fastest, bend = task.reference_rates
     bent = (_outward(Fraction(0), fraction_of(v.upper().fmpq()))[1] for v in period.bent)
     numbers = (
         *(loop.step, task.amplitude, task.authority, task.beta[1], *bounds.slope, *bounds.chord, *bounds.damping),
-        *(fastest + loop.told, bend, *bent, law.rate_gain, law.target_gain, law.return_rate, law.level_gain),
+        *(fastest + loop.target_noise, bend, *bent, law.rate_gain, law.target_gain, law.return_rate, law.level_gain),
         *(law.slip_gain, law.rest_slip, loop.slip_noise),
     )
     return f"Definition plant : loop := Loop {' '.join(map(gallina.rational, numbers))}."
@@ -124,7 +124,7 @@ def _terms(period: Period) -> str:
     UnsupportedError
         For a period that is too long against the plant.
     """
-    step, (s, w) = period.held.step, (sum(pair, Fraction(0)) / 2 for pair in (period.found.slope, period.found.damping))
+    step, (s, w) = period.held.step, (sum(pair, Fraction(0)) / 2 for pair in (period.plant.slope, period.plant.damping))
     n, terms = ceil((3 + abs(s) + 2 * abs(w)) * step), 1
     x, y = Fraction(0), Fraction(1)
     while terms < _MOST_TERMS:

@@ -15,7 +15,7 @@ from quakedesign.synthesis import guarantee
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BlocksAnswer:
+class BlocksResult:
     """What is proved of a fault cut into numbers of blocks."""
 
     fault: Fault
@@ -38,9 +38,9 @@ class BlocksAnswer:
 
     def lines(self) -> list[str]:
         """For people."""
-        held = "one well for all" if self.wells == "one" else "a well for each block"
+        wells = "one well for all" if self.wells == "one" else "a well for each block"
         parts = [
-            f"{self.fault.name} cut into blocks, {held}, a law designed for each number of blocks; the certificates "
+            f"{self.fault.name} cut into blocks, {wells}, a law designed for each number of blocks; the certificates "
             "are about the plants without stick that are derived from the fault, not about the derivation",
             f"from rest, with zero-order hold over {UpperBound(self.step):.6g} s, each block its own friction of the "
             "box, for all t >= 0:",
@@ -62,10 +62,10 @@ class BlocksAnswer:
         rows = []
         for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
-            known: dict[str, Any] = {"blocks": blocks, "verdict": "proved" if one.proved else "undecided"}
-            known |= {"reason": None if one.proved else one.reason}
-            known |= {"slip_error": ends and ends[0].exact, "slip_rate_error": ends and ends[1].exact}
-            rows.append(known)
+            entry: dict[str, Any] = {"blocks": blocks, "verdict": "proved" if one.proved else "undecided"}
+            entry |= {"reason": None if one.proved else one.reason}
+            entry |= {"slip_error": ends and ends[0].exact, "slip_rate_error": ends and ends[1].exact}
+            rows.append(entry)
         return {"fault": self.fault.name, "wells": self.wells, "step": str(self.step), "blocks": rows}
 
 
@@ -76,7 +76,7 @@ def one_block(
     wells: str = "one",
     coupling: Any = None,
     step: Any = None,
-) -> BlocksAnswer:
+) -> BlocksResult:
     """Whether one block may stand for a fault: what is proved when it is cut into several.
 
     Parameters
@@ -96,4 +96,4 @@ def one_block(
         plant = UncertainPlant.from_blocks(fault, count, wells=wells, coupling=coupling)
         proofs[count] = guarantee(plant, setup=setup).proof
     assert setup.step is not None
-    return BlocksAnswer(fault=fault, wells=wells, step=setup.step, proofs=proofs)
+    return BlocksResult(fault=fault, wells=wells, step=setup.step, proofs=proofs)

@@ -117,24 +117,24 @@ class ChainLimits:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; null where no well reaches a mode, where it oscillates, and where no stress is given."""
-        modes, known = [asdict(mode) for mode in self.modes], {"fault": self.chain.name, "feasible": self.feasible}
+        modes, values = [asdict(mode) for mode in self.modes], {"fault": self.chain.name, "feasible": self.feasible}
         if not self.chain.ages:
-            told = ("pole", "shape", "reached", "pressure")
-            return known | {"modes": [{name: mode[name] for name in told} for mode in modes]}
+            shown = ("pole", "shape", "reached", "pressure")
+            return values | {"modes": [{name: mode[name] for name in shown} for mode in modes]}
         beside = {name: getattr(self, name) for name in ("stress", "largest_pressure", "diffusivity")}
-        return known | {"modes": modes, **beside, "slip_rate_error": list(self.slip_rate_error) or None}
+        return values | {"modes": modes, **beside, "slip_rate_error": list(self.slip_rate_error) or None}
 
 
 def _count(chain: BlockChain, slopes: Sequence[Fraction]) -> int:
     """Unstable modes of blocks that damping never pushes, exactly: pivots above 0 of what weakens less what holds."""
-    pulls, found, before = {(i, j): K for i, j, K in chain.springs}, 0, Fraction(0)
+    pulls, count, before = {(i, j): K for i, j, K in chain.springs}, 0, Fraction(0)
     for i, slope in enumerate(slopes):
         pivot = slope - pulls.get((i, i - 1), 0) - pulls.get((i, i + 1), 0)
         if i:
             pivot -= pulls[i, i - 1] * pulls[i - 1, i] / before
         before = pivot or Fraction(-1, 10**60)
-        found += before > 0
-    return found
+        count += before > 0
+    return count
 
 
 def chain_limits(
@@ -166,7 +166,7 @@ def chain_limits(
     largest = min(block.effective_normal_stress for block in chain.blocks) if pressure is None else pressure
     diffusivity = 1.0 if diffusivity is None else diffusivity
     require_positive(pressure=largest, diffusivity=diffusivity, stress=1.0 if stress is None else stress)
-    A, entries, B, told, at_once = _sliding(chain)
+    A, entries, B, gains, at_once = _sliding(chain)
     modes, step = [], chain.fault.sampling_time
     for mode in _modes(A, entries, B, stress):
         if mode.pressure is not None:
@@ -181,7 +181,7 @@ def chain_limits(
     if stress is not None:
         N, V = len(chain.blocks), float(mean_rate(chain.fault))
         moved = expm(np.block([[A, entries], [np.zeros((N, 3 * N))]]) * step)[: 2 * N, 2 * N :]
-        later = np.abs(told @ moved + at_once).sum(axis=1)
+        later = np.abs(gains @ moved + at_once).sum(axis=1)
         rates = tuple((V * stress * np.maximum(np.diag(at_once), later)).tolist())
     return ChainLimits(
         chain=chain,
@@ -224,11 +224,11 @@ def _sliding(chain: BlockChain) -> tuple[np.ndarray, ...]:
         for name in ("strength", "weakening", "state_rate", "coefficient")
     )
     length, at_once = float(models[0].rate / models[0].state_rate), np.diag(1 / strength)
-    told = at_once @ np.hstack([-CoupledSliders.of(chain).stiffness * length, np.diag(-weakening)])
+    gains = at_once @ np.hstack([-CoupledSliders.of(chain).stiffness * length, np.diag(-weakening)])
     into = np.vstack([aged[0] * np.eye(N), np.diag(-aged)])
-    A, entries = into @ told, into @ at_once
+    A, entries = into @ gains, into @ at_once
     A[N:, N:] -= np.diag(aged)
-    return A, entries, entries @ (friction[:, None] * np.array(chain.shares, dtype=float)), told, at_once
+    return A, entries, entries @ (friction[:, None] * np.array(chain.shares, dtype=float)), gains, at_once
 
 
 def _transmitted(chain: BlockChain, pole: float) -> np.ndarray:
@@ -279,11 +279,11 @@ def _modes(
         for row, shape in zip(turned @ rows, shapes.T, strict=True):
             reach, steady = np.abs(row @ felt).sum(), np.abs(row @ B).sum()
             reached = bool(reach and steady > _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B))
-            known = reached and not wave and size is not None
+            sized = reached and not wave and size is not None
             yield UnstableMode(
                 pole=float(pole.real),
                 frequency=wave,
                 shape=tuple(np.real(shape / shape[np.argmax(np.abs(shape))]).tolist()),
                 reached=reached,
-                pressure=size * float(np.abs(row @ entries).sum() / reach) if known and size is not None else None,
+                pressure=size * float(np.abs(row @ entries).sum() / reach) if sized and size is not None else None,
             )

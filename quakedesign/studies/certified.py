@@ -97,21 +97,21 @@ def certified(
     if maximize in ("beta", "beta-factor") and low != high:
         raise ParameterError(f"to maximise the range of beta, give one value twice. Received {low} {high}.")
     try:
-        certificate, facts, lines = _answer(name, gains, lipschitz, maximize, (low, high))
+        certificate, values, lines = _results(name, gains, lipschitz, maximize, (low, high))
     except CertificateError as error:
         bound = None if lipschitz is None else rational(lipschitz, "lipschitz")
-        certificate, facts, lines = None, _facts(bound, (low, high)), [f"no certificate can be sought: {error}"]
+        certificate, values, lines = None, _values(bound, (low, high)), [f"no certificate can be sought: {error}"]
     verdict = _verdict(certificate)
     head = f"{verdict}: {name} {' '.join(map(str, gains))}"
-    if facts["lipschitz"] is not None:
-        head += f", |h'| <= {facts['lipschitz']}, beta from {facts['gain_range'][0]} to {facts['gain_range'][1]}"
-    whole = {"verdict": str(verdict), **facts, "certificate": None, "seconds": perf_counter() - began}
+    if values["lipschitz"] is not None:
+        head += f", |h'| <= {values['lipschitz']}, beta from {values['gain_range'][0]} to {values['gain_range'][1]}"
+    whole = {"verdict": str(verdict), **values, "certificate": None, "seconds": perf_counter() - began}
     return Certified(verdict=verdict, certificate=certificate, facts=whole, lines=(head, *lines))
 
 
-def _answer(
+def _results(
     name: str, gains: tuple[Number, ...], lipschitz: Number | None, maximize: str | None, ends: "Ends"
-) -> "Answer":
+) -> "Results":
     if maximize == "lipschitz":
         return _of_reach(name, gains, largest_lipschitz(name, gains, gain_range=ends), ends, lipschitz)
     if maximize in ("beta", "beta-factor"):
@@ -122,10 +122,10 @@ def _answer(
     return _at(name, gains, str(lipschitz), ends, decay=maximize == "decay")
 
 
-def _facts(bound: Fraction | None, ends: "Ends", **known: Any) -> dict[str, Any]:
+def _values(bound: Fraction | None, ends: "Ends", **values: Any) -> dict[str, Any]:
     """Facts of every answer; what is not given is not known."""
     empty: dict[str, Any] = {"decay": None, "settling": None, "limit": None, "counterexample": "none", "dual": []}
-    return {"lipschitz": _text(bound), "gain_range": [str(v) for v in ends], **empty, **known}
+    return {"lipschitz": _text(bound), "gain_range": [str(v) for v in ends], **empty, **values}
 
 
 def _verdict(certificate: Certificate | None) -> Verdict:
@@ -135,10 +135,10 @@ def _verdict(certificate: Certificate | None) -> Verdict:
 
 
 Ends = tuple[Fraction, Fraction]
-Answer = tuple[Certificate | None, dict[str, Any], list[str]]
+Results = tuple[Certificate | None, dict[str, Any], list[str]]
 
 
-def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, decay: bool) -> Answer:
+def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, decay: bool) -> Results:
     """Verdict for one bound, with the decay if that is asked for."""
     loop = closed_loop(name, gains, lipschitz=lipschitz, gain_range=ends)
     limit, bound, fast = necessary_limit(loop, name), rational(lipschitz, "lipschitz"), None
@@ -150,19 +150,19 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
     proved = certificate is not None and refuted is None
     kind = "none" if proved else against(loop, refuted)
     excluded = [] if proved or kind == "exact" else _excluded(loop)
-    told = fast[1] if fast else None
-    facts = _facts(
+    settling = fast[1] if fast else None
+    values = _values(
         bound,
         ends,
-        decay=str(told.decay) if told else None,
-        settling=_settling_facts(told),
+        decay=str(settling.decay) if settling else None,
+        settling=_settling_values(settling),
         limit=_text(limit),
         counterexample=kind,
         dual=excluded,
     )
     lines = [_limit_line(limit), *(["the bound is at or beyond that limit"] if hopeless else [])]
-    lines += _settling_lines(told) if told else ["no decay rate was found"] if decay else []
-    return certificate, facts, lines + _nothing_lines(certificate, kind, excluded)
+    lines += _settling_lines(settling) if settling else ["no decay rate was found"] if decay else []
+    return certificate, values, lines + _nothing_lines(certificate, kind, excluded)
 
 
 def _excluded(loop: Loop) -> list[int]:
@@ -190,7 +190,7 @@ def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[in
 
 def _of_reach(
     name: str, gains: tuple[Number, ...], reach: CertifiedLimit, ends: Ends, lipschitz: Number | None
-) -> Answer:
+) -> Results:
     """How far gains reach in L̄ or in the range of β."""
     tried = ends if reach.quantity == "lipschitz" else (ends[0], ends[0])
     lowest = closed_loop(
@@ -206,7 +206,7 @@ def _of_reach(
         bound = value
     elif value is not None:
         ends = (ends[0], value) if reach.quantity == "beta" else (ends[0] / value, ends[0] * value)
-    facts = _facts(
+    values = _values(
         bound,
         ends,
         limit=_text(limit),
@@ -222,7 +222,7 @@ def _of_reach(
     lines = [*_reach_lines(reach), *_nothing_lines(reach.certificate, kind, excluded), _limit_line(limit)]
     if scale is not None:
         lines.append(f"the bound {lipschitz} needs gains scaled by lambda >= {UpperBound(scale)}")
-    return reach.certificate, facts, lines
+    return reach.certificate, values, lines
 
 
 def _reach_lines(reach: CertifiedLimit) -> list[str]:
@@ -246,18 +246,18 @@ def _limit_line(limit: Fraction | None) -> str:
     return f"necessary limit: from |h'| = {UpperBound(limit)} on nothing can be proved of these gains"
 
 
-def _settling_facts(told: Settling | None) -> dict[str, Any] | None:
-    if told is None:
+def _settling_values(settling: Settling | None) -> dict[str, Any] | None:
+    if settling is None:
         return None
-    exact = {"factor": str(told.factor), "power": str(told.power), "start": str(told.start)}
-    return exact | {"seconds": told.seconds}
+    exact = {"factor": str(settling.factor), "power": str(settling.power), "start": str(settling.start)}
+    return exact | {"seconds": settling.seconds}
 
 
-def _settling_lines(told: Settling) -> list[str]:
+def _settling_lines(settling: Settling) -> list[str]:
     return [
-        f"decay: V' <= -k V^{1 - told.power} with k = {LowerBound(told.decay)} 1/s for this V",
-        f"settles within {UpperBound(told.factor)} V(0)^{told.power} s; from |e_i| <= {LowerBound(told.start)} "
-        f"within {UpperBound(told.seconds)} s",
+        f"decay: V' <= -k V^{1 - settling.power} with k = {LowerBound(settling.decay)} 1/s for this V",
+        f"settles within {UpperBound(settling.factor)} V(0)^{settling.power} s; from |e_i| <= "
+        f"{LowerBound(settling.start)} within {UpperBound(settling.seconds)} s",
     ]
 
 

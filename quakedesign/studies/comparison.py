@@ -20,11 +20,10 @@ from quakedesign.guarantees import (
     ContinuousProof,
     FaultProof,
     Guarantee,
-    NoProof,
-    attacked,
+    with_worst_case,
 )
 from quakedesign.guarantees.stick_slip_result import stick_slip_with_worst_case
-from quakedesign.guarantees.tracking_result import given_with_worst_case
+from quakedesign.guarantees.tracking_result import given_law_with_worst_case
 from quakedesign.laws import Controller, published
 from quakedesign.linear.riccati import vertex_poles
 from quakedesign.linear.sampled_stability import HeldLoop
@@ -68,16 +67,16 @@ class Entry:
         for sampled schemes.
     growth_per_step : float or None
         For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable. None for sampled
-        schemes, see `held`.
+        schemes, see `zero_order_hold`.
     variants : tuple of Variant
         For a designed sliding mode: certified properties of the same gains with every named feed-forward.
-    held : HeldLoop or None
+    zero_order_hold : HeldLoop or None
         For a linear law: stability with zero-order hold over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousProof
         For a designed linear law that is proved: peaks in continuous time by class; no class without any.
     given : bool
         Whether the law is given, not designed.
-    answer : Guarantee or None
+    guarantee : Guarantee or None
         For a designed or given law: guarantee with zero-order hold over T_s, see `Design.guarantee`, and worst case
         found.
     """
@@ -89,10 +88,10 @@ class Entry:
     largest_step: float | None = None
     growth_per_step: float | None = None
     variants: tuple[Variant, ...] = ()
-    held: HeldLoop | None = None
+    zero_order_hold: HeldLoop | None = None
     peaks: Mapping[str, ContinuousProof] = field(default_factory=dict)
     given: bool = False
-    answer: Guarantee | None = None
+    guarantee: Guarantee | None = None
 
     @property
     def kind(self) -> str:
@@ -100,21 +99,16 @@ class Entry:
         return "given" if self.given else self.origin
 
     @property
-    def guarantee(self) -> FaultProof | NoProof | None:
-        """Guarantee of the loop with zero-order hold over T_s."""
-        return self.answer.proof if self.answer else None
-
-    @property
-    def guaranteed(self) -> FaultProof | None:
-        """The guarantee, if there is one."""
-        found = self.guarantee
-        return found if found is not None and found.proved else None
+    def proof(self) -> FaultProof | None:
+        """Proof of the guarantee; None without one."""
+        proof = self.guarantee.proof if self.guarantee else None
+        return proof if proof is not None and proof.proved else None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""
         design = self.design
         return {
-            "guarantee": self.answer.to_dict() | {"certificate": None} if self.answer else None,
+            "guarantee": self.guarantee.to_dict() | {"certificate": None} if self.guarantee else None,
             "class": design.disturbance_class,
             "outcome": self.run.outcome.to_dict() if self.run else None,
             "gains": {name: str(v) for name, v in design.gains.items()},
@@ -127,7 +121,7 @@ class Entry:
             "remarks": [],
             "largest_sampling_time": self.largest_step,
             "growth_per_step": self.growth_per_step,
-            "held": self.held.to_dict() if self.held else None,
+            "held": self.zero_order_hold.to_dict() if self.zero_order_hold else None,
             "peaks": {name: design.to_dict() for name, design in self.peaks.items()} or None,
             "details": dict(design.details),
             "metrics": self.run.metrics.to_dict() if self.run else None,
@@ -196,8 +190,8 @@ def compared(
         for designed, given in designs:
             begun.append(_begun("designed", designed, schemes, runs, plant, given=given))
             tell(f"{begun[-1][0].label}: worst cases", 0.0)
-            answer = _answer(fault, designed, given=given)
-            begun[-1] = replace(begun[-1][0], answer=answer), begun[-1][1]
+            result = _guarantee_of(fault, designed, given=given)
+            begun[-1] = replace(begun[-1][0], guarantee=result), begun[-1][1]
         natural = runs.result(uncontrolled, partial(tell, "uncontrolled"))
         entries = [
             entry if run is None else _ended(entry, runs.result(run, partial(tell, entry.label)), tell)
@@ -215,18 +209,18 @@ def behind_path(fault: Fault) -> dict[str, str]:
     return {name: why for name in designable(fault) if name != "elqr"}
 
 
-def _answer(fault: Fault, design: Design, *, given: bool) -> Guarantee | None:
-    found: Any = design.guarantee
+def _guarantee_of(fault: Fault, design: Design, *, given: bool) -> Guarantee | None:
+    proof: Any = design.guarantee
     if design.sliding is not None:
         return design.sliding
-    if found.proved and found.kind == STICK_SLIP:
-        return stick_slip_with_worst_case(fault, found, design.compensation)
+    if proof.proved and proof.kind == STICK_SLIP:
+        return stick_slip_with_worst_case(fault, proof, design.compensation)
     if given:
         notes = getattr(design.controller, "notes", None)
-        return replace(given_with_worst_case(fault, found, notes), compensation=design.compensation)
+        return replace(given_law_with_worst_case(fault, proof, notes), compensation=design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
-    answer = replace(attacked(fault, found), compensation=design.compensation, not_at_rest=tried)
-    return answer if found.proved or design.runs else replace(answer, given=True)  # no T_s but the fault's was tried
+    result = replace(with_worst_case(fault, proof), compensation=design.compensation, not_at_rest=tried)
+    return result if proof.proved or design.runs else replace(result, given=True)  # no T_s but the fault's was tried
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:
@@ -236,9 +230,9 @@ def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, who
     for designed in designs:
         entry = Entry(label=f"{designed.title} (designed)", origin="designed", design=designed, run=None)
         if designed.controller is not None:
-            told = partial(tell, entry.label)
-            entry = replace(entry, run=designed_run(designed, natural.natural_peak, told, whole=whole))
-        entries.append(replace(entry, answer=designed.sliding))
+            progress = partial(tell, entry.label)
+            entry = replace(entry, run=designed_run(designed, natural.natural_peak, progress, whole=whole))
+        entries.append(replace(entry, guarantee=designed.sliding))
     return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
 
 
@@ -284,16 +278,16 @@ def _ended(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
 def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
     """A linear law in continuous time: held, and its peaks."""
     design = entry.design
-    growth, held = None, design.held_loop()
-    if held is not None and run.provenance["scheme"] == AS_IN_THE_PAPER:
+    growth, sampled = None, design.held_loop()
+    if sampled is not None and run.provenance["scheme"] == AS_IN_THE_PAPER:
         poles = vertex_poles(sectors(design.fault), list(design.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
     tell(f"{entry.label}: held pressure and peaks", 0.0)
     wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
-    proved = {kind: found for kind, found in peaks.items() if found.proved}
-    return replace(entry, growth_per_step=growth, held=held, peaks=proved)
+    proved = {kind: peak for kind, peak in peaks.items() if peak.proved}
+    return replace(entry, growth_per_step=growth, zero_order_hold=sampled, peaks=proved)
 
 
 def _with_rate(entry: Entry, law: Controller, limit: float, run: Trajectory, tell: Tell) -> Entry:

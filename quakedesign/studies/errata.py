@@ -101,16 +101,16 @@ def find_rows(numbers: Iterable[int | str] = ()) -> tuple[ErrataRow, ...]:
     UnknownNameError
         For a number without a row, and for anything that is not a whole number.
     """
-    known = {str(row.number): row for row in errata_rows()}
+    rows = {str(row.number): row for row in errata_rows()}
     wanted = list(dict.fromkeys(str(n).strip() for n in numbers))
     for number in wanted:
-        if number not in known:
-            first, last = min(map(int, known)), max(map(int, known))
+        if number not in rows:
+            first, last = min(map(int, rows)), max(map(int, rows))
             raise UnknownNameError(
                 f"row of the errata must be a whole number from {first} to {last}. Received {number!r}. "
                 "Omit the row to run every row."
             )
-    return tuple(known[n] for n in wanted) if wanted else errata_rows()
+    return tuple(rows[n] for n in wanted) if wanted else errata_rows()
 
 
 def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from quakedesign.simulation.run_settings import sampled_scheme
 from quakedesign.studies.single_runs import differentiator_premise, sensor
 
 
-def export_answer(
+def export_result(
     fault: Fault,
     law: Controller,
     folder: Path,

@@ -220,8 +220,8 @@ def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[list[Function]
         critical = rate_and_state_plant.critical_stiffness(law.symbolic(), inertia=inertia) / plant.N_hat
     except UnsupportedError:
         return conditions, lambda s: np.full(np.shape(s), np.nan), limits
-    known = {**law.values(), **values, rate_and_state_plant.loading_rate: at, plant.sigma: stress, plant.p: 0}
-    function = sp.lambdify(stress, sp.N(critical.subs(known)))
+    numbers = {**law.values(), **values, rate_and_state_plant.loading_rate: at, plant.sigma: stress, plant.p: 0}
+    function = sp.lambdify(stress, sp.N(critical.subs(numbers)))
     return conditions, lambda s: function(s) + 0 * np.asarray(s, dtype=float), limits
 
 
@@ -326,9 +326,9 @@ def fault_dict(fault: Fault) -> dict[str, Any]:
         "assumed": list(fault.assumed),
         "natural_frequency": fault.natural_frequency,
         "damping_ratio": fault.damping_ratio,
-        "seismic_moment": _known(fault.seismic_moment) or None,
-        "magnitude": _known(fault.magnitude),
-        "rest_slip": _known(fault.rest_slip),
+        "seismic_moment": _finite(fault.seismic_moment) or None,
+        "magnitude": _finite(fault.magnitude),
+        "rest_slip": _finite(fault.rest_slip),
         "unstable": model.unstable,
         "reasons": list(model.reasons),
         "eigenvalues": [[z.real, z.imag] for z in model.eigenvalues],
@@ -357,7 +357,7 @@ def fault_sentences(fault: Fault) -> list[str]:
         f"{fault.natural_frequency:.4g} rad/s, damping ratio {fault.damping_ratio:.4g}",
         *_rock(fault),
         *_event(fault),
-        *(f"assumed: {said}" for said in fault.assumed),
+        *(f"assumed: {assumption}" for assumption in fault.assumed),
         f"{state}; eigenvalues {poles} 1/s{about.format(fault.friction.operating_rate)}",
         f"{sampling_sentence(sampling_adequacy(fault))}{about and '; the pole is that'}{about.format(mean)}",
         *_of_sliding(fault),
@@ -416,7 +416,7 @@ def beyond_control(fault: Fault) -> list[str]:
     ]
 
 
-def _known(value: float) -> float | None:
+def _finite(value: float) -> float | None:
     """A number, if there is one."""
     return value if isfinite(value) else None
 
@@ -428,7 +428,7 @@ def _rock(fault: Fault) -> list[str]:
     unlikely = "" if usual else " (UNLIKELY for rock: check density and shear modulus)"
     stress = LowerBound(rational(fault.effective_normal_stress)).quantity("Pa")
     numbers = ", ".join(
-        f"{name} {getattr(law, name):.4g} {told.metadata['unit']}".strip() for name, told in law.quantities().items()
+        f"{name} {getattr(law, name):.4g} {field.metadata['unit']}".strip() for name, field in law.quantities().items()
     )
     rock = f"shear waves {speed:.4g} m/s{unlikely}, effective normal stress {stress}"
     return [f"{rock}, friction {law.name}: {numbers}", *box_sentences(fault)]

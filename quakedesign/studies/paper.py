@@ -90,14 +90,14 @@ def printed(comparison: Compared) -> list[dict[str, Any]]:
     runs: dict[str, Trajectory | None] = {"uncontrolled": comparison.uncontrolled}
     runs |= {f"{e.origin} {e.design.name}": e.run for e in comparison.entries}
     rows = []
-    for said in data.get(comparison.fault.name, []):
-        run = runs.get(said["run"])
-        value = getattr(run.metrics, said["metric"]) if run else None
-        ratio = value / said["printed"] if value is not None else None
-        plant, more = run.provenance["plant"] if run else None, said.pop("note_without_stick", "")
-        said["note"] += f" {more}" if more and plant == "printed" else ""
-        unit = run.metrics.unit(said["metric"]) if run else None
-        rows.append({**said, "plant": plant, "unit": unit, "found": value, "ratio": ratio})
+    for row in data.get(comparison.fault.name, []):
+        run = runs.get(row["run"])
+        value = getattr(run.metrics, row["metric"]) if run else None
+        ratio = value / row["printed"] if value is not None else None
+        plant, more = run.provenance["plant"] if run else None, row.pop("note_without_stick", "")
+        row["note"] += f" {more}" if more and plant == "printed" else ""
+        unit = run.metrics.unit(row["metric"]) if run else None
+        rows.append({**row, "plant": plant, "unit": unit, "found": value, "ratio": ratio})
     return rows
 
 

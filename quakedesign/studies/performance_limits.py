@@ -93,7 +93,7 @@ class Limit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class Sensing:
     """What controllers measure of slip and slip rate, at all times up to a sample.
 
     Raises
@@ -177,7 +177,7 @@ class Limits:
         Each of the latter three and the delay at the fault's T_s.
     proved : tuple of TrackingProof
         Of the designs without delay that were found on the way, by T_s.
-    told : Told
+    sensing : Sensing
         What controllers are told, for the slip-rate error and designs; all others may know everything.
     """
 
@@ -192,7 +192,7 @@ class Limits:
     farthest_well: Limit
     smallest_pressure: Limit
     proved: tuple[TrackingProof, ...]
-    told: Told
+    sensing: Sensing
 
     def __repr__(self) -> str:
         return f"Limits({self.fault.name}: {', '.join(self.named())})"
@@ -231,20 +231,20 @@ class Limits:
             "step": self.fault.sampling_time,
             "withdrawal": float(self.withdrawal),
             "diffusivity": float(self.diffusivity),
-            "measured": self.told.measured,
-            "slip_noise": str(self.told.slip_noise),
-            "rate_noise": str(self.told.rate_noise),
+            "measured": self.sensing.measured,
+            "slip_noise": str(self.sensing.slip_noise),
+            "rate_noise": str(self.sensing.rate_noise),
             "slip_error": None if self.slip_error is None else str(self.slip_error),
             "stick_slip_rate": None if (least := self.stick_slip_rate) is None else str(least),
             **{name: limit.to_dict() for name, limit in self.named().items()},
         }
 
-    def smallest_peaks(self, *, told: bool = True) -> list[tuple[Fraction, LowerBound]]:
+    def smallest_peaks(self, *, measured: bool = True) -> list[tuple[Fraction, LowerBound]]:
         """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below.
 
-        Of controllers that are `told` no more than these, or that know everything.
+        Of controllers that are `measured` no more than these, or that know everything.
         """
-        task, noise = uncertain_plant(self.fault), (self.told if told else Told()).bounds
+        task, noise = uncertain_plant(self.fault), (self.sensing if measured else Sensing()).bounds
         peaks = [(step, smallest_peak(task, step, **noise)) for step in self._steps()]
         return [(step, peak.slip_rate_error) for step, peak in peaks if peak is not None]
 
@@ -277,8 +277,8 @@ class SlidingLimits(Limits):
     @property
     def achieved(self) -> list[tuple[Fraction, UpperBound]]:
         """T_s [s] and proved slip-rate error [m/s] of the guarantee."""
-        found = self.guarantee
-        return [] if found is None else [(found.held.step, above_the_reference(found))]
+        proof = self.guarantee
+        return [] if proof is None else [(proof.held.step, above_the_reference(proof))]
 
     @property
     def stick_slip_rate(self) -> None:
@@ -293,14 +293,14 @@ class SlidingLimits(Limits):
         """Plain values, SI; what is proved as decimal texts, rounded outwards."""
         return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
 
-    def smallest_peaks(self, *, told: bool = True) -> list[tuple[Fraction, LowerBound]]:
+    def smallest_peaks(self, *, measured: bool = True) -> list[tuple[Fraction, LowerBound]]:
         """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
         return [(step, self.push.smallest_rate_error(step)) for step in self._steps()]
 
 
-def above_the_reference(found: SlidingProof) -> UpperBound:
+def above_the_reference(proof: SlidingProof) -> UpperBound:
     """Proved bound of the slip rate, less V [m/s]."""
-    return UpperBound(found.peak_slip_rate - found.task.rate)
+    return UpperBound(proof.peak_slip_rate - proof.task.rate)
 
 
 # ----------------------------------------------------------------------
@@ -316,7 +316,7 @@ def limits(
     stress: float | None = None,
     spread: Quantity = 0,
     prove: bool = True,
-    **given: Quantity | None,
+    **entered: Quantity | None,
 ) -> Limits:
     """Performance limits of every controller for a disturbance of the class ``amplitude``.
 
@@ -343,7 +343,7 @@ def limits(
         what is impossible is so for the nominal ones.
     prove : bool
         Whether to look for designs with a guarantee, which takes a minute.
-    **given : float, str or Fraction
+    **entered : float, str or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
@@ -358,12 +358,12 @@ def limits(
         that is not measured.
     """
     off = rational(spread, "spread")
-    fault, setup = setup.with_given(**given).at_step(fault)
-    return _of_plant(fault, pressure, diffusivity, stress, Told(setup=setup), off, prove)
+    fault, setup = setup.with_given(**entered).at_step(fault)
+    return _of_plant(fault, pressure, diffusivity, stress, Sensing(setup=setup), off, prove)
 
 
 def _limits_at_rest(
-    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, told: Told, off: Fraction, prove: bool
+    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, sensing: Sensing, off: Fraction, prove: bool
 ) -> Limits:
     if stress is not None or off:
         raise ParameterError(
@@ -371,18 +371,18 @@ def _limits_at_rest(
             "out: the box and the disturbance of the fault are meant."
         )
     task, step = uncertain_plant(fault), rational(fault.sampling_time)
-    withdrawal, spread = _given(fault, pressure, diffusivity)
-    held, own = _proved_steps(task, step, told) if prove else ((), None)
-    late = ExactSetup.of(told.setup).delay
-    peak, proved = smallest_peak(task, step, late, **told.bounds), dict[str, Bound | None]()
-    if held:
-        proved["largest_step"] = LowerBound(held[-1].held.step)
+    withdrawal, spread = _pressure_and_diffusivity(fault, pressure, diffusivity)
+    proofs, own = _proved_steps(task, step, sensing) if prove else ((), None)
+    late = ExactSetup.of(sensing.setup).delay
+    peak, proved = smallest_peak(task, step, late, **sensing.bounds), dict[str, Bound | None]()
+    if proofs:
+        proved["largest_step"] = LowerBound(proofs[-1].held.step)
     if own is not None:
         proved["peak_slip_rate_error"] = own.claims.slip_rate_error
-        longest = longest_delay(task, step, **told.wanted)
+        longest = longest_delay(task, step, **sensing.wanted)
         proved["largest_delay"] = LowerBound(longest.held.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
-        if (farthest := farthest_rock(task, step, **told.wanted)) is not None:
+        if (farthest := farthest_rock(task, step, **sensing.wanted)) is not None:
             proved["largest_diffusion_time"] = rock = LowerBound(farthest.held.diffusion)
             proved["farthest_well"] = nearest_proved_well(rock, spread)
     return Limits(
@@ -391,10 +391,12 @@ def _limits_at_rest(
         diffusivity=spread,
         slip_error=peak.slip_error if peak else None,
         **_limits(
-            _impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None), proved, told.knowing()
+            _impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None),
+            proved,
+            sensing.knowing(),
         ),
-        proved=held,
-        told=told,
+        proved=proofs,
+        sensing=sensing,
     )
 
 
@@ -429,19 +431,19 @@ def _limits(
     }
 
 
-def _require_plain(fault: Fault, told: Told) -> None:
-    if told.setup.noise or told.measured != MEASURED[0]:
+def _require_plain(fault: Fault, sensing: Sensing) -> None:
+    if sensing.setup.noise or sensing.measured != MEASURED[0]:
         raise ParameterError(
-            f"no limit of slow sliding is known for noise. Received {fault.friction.name}, measured {told.words()}. "
-            "Leave noise out: what cannot be done without it cannot be done with it."
+            f"no limit of slow sliding is known for noise. Received {fault.friction.name}, measured "
+            f"{sensing.words()}. Leave noise out: what cannot be done without it cannot be done with it."
         )
-    if more := told.setup.given().keys() - {"lag", "diffusion"}:
+    if more := sensing.setup.given().keys() - {"lag", "diffusion"}:
         raise ParameterError(
             f"limits of slow sliding take lag and diffusion only. Received {', '.join(sorted(more))}. Omit these."
         )
 
 
-def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fraction, Fraction]:
+def _pressure_and_diffusivity(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fraction, Fraction]:
     withdrawal = rational(fault.effective_normal_stress if pressure is None else pressure, "pressure")
     spread = rational(diffusivity, "diffusivity")
     if withdrawal <= 0 or spread <= 0:
@@ -453,7 +455,7 @@ def _given(fault: Fault, pressure: float | None, diffusivity: float) -> tuple[Fr
 
 
 def _sliding_limits(
-    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, plain: Told, off: Fraction, prove: bool
+    fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, plain: Sensing, off: Fraction, prove: bool
 ) -> Limits:
     """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
 
@@ -462,44 +464,44 @@ def _sliding_limits(
     """
     _require_plain(fault, plain)
     setup = plain.setup if prove else None
-    withdrawal, spread = _given(fault, pressure, diffusivity)
+    withdrawal, spread = _pressure_and_diffusivity(fault, pressure, diffusivity)
     model, step = sliding_model(fault), rational(fault.sampling_time)
-    asked = None if stress is None else rational(stress, "stress")
-    told = setup if setup is not None and setup.path else None
+    requested = None if stress is None else rational(stress, "stress")
+    path = setup if setup is not None and setup.path else None
     through = ExactSetup(diffusion=near_path(model))
-    answer = None if setup is None else guarantee_sliding(fault, stress=asked, spread=off, setup=through)
-    found = answer.proof if answer is not None and answer.proof.proved else None
-    amplitude = asked if asked is not None or found is None else found.task.stress
+    result = None if setup is None else guarantee_sliding(fault, stress=requested, spread=off, setup=through)
+    proof = result.proof if result is not None and result.proof.proved else None
+    amplitude = requested if requested is not None or proof is None else proof.task.stress
     if amplitude is None or amplitude <= 0:
-        why = f": {answer.reason}" if answer is not None and not answer.proved else ""
+        why = f": {result.reason}" if result is not None and not result.proved else ""
         raise ParameterError(
             "limits of slow sliding need a shear stress disturbance above 0. Received none, and no design was "
             f"found that withstands any{why}. Give --stress, such as '25 kPa'."
         )
     push = SlidingPush(model=model, amplitude=amplitude)
-    farthest, rock = longest_diffusion(push, withdrawal, step), (told or IDEAL).diffusion
-    if told is not None and (farthest is None or rock <= farthest):
-        behind = guarantee_sliding(fault, stress=asked, spread=off, setup=ExactSetup.of(told)).proof
-        found = behind if behind.proved else None
-        push = replace(push, amplitude=found.task.stress) if found else push
+    farthest, rock = longest_diffusion(push, withdrawal, step), (path or IDEAL).diffusion
+    if path is not None and (farthest is None or rock <= farthest):
+        behind = guarantee_sliding(fault, stress=requested, spread=off, setup=ExactSetup.of(path)).proof
+        proof = behind if behind.proved else None
+        push = replace(push, amplitude=proof.task.stress) if proof else push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
     proved: dict[str, Bound | None] = {}
-    if found is not None:
-        proved["peak_slip_rate_error"] = above_the_reference(found)
+    if proof is not None:
+        proved["peak_slip_rate_error"] = above_the_reference(proof)
         proved["largest_step"] = LowerBound(step)
-        proved["largest_diffusion_time"] = LowerBound(found.held.diffusion)
-        proved["smallest_pressure"] = found.claims.push
-    known = _limits(impossible, proved, KNOWING, ", of the linearised plant")
+        proved["largest_diffusion_time"] = LowerBound(proof.held.diffusion)
+        proved["smallest_pressure"] = proof.claims.push
+    limits_by_name = _limits(impossible, proved, KNOWING, ", of the linearised plant")
     return SlidingLimits(
         fault=fault,
         withdrawal=withdrawal,
         diffusivity=spread,
         slip_error=None,
-        **known | {"smallest_pressure": replace(known["smallest_pressure"], title="pressure")},
+        **limits_by_name | {"smallest_pressure": replace(limits_by_name["smallest_pressure"], title="pressure")},
         proved=(),
-        told=Told(),
+        sensing=Sensing(),
         push=push,
-        guarantee=found,
+        guarantee=proof,
         rock=rock,
     )
 
@@ -508,23 +510,23 @@ _of_plant = by_equilibrium(rest=_limits_at_rest, sliding=_sliding_limits)
 
 
 def _proved_steps(
-    task: FaultPlant, step: Fraction, told: Told
+    task: FaultPlant, step: Fraction, sensing: Sensing
 ) -> tuple[tuple[TrackingProof, ...], TrackingProof | None]:
     """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
-    own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **told.wanted)
-    longest = longest_step(task, **told.wanted)
+    own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **sensing.wanted)
+    longest = longest_step(task, **sensing.wanted)
     if own is not None and own.proved:
-        own = _best_at(own, told)
+        own = _best_at(own, sensing)
     else:
-        own = continued(task, step, longest, **told.wanted)
-    found = [] if own is None else [own]
+        own = continued(task, step, longest, **sensing.wanted)
+    proofs = [] if own is None else [own]
     if longest is not None and (own is None or longest.guarantee.held.step > step):
-        found.append(design_at(task, longest))
-    return tuple(found), own
+        proofs.append(design_at(task, longest))
+    return tuple(proofs), own
 
 
-def _best_at(least_peak: TrackingProof, told: Told) -> TrackingProof:
+def _best_at(least_peak: TrackingProof, sensing: Sensing) -> TrackingProof:
     """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
-    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **told.wanted)
-    found = [least_peak, *([tracking] if tracking.proved else [])]
-    return min(found, key=lambda g: g.claims.slip_rate_error)
+    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **sensing.wanted)
+    proofs = [least_peak, *([tracking] if tracking.proved else [])]
+    return min(proofs, key=lambda g: g.claims.slip_rate_error)

@@ -117,7 +117,7 @@ def sampling_report(
     entries = [
         ("designed" if design else "given", variant, tuple(schemes)) for variant in _variants(controller, scales)
     ]
-    entries += [("published", known, PUBLISHED_SCHEMES) for known in published(fault.name).values()]
+    entries += [("published", printed, PUBLISHED_SCHEMES) for printed in published(fault.name).values()]
     rows = [
         _row(fault, origin, variant, scheme, bound if origin != "published" else None, duration, tell)
         for origin, variant, chosen in entries

@@ -71,9 +71,9 @@ def scale_answer(
         For an unknown controller or fault, published gains that do not exist, or wrong gains.
     """
     start, end = (f if isinstance(f, Fault) else load_fault(f) for f in (source, target))
-    given = (gains,) if isinstance(gains, str) else tuple(gains)
-    law = choice(start, controller_name, given).controller
-    own = given != ("published",) and law.divisor is not None
+    names = (gains,) if isinstance(gains, str) else tuple(gains)
+    law = choice(start, controller_name, names).controller
+    own = names != ("published",) and law.divisor is not None
     relation = similarity(start, end, clock=clock)
     carried = carry(law, relation.scales, divisor=least_authority(end) if own else None)
     output = "pressure·divisor" if own else "pressure"
@@ -99,7 +99,7 @@ def scale_answer(
         "violations": [c.group.name for c in relation.violations()],
         "unmatched": list(relation.unmatched),
         "published": _published(end, carried),
-        "unrounded": _unrounded(start, end, law, relation.scales) if given == ("published",) else None,
+        "unrounded": _unrounded(start, end, law, relation.scales) if names == ("published",) else None,
     }
 
 

@@ -86,12 +86,12 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
 # A designed law, its proof and a run.
 
 
-def farthest_balance(chain: BlockChain, found: PlantProof) -> UpperBound | None:
+def farthest_balance(chain: BlockChain, proof: PlantProof) -> UpperBound | None:
     """How far from the reference a block may be at balance [m], under fewer wells than blocks; else None."""
     N, task = len(chain.blocks), uncertain_plant(chain.fault)
     if len(chain.wells) == N:
         return None
-    moves = [size for _, size in found.part.disturbances[N:]]  # behind the forces on the blocks
+    moves = [size for _, size in proof.part.disturbances[N:]]  # behind the forces on the blocks
     return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip)
 
 
@@ -148,7 +148,7 @@ class ChainRun:
         return table_row(self.controller, max(outputs[N:]), max(outputs[:N]), worst, self.run.pressure)
 
     @property
-    def answer(self) -> str:
+    def summary(self) -> str:
         """What is guaranteed, beside the natural earthquake."""
         N, peak = len(self.chain.blocks), natural_peak(self.chain)
         rate, slip = max(self.proved_slip_rates), max(self.proof.claims.outputs[:N])
@@ -188,7 +188,7 @@ class ChainRun:
             ends.append((LowerBound(low - error), UpperBound(high + error)))
         return ends
 
-    def proved_facts(self) -> dict[str, Any]:
+    def proved_values(self) -> dict[str, Any]:
         """Proved slip rates of blocks [m/s] and pressures of wells [Pa], and the peak without control [m/s]."""
         ends = self.proved_pressures
         return {
@@ -200,7 +200,7 @@ class ChainRun:
     def screen(self, conditions: Sequence[str]) -> list[str]:
         """Lines of at most 80 characters: the answer, a table of blocks and wells, and what the proof depends on."""
         wrapped = [wrap(line, 80, subsequent_indent="  ", break_on_hyphens=False) for line in conditions]
-        return [*wrap(self.answer, 80), "", *self.lines(), "", *(line for lines in wrapped for line in lines)]
+        return [*wrap(self.summary, 80), "", *self.lines(), "", *(line for lines in wrapped for line in lines)]
 
     def lines(self) -> list[str]:
         """Lines of at most 80 characters: blocks and wells, what is proved beside what a run shows."""
@@ -225,15 +225,15 @@ class ChainRun:
         ends, left = self.proved_pressures, False
         parts += [] if ends is None and run is None else ["pressure"]
         for j in range(len(chain.wells)):
-            told = []
+            ranges = []
             if ends is not None:
-                told.append(f"proved {ends[j][0].quantity('Pa')} to {ends[j][1].quantity('Pa')}")
+                ranges.append(f"proved {ends[j][0].quantity('Pa')} to {ends[j][1].quantity('Pa')}")
             if run is not None:
                 low, high = float(run.pressure[:, j].min()), float(run.pressure[:, j].max())
                 outside = ends is not None and not ends[j][0] <= low <= high <= ends[j][1]
-                told.append(f"run {quantity(low, 'Pa')} to {quantity(high, 'Pa')}{' (OUTSIDE)' if outside else ''}")
+                ranges.append(f"run {quantity(low, 'Pa')} to {quantity(high, 'Pa')}{' (OUTSIDE)' if outside else ''}")
                 left |= outside
-            parts += [f"{f'well {j + 1}':10}{', '.join(told)}"] if told else []
+            parts += [f"{f'well {j + 1}':10}{', '.join(ranges)}"] if ranges else []
         if run is not None:
             did = ", as pressures do here" if left else ""
             parts += [f"run: {lasting(float(run.times[-1]))} on the stick-slip plant, where errors and pressures may"]
@@ -286,7 +286,7 @@ def chain_law(
                 f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of "
                 "guarantee."
             )
-        found: Any = covered_stress(chain, claim)[-1]
+        proof: Any = covered_stress(chain, claim)[-1]
     else:
         plant = UncertainPlant.from_blocks(chain)
         if not several or claim.part != linear_part(plant, {}):
@@ -294,12 +294,12 @@ def chain_law(
                 f"a certificate must be about the fault. Received {certificate}, about another plant than "
                 f"{plant.name}. Give a file of guarantee {chain.name} --out FILE."
             )
-        found = named(claim, plant)
+        proof = named(claim, plant)
     if claim.law.delay or claim.check() is not Verdict.PROVED:
         raise CertificateError(
             f"a certificate must hold, for a law without delay. Received {certificate}. Prove it anew with guarantee."
         )
-    return found
+    return proof
 
 
 def run_of_chain(
@@ -326,9 +326,9 @@ def run_of_chain(
     ParameterError, CertificateError
     """
     whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
-    found = chain_law(chain, controller, certificate)
-    run = simulate_blocks(chain, found.law, duration=duration) if found.proved else None
-    return ChainRun(chain=chain, controller=controller, proof=found, run=run)
+    proof = chain_law(chain, controller, certificate)
+    run = simulate_blocks(chain, proof.law, duration=duration) if proof.proved else None
+    return ChainRun(chain=chain, controller=controller, proof=proof, run=run)
 
 
 # ----------------------------------------------------------------------
@@ -399,7 +399,7 @@ class SlidingChainRun:
         """What the proof depends on, and the run."""
         return [*conditions, "", *self.lines()]
 
-    def proved_facts(self) -> dict[str, Any]:
+    def proved_values(self) -> dict[str, Any]:
         """Nothing beyond the guarantee: its bounds are those of the blocks."""
         return {}
 
@@ -505,14 +505,14 @@ def run_sliding_chain(
         return SlidingChainRun(chain=chain, run=run, inertia=inertia)
     if loading_rate is not None:
         raise ParameterError("the far end rests in slow sliding. Received a loading rate. Omit it.")
-    found = chain_law(chain, controller, certificate, **(sliding or {}))
-    if not found.proved:
-        return SlidingChainRun(chain=chain, run=None, inertia=inertia, proof=found, controller=controller)
-    lag, covered, rate, _ = covered_stress(chain, found)
+    proof = chain_law(chain, controller, certificate, **(sliding or {}))
+    if not proof.proved:
+        return SlidingChainRun(chain=chain, run=None, inertia=inertia, proof=proof, controller=controller)
+    lag, covered, rate, _ = covered_stress(chain, proof)
     size = float(covered) if stress is None else stress
-    held = simulate_held_blocks(
+    trajectory = simulate_held_blocks(
         chain,
-        found.law,
+        proof.law,
         lag=float(lag),
         stress=size,
         period=stress_period,
@@ -521,4 +521,4 @@ def run_sliding_chain(
         progress=tell,
     )
     entries: dict[str, Any] = {"lag": lag, "covered": covered, "log_rate": rate, "stress": size}
-    return SlidingChainRun(chain=chain, run=held, inertia=inertia, proof=found, controller=controller, **entries)
+    return SlidingChainRun(chain=chain, run=trajectory, inertia=inertia, proof=proof, controller=controller, **entries)

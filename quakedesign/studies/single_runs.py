@@ -131,7 +131,7 @@ def run_state(
         **settings,
     )
     still = np.all(np.abs(np.log(run.slip_rate / fault.friction.operating_rate)) < _UNDISTURBED)
-    answer = {
+    result = {
         "outcome": run.outcome.to_dict() | {"earthquake_from": EARTHQUAKE_SHARE * run.dynamic_rate},
         "resting": bool(still) and derive(fault).unstable,
         "loading_rate": rate,
@@ -145,7 +145,7 @@ def run_state(
         "steps": len(run.time),
         "run": dict(run.provenance),
     }
-    return run, answer
+    return run, result
 
 
 def natural_run(fault: Fault) -> StateTrajectory:
@@ -170,8 +170,8 @@ def natural_run(fault: Fault) -> StateTrajectory:
 
 def _natural_cycle(run: StateTrajectory, plant: str, **figures: Any) -> StateTrajectory:
     """A run with the settings that those with a controller name, and with other figures in its metrics."""
-    told = {"scheme": "continuous", "step": None, "plant": plant, "controller": "none"}
-    return replace(run, provenance={**run.provenance, **told}, metrics=replace(run.metrics, **figures))
+    settings = {"scheme": "continuous", "step": None, "plant": plant, "controller": "none"}
+    return replace(run, provenance={**run.provenance, **settings}, metrics=replace(run.metrics, **figures))
 
 
 def shown_time(fault: Fault, *, whole: bool = False) -> float:
@@ -191,17 +191,17 @@ def designed_run(
 
     Its period is that of the tide, or a quarter of a run that is shorter than four of them.
     """
-    answer = design.sliding
-    if answer is None or answer.held is None:
+    result = design.sliding
+    if result is None or result.held is None:
         raise ParameterError(f"a designed run needs a law for slow sliding. Received {design!r:.60}. Use simulate.")
     duration = shown_time(design.fault, whole=whole)
     run = simulate_sliding(
         design.fault,
-        answer.held.law,
-        answer.held.step,
-        lag=answer.held.lag,
-        diffusion=answer.held.diffusion,
-        tide=Tide(amplitude=float(answer.task.stress), period=min(TIDE, duration / _SWINGS)),
+        result.held.law,
+        result.held.step,
+        lag=result.held.lag,
+        diffusion=result.held.diffusion,
+        tide=Tide(amplitude=float(result.task.stress), period=min(TIDE, duration / _SWINGS)),
         duration=duration,
         inertia=True,
         progress=progress,
@@ -209,7 +209,7 @@ def designed_run(
     return replace(run, criterion=replace(run.criterion, natural_peak=natural_peak))
 
 
-def run_held(
+def run_sliding(
     fault: Fault,
     *,
     step: float | None = None,
@@ -247,19 +247,19 @@ def run_held(
         given.
     """
     _require_runnable(fault, plant)
-    held, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
+    sampling_step, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
     through, model, plan = rational(lag), sliding_model(fault), None
     if claim is None:
-        law = sliding_law(model, held, diffusion=path)
+        law = sliding_law(model, sampling_step, diffusion=path)
     else:
-        law, held, path, through = claim.held.law, claim.held.step, claim.held.diffusion, claim.held.lag
-        stages = (*Actuator.meant_for(Sampling(step=held, delay=claim.held.delay)).sampled, *stages)
+        law, sampling_step, path, through = claim.held.law, claim.held.step, claim.held.diffusion, claim.held.lag
+        stages = (*Actuator.meant_for(Sampling(step=sampling_step, delay=claim.held.delay)).sampled, *stages)
         if slow_sliding_plant(fault, claim.task.stress).ramp != claim.task.ramp:  # another fault of the same box
             plan = float(claim.task.ramp / claim.task.rate)
     run = simulate_sliding(
         fault,
         law,
-        held,
+        sampling_step,
         lag=through,
         diffusion=path,
         stages=stages,
@@ -272,12 +272,12 @@ def run_held(
     )
     assert run.reference is not None
     assert run.reference_rate is not None
-    answer = {
+    result = {
         "outcome": run.outcome.to_dict() | {"earthquake_from": float(model.rate) + 0.1 * dynamic_rate(fault)},
         "reference_rate": float(model.rate),
         "largest_reference_rate": float(np.max(run.reference_rate)),
         "growth_rate": growth_rate(model),
-        "step": float(held),
+        "step": float(sampling_step),
         "lag": float(through),
         "diffusion": float(path),
         "stages": [stage.name for stage in stages],
@@ -295,7 +295,7 @@ def run_held(
         "guarantee": {"sentence": claim.sentence()} if claim else None,
         "outside": [],
     }
-    return run, answer
+    return run, result
 
 
 def _require_runnable(fault: Fault, plant: str) -> None:
@@ -310,10 +310,10 @@ def _require_runnable(fault: Fault, plant: str) -> None:
 def _start(
     fault: Fault, kind: str, rate: float, hold: float | None, share: float | None, settings: dict[str, Any]
 ) -> StartingState:
-    given = {"hold": hold, "share": share}
+    options = {"hold": hold, "share": share}
     wanted: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
     require_known(kind, wanted, "start", UnknownNameError)
-    if others := [name for name, value in given.items() if value is not None and name not in wanted[kind]]:
+    if others := [name for name, value in options.items() if value is not None and name not in wanted[kind]]:
         raise ParameterError(f"{others[0]} cannot be used with the start {kind}. Received both. Omit {others[0]}.")
     if kind == "steady":
         return sliding(fault, rate)
@@ -370,7 +370,7 @@ def sensor(
         For noise of a slip rate that is not measured, or for what belongs to a differentiator without one.
     """
     if bound is None:
-        given = {
+        entered = {
             "differentiator order": order != 1,
             "filter order": filter_order != 0,
             "bandwidth": bandwidth != math.inf,
@@ -378,7 +378,7 @@ def sensor(
             "quantum of the slip": quantum != 0,
             "number of steps": inner_steps != 1,
         }
-        for name in (name for name, there in given.items() if there):
+        for name in (name for name, there in entered.items() if there):
             raise ParameterError(f"the {name} belongs to a differentiator. Received no bound. Give both or neither.")
         return noise
     if noise.rate_noise:
@@ -570,9 +570,9 @@ def choice(
             f"Received {feedforward}. Give --gains continuous, or omit feedforward."
         )
     scaled = law if scale is None else law.scaled(rational(scale, "scale"))
-    known = feed_forward(feedforward, fault, law.divisor)
+    added = feed_forward(feedforward, fault, law.divisor)
     return Choice(
-        controller=law if scaled is law and feedforward == "none" else scaled.with_feedforward(known),
+        controller=law if scaled is law and feedforward == "none" else scaled.with_feedforward(added),
         lipschitz=None if base is None else base * (scaled.scale or 1),
     )
 
@@ -585,13 +585,13 @@ def _with_gains(
     if len(gains) == 1 and gains[0].isalpha():
         require_known(gains[0], (*PUBLISHED, *DESIGNED, *CONTINUOUS), "gains in a word", UnknownNameError)
     if gains == PUBLISHED:
-        known = published(fault.name)
-        if name not in known:
+        laws = published(fault.name)
+        if name not in laws:
             raise UnknownNameError(
                 f"published gains exist for real-fault and lab-fault. Received {fault.name!r}. "
                 "Give --gains designed, or the gains of the law."
             )
-        return known[name], None
+        return laws[name], None
     if gains == DESIGNED and step is not None:
         fault = replace(fault, sampling_time=step)
     if gains == DESIGNED and path:
@@ -614,15 +614,15 @@ def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Cont
     """
     setup = IDEAL.with_given(**path)
     Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **setup.path))
-    found: Any = guarantee(fault, name, setup)
-    if not found.proved:
+    result: Any = guarantee(fault, name, setup)
+    if not result.proved:
         text = ", ".join(f"{part} {time:g} s" for part, time in path.items())
-        sooner = f"--step '{float(found.shorter.held.step):g} s', where it has, " if found.shorter else ""
+        sooner = f"--step '{float(result.shorter.held.step):g} s', where it has, " if result.shorter else ""
         raise ParameterError(
             f"designed gains must have a proof behind what is around them. Received {name} with {text}, "
-            f"T_s = {fault.sampling_time:g} s: {found.proof.reason}. Give {sooner}gains as numbers, or see limits."
+            f"T_s = {fault.sampling_time:g} s: {result.proof.reason}. Give {sooner}gains as numbers, or see limits."
         )
-    law: Controller = found.controller
+    law: Controller = result.controller
     return law
 
 
@@ -677,18 +677,18 @@ def run_single(
         substeps = settings.pop("substeps")
         around |= {"substeps": substeps} if substeps != 1 else {}
         settings, around = settings | {"scheme": simulation_scheme(name, **tuning, **around)}, {}
-    known = law if isinstance(law, Choice) or law is None else Choice(controller=law)
-    own = known.controller if known else None
+    chosen = law if isinstance(law, Choice) or law is None else Choice(controller=law)
+    own = chosen.controller if chosen else None
     around |= dict(initial or {})
     run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **around)
-    if known is None:
+    if chosen is None:
         return run, []
-    return run, _premises(fault, known, run, noise, name)
+    return run, _premises(fault, chosen, run, noise, name)
 
 
-def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Sensor, scheme: str) -> list[Premise]:
+def _premises(fault: Fault, chosen: Choice, run: Trajectory, seen: Sensor, scheme: str) -> list[Premise]:
     """Premises that a run decides, or a differentiator needs."""
-    law, bound = known.controller, known.lipschitz
+    law, bound = chosen.controller, chosen.lipschitz
     premises = [trajectory_premise(law, None if bound is None else float(bound), run)]
     if isinstance(seen, OutputFeedback):
         premises.append(differentiator_premise(fault, law, seen, scheme=scheme))
@@ -698,11 +698,11 @@ def _premises(fault: Fault, known: Choice, run: Trajectory, seen: Sensor, scheme
 def _natural(fault: Fault, settings: dict[str, Any], around: dict[str, Any]) -> Trajectory:
     """Natural earthquake, to which nothing but the plant can be told."""
     usual = {"step": None, "scheme": "continuous", "method": "dormand-prince", "substeps": 1}
-    given = [name for name, value in settings.items() if name != "plant" and value != usual[name]]
-    given += list(around)
-    if given:
+    others = [name for name, value in settings.items() if name != "plant" and value != usual[name]]
+    others += list(around)
+    if others:
         raise ParameterError(
-            f"the natural earthquake runs with the settings of the fault. Received {', '.join(given)}. "
+            f"the natural earthquake runs with the settings of the fault. Received {', '.join(others)}. "
             "Choose a controller, or give a duration."
         )
     return natural_earthquake(fault, plant=settings["plant"])

@@ -62,15 +62,15 @@ class Design:
     domain : Domain or None
         Certified domain of the self-consistent premise on |h'|.
     details : mapping
-        What synthesis decided: exact numbers as texts.
+        Results of the synthesis; exact numbers as texts.
     setup : LoopSetup
         For which a sampled law is designed.
     runs : FaultProof or NoProof, optional
-        What was proved of the loop that runs while it was designed; None to find it when `guarantee` is asked for.
+        Proof of the sampled loop from the design; None if `guarantee` computes it on access.
     sliding : SlidingGuarantee, optional
-        For friction with a state: the law as it runs, with its rock, and the task that it is designed for.
+        For friction with a state: the sampled law with its diffusion path, and the task of the design.
     disturbance_class : str
-        Of the disturbances that the guarantee is about: ``amplitude``, or ``rate`` for those of bounded rate.
+        Class of the disturbances: ``amplitude``, or ``rate`` for those of bounded rate.
     """
 
     fault: Fault
@@ -88,17 +88,18 @@ class Design:
 
     @property
     def gains(self) -> dict[str, Fraction]:
-        """Exact gains; for a sliding mode also ``scale`` λ, ``divisor`` μ0N̂0 [m²/kg] and a feed-forward that is on.
+        """Exact gains; of a sliding mode also ``scale`` λ and ``divisor`` μ0N̂0 [m²/kg].
 
-        A sliding mode of samples has the numbers of its scheme too, ``weight`` [-] and ``authority`` B0 [m²/kg].
+        Feed-forward coefficients follow. A sampled sliding mode also has the numbers of its scheme, ``weight`` [-] and
+        ``authority`` B0 [m²/kg].
         """
         return self.controller.numbers if self.controller else {}
 
     @property
     def title(self) -> str:
-        """Name for people."""
-        known = self.controller or control_laws().get(self.name)
-        return known.title if known else self.name
+        """Name for display."""
+        law = self.controller or control_laws().get(self.name)
+        return law.title if law else self.name
 
     @property
     def measurement(self) -> Measurement | None:
@@ -108,7 +109,7 @@ class Design:
 
     @property
     def conditions(self) -> tuple[Premise, ...]:
-        """Premises of what is proved first: of the guarantee of a law of samples, of the certificate of another."""
+        """Premises of the main proof: of the guarantee if sampled, else of the certificate."""
         sampled = self.controller is not None and self.controller.sampling is not None
         return tuple(p for p in self.premises if p.name in REACH) if sampled else self.premises
 
@@ -119,7 +120,7 @@ class Design:
 
     @property
     def other_step_first(self) -> str:
-        """That nothing is guaranteed at the fault's own T_s, before what is for another; empty if its T_s runs."""
+        """Note that the fault's own T_s has no guarantee; empty if the design uses that T_s."""
         if not self.other_step or self.controller is None:
             return ""
         own = f"not guaranteed at T_s = {self.fault.sampling_time:g} s"
@@ -130,7 +131,7 @@ class Design:
         return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
 
     def feedforward_variants(self) -> tuple[Variant, ...]:
-        """Premises and domain of the same gains with every named feed-forward, its own first; none for other laws.
+        """Premises and domain of the same gains with every named feed-forward, its own first.
 
         Takes a few seconds.
         """
@@ -140,7 +141,7 @@ class Design:
     def certified_peaks(self, disturbance_class: str = "amplitude") -> ContinuousProof | NoProof:
         """Certified peaks of slip, slip rate and pressure of an e-LQR in continuous time.
 
-        What holds for the law as it runs is `guarantee`.
+        The bounds of the sampled law are in `guarantee`.
 
         Parameters
         ----------
@@ -161,8 +162,8 @@ class Design:
     def guarantee(self) -> FaultProof | NoProof:
         """Guarantee of the sampled law with zero-order hold, or the reason why there is none.
 
-        A law of samples has its own T_s, a sliding mode of samples its own scheme; the integrals of
-        an e-LQR in continuous time are summed over the T_s of the fault. Computed when asked for unless it is known.
+        A sampled law has its own T_s, a sampled sliding mode its own scheme; the integrals of an e-LQR in continuous
+        time become sums over the T_s of the fault. Computed on access unless the design has it.
         """
         law = self.controller
         if self.runs is not None:
@@ -175,10 +176,10 @@ class Design:
     @property
     def compensation(self) -> Compensation | None:
         """A sampled sliding mode with its guarantee; None for another law."""
-        law, found = self.controller, self.guarantee
+        law, proof = self.controller, self.guarantee
         if law is None or law.sampling is None or self.sliding is not None:
             return None
-        return method_of(type(law)).compensation(law, found)
+        return method_of(type(law)).compensation(law, proof)
 
     def held_loop(self) -> HeldLoop | None:
         """Stability of an e-LQR with zero-order hold over the fault's T_s; None for another law."""
@@ -220,39 +221,38 @@ def design(
     disturbance_class: str = CLASSES[0],
     progress: Callable[[str, float], None] | None = None,
     accept_poor_fit: bool = False,
-    **given: Quantity | None,
+    **entered: Quantity | None,
 ) -> Design:
     """Find gains with a proof for a fault.
 
-    All of them run as they are guaranteed, measured and held over the fault's T_s, or over the longest T_s with a
-    guarantee where the fault's own has none; see `Design.guarantee`.
+    The guarantee is for the sampled law with zero-order hold over the fault's T_s. Where that T_s has no guarantee, the
+    longest T_s that has one is used; see `Design.guarantee`.
 
-    2-CTA, 2-DIA: base gains (families.toml) are proved in continuous time for the fault's range of β; λ = ρ⁶ (ρ
-    rational, so that every scaled gain is rational) and the settings of the scheme ``stick-slip``, or of
-    ``compensated`` on the plant without stick, are chosen by what is guaranteed. e-LQR: feedback with an estimate of
-    the disturbance.
+    2-CTA, 2-DIA: base gains (families.toml) are proved in continuous time for the fault's range of β. The scale λ = ρ⁶
+    (ρ rational, so that every scaled gain is rational) and the settings of the scheme are chosen for guaranteed bounds.
+    The scheme is ``stick-slip``, or ``compensated`` on the plant without stick. e-LQR: feedback with a disturbance
+    estimate.
 
-    With `continuous` those of the paper, without a guarantee of the loop that runs. 2-CTA, 2-DIA: λ grows until L̄
-    exceeds by a tenth what the reference and the disturbance need; so does it where no T_s has a guarantee. e-LQR:
+    With `continuous` the designs are those of the paper, without a guarantee of the sampled loop. 2-CTA, 2-DIA: λ grows
+    until L̄ is 1.1 times the requirement of reference and disturbance; so it does where no T_s has a guarantee. e-LQR:
     Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
 
-    A fault whose friction has a state is held in slow sliding along its task by an e-LQR of the slip alone, through
-    the rock between well and fault (`Design.sliding`); sliding modes do not apply to it.
+    Rate-and-state friction: an e-LQR of the slip alone controls slow sliding along the task, through the diffusion path
+    (`Design.sliding`); sliding modes do not apply.
 
     Parameters
     ----------
     fault : Fault
     controller : str or type of Controller
-        ``"cta"``, ``"dia"`` or ``"elqr"``; or a law of your own, also as ``"module:Class"``, which says how it is
-        designed or derives from one of these.
+        ``"cta"``, ``"dia"`` or ``"elqr"``; or a user-defined law, also as ``"module:Class"``, with its own design
+        method or derived from one of these.
     setup : LoopSetup
-        T_s in place of the fault's, delay, lag and diffusion path behind which an e-LQR is designed and runs, what it
-        measures, and bounds of the measurement errors. Of rate-and-state friction a diffusion path of a tenth of D_c/V
-        unless given.
+        T_s in place of the fault's; delay, lag, diffusion path, measured signals and bounds of measurement errors of
+        an e-LQR. Rate-and-state friction: by default a diffusion path of 0.1 D_c/V.
     feedforward : str
-        What a sliding mode adds to ν from what is known of the plant: ``"none"``, ``"nominal"`` or ``"centred"``, see
-        `quakedesign.laws.feed_forward`. It enlarges the certified domain in continuous time and has no guarantee
-        as it runs, so it needs `continuous`; the e-LQR takes none.
+        Feed-forward of a sliding mode from a plant model: ``"none"``, ``"nominal"`` or ``"centred"``, see
+        `quakedesign.laws.feed_forward`. It enlarges the certified domain in continuous time and has no sampled
+        guarantee, so it needs `continuous`; the e-LQR has none.
     objective : str
         ``"tracking"`` for small errors under slow disturbances, ``"peak"`` for the smallest guaranteed slip-rate error.
     continuous : bool
@@ -269,11 +269,11 @@ def design(
         Of the guarantee: ``"amplitude"``, any disturbance as large as the fault's, or ``"rate"``, one that starts at 0
         and is no faster either, such as a tide.
     progress : callable, optional
-        Called with what the search for a law around friction with a state is doing, and the fraction done [-].
+        Called with the present task of the search for slow sliding, and the completed fraction [-].
     accept_poor_fit : bool
         Whether to go on for a fault whose friction its record does not support (`Fault.poor_fit`); the fault, and what
         is said of it, is then named so.
-    **given : str, float or Fraction
+    **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
@@ -294,19 +294,19 @@ def design(
     """
     require_fault(fault)
     fault = with_accepted_fit(fault, accept_poor_fit)
-    law, setup = control_law(controller), setup.with_given(**given)
+    law, setup = control_law(controller), setup.with_given(**entered)
     if unknown := setup.given().keys() - _DESIGNED_FOR:
         raise ParameterError(
             f"a design knows {', '.join(_DESIGNED_FOR)} of the loop setup. Received {', '.join(sorted(unknown))}. "
             "Use guarantee, which designs for all of them."
         )
     fault, setup = setup.at_step(fault)
-    asked = SlowSlidingDesign(
+    requested = SlowSlidingDesign(
         diffusion=setup.diffusion or None,
         stress=None if stress is None else exact_value(stress, "Pa", "stress"),
         spread=exact_value(spread, "", "spread"),
     )
-    setup, sliding = _request(fault, law, setup, asked, given.get("diffusion") is not None)
+    setup, sliding = _request(fault, law, setup, requested, entered.get("diffusion") is not None)
     added = NONE if feedforward == NONE.name else feed_forward(feedforward, fault, least_authority(fault))
     require_known(objective, OBJECTIVES, "objective")
     require_known(disturbance_class, CLASSES, "class")
@@ -320,16 +320,16 @@ def design(
     entries: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
     entries |= {"plant": plant, "setup": setup}
     entries |= {"tell": progress} if progress else {}
-    return law.design(GainProblem(fault=fault, answer=Design, feedforward=added, sliding=sliding, **entries))
+    return law.design(GainProblem(fault=fault, result_type=Design, feedforward=added, sliding=sliding, **entries))
 
 
 _DESIGNED_FOR = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", "rate_noise")
 
 
 def _tracking(
-    fault: Fault, law: type[Controller], setup: LoopSetup, asked: SlowSlidingDesign, path: bool
+    fault: Fault, law: type[Controller], setup: LoopSetup, requested: SlowSlidingDesign, path: bool
 ) -> tuple[LoopSetup, SlowSlidingDesign | None]:
-    if asked.stress is not None or asked.spread:
+    if requested.stress is not None or requested.spread:
         raise ParameterError(
             f"stress and spread of a design need friction with a state. Received {fault.friction.name}. "
             "Omit stress and spread."
@@ -338,9 +338,9 @@ def _tracking(
 
 
 def _sliding(
-    fault: Fault, law: type[Controller], setup: LoopSetup, asked: SlowSlidingDesign, path: bool
+    fault: Fault, law: type[Controller], setup: LoopSetup, requested: SlowSlidingDesign, path: bool
 ) -> tuple[LoopSetup, SlowSlidingDesign | None]:
-    """The request, and the setup without the diffusion path, which is in it; refuses laws that do not apply."""
+    """Request with the diffusion path, and the setup without it; rejects other laws."""
     if path and not setup.diffusion:
         raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
     if setup.delay or setup.lag:
@@ -350,17 +350,17 @@ def _sliding(
         )
     if why := method_of(law).without_state:
         raise UnsupportedError(f"{why}. Received {law.name}. Design an elqr.")
-    return replace(setup, diffusion=Fraction(0)), asked
+    return replace(setup, diffusion=Fraction(0)), requested
 
 
 _request = by_equilibrium(rest=_tracking, sliding=_sliding)
 
 
-def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **given: Quantity | None) -> Design:
+def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **entered: Quantity | None) -> Design:
     """Verdict, certificate and premises of given gains on a fault.
 
     Sliding modes are tried at 99, 90 and 50 % of the bound on |h'| that no V can exceed; the e-LQR over the fault's
-    sectors. A law that certificates cannot express yet is ``UNDECIDED``. The verdict on a law of samples is that on its
+    sectors. A law without a form of certificate is ``UNDECIDED``. The verdict on a sampled law is that on its
     guarantee.
 
     Parameters
@@ -369,15 +369,15 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **giv
     controller : Controller
     setup : LoopSetup
         Of a sampled linear law.
-    **given : str, float or Fraction
+    **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
     -------
     Design
     """
-    setup = setup.with_given(**given)
+    setup = setup.with_given(**entered)
     fault.require_memoryless("a verdict on gains")
     if setup != IDEAL and controller.sampling is None:
         raise ParameterError("a loop setup needs a law of samples. Received a law in continuous time. Omit setup.")
-    return GainProblem(fault=fault, answer=Design, setup=setup).assessed(controller)
+    return GainProblem(fault=fault, result_type=Design, setup=setup).assessed(controller)

@@ -36,23 +36,23 @@ from quakedesign.synthesis.method import Wanted, method_of
 from quakedesign.synthesis.plant_guarantees import guarantee_plant
 from quakedesign.synthesis.state_feedback import may_stick
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 
 
 def answers(
-    questions: Sequence[Callable[[], Found]],
+    questions: Sequence[Callable[[], Result]],
     *,
     workers: int = 1,
     scheduler: str | None = None,
     executor: Executor | None = None,
     tell: Callable[[str, float], None] | None = None,
-) -> list[Found | QuakedesignError]:
-    """Results of several calls, in their order, computed by several processes; errors are among the results.
+) -> list[Result | QuakedesignError]:
+    """Results of several calls, in their order, computed in parallel; errors are results too.
 
     Parameters
     ----------
     questions : sequence of callable
-        Such as ``partial(guarantee, fault, step=Fraction(1, 20))``; without argument, and known to other processes.
+        Such as ``partial(guarantee, fault, step=Fraction(1, 20))``: without argument, importable by other processes.
     workers : int
         Number of processes; 1 computes in this one. No digit depends on who computes.
     scheduler : str, optional
@@ -67,18 +67,18 @@ def answers(
     SimulationError
         When the workers cannot be reached, or do not live.
     """
-    found: dict[int, Found | QuakedesignError] = {}
+    results: dict[int, Result | QuakedesignError] = {}
     with crew_or_here(workers, scheduler, executor) as crew:
-        for place, one in crew.answers(_asked, [(question,) for question in questions]):
-            found[place] = one
+        for place, one in crew.answers(_called, [(call,) for call in questions]):
+            results[place] = one
             if tell is not None:
-                tell(f"{len(found)} of {len(questions)} answered", len(found) / len(questions))
-    return [found[place] for place in range(len(questions))]
+                tell(f"{len(results)} of {len(questions)} answered", len(results) / len(questions))
+    return [results[place] for place in range(len(questions))]
 
 
-def _asked(question: Callable[[], Found]) -> Found | QuakedesignError:
+def _called(call: Callable[[], Result]) -> Result | QuakedesignError:
     try:
-        return question()
+        return call()
     except QuakedesignError as refused:
         return refused
 
@@ -105,9 +105,9 @@ def guarantee(
     plant: str | None = None,
     progress: Callable[[str, float], None] | None = None,
     accept_poor_fit: bool = False,
-    **given: Quantity | None,
+    **entered: Quantity | None,
 ) -> Guarantee:
-    """Prove bounds of slip, slip rate and pressure of the sampled loop, as the command `guarantee` does.
+    """Prove bounds of slip, slip rate and pressure of a sampled loop.
 
     The controller is designed for the loop setup unless gains are given.
 
@@ -151,7 +151,7 @@ def guarantee(
     accept_poor_fit : bool
         Whether to go on for a fault whose friction its record does not support (`Fault.poor_fit`); the fault, and what
         is said of it, is then named so.
-    **given : str, float or Fraction
+    **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
     Returns
@@ -168,7 +168,7 @@ def guarantee(
     UnsupportedError
         For a controller that does not apply to the friction.
     """
-    setup = setup.with_given(**given)
+    setup = setup.with_given(**entered)
     if plant is not None:
         require_known(plant, PLANTS, "plant")
     if isinstance(fault, BlockChain):
@@ -278,12 +278,12 @@ def guarantee(
         if sticking.proof.proved:
             return sticking
         without = sticking.proof.reason
-    answer = _sampled(fault, task, family, wanted)
-    return replace(answer, not_at_rest=without) if without else answer
+    result = _sampled(fault, task, family, wanted)
+    return replace(result, not_at_rest=without) if without else result
 
 
 def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> TrackingGuarantee:
-    """Guarantee on a moving reference; none without given gains where no controller within σ′ can hold the fault."""
+    """Guarantee on a moving reference; no design if infeasible within the pressure σ′."""
     setup, most = wanted.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step
     exact = ExactSetup.of(setup)

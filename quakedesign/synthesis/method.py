@@ -29,7 +29,7 @@ from quakedesign.guarantees import (
 )
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.float_bounds import spectral_radius
-from quakedesign.guarantees.tracking_result import FACTOR, given_with_worst_case
+from quakedesign.guarantees.tracking_result import FACTOR, given_law_with_worst_case
 from quakedesign.laws import Controller, LinearLaw, SampledController, Signals, SlidingMode, control_laws
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.laws.sampled_law import steady_states
@@ -53,7 +53,7 @@ L = TypeVar("L", bound=Controller)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowSlidingDesign:
-    """Design problem of slow sliding for friction with a state; see `quakedesign.synthesis.design`.
+    """Design problem of slow sliding; see `quakedesign.synthesis.design`.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class GainProblem(Generic[Designed]):
     Attributes
     ----------
     fault : Fault
-    answer : callable
+    result_type : callable
         Builds the `Design` from the results.
     objective : str
     continuous : bool
@@ -94,7 +94,7 @@ class GainProblem(Generic[Designed]):
     """
 
     fault: Fault
-    answer: Callable[..., Designed]
+    result_type: Callable[..., Designed]
     objective: str = OBJECTIVES[0]
     continuous: bool = False
     feedforward: FeedForward = NONE
@@ -110,12 +110,7 @@ class GainProblem(Generic[Designed]):
         return uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
 
     def require_exact_in_continuous_time(self) -> None:
-        """Reject a design in continuous time without exact slip and slip rate.
-
-        Raises
-        ------
-        ParameterError
-        """
+        """Reject a design in continuous time without exact slip and slip rate."""
         if self.continuous and self.setup != IDEAL:
             raise ParameterError(
                 "a design in continuous time needs exact measurements of slip and slip rate, and no delay, lag or "
@@ -147,7 +142,7 @@ class GainProblem(Generic[Designed]):
         verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
         if runs is not None and controller.sampling is not None:
             verdict = runs.check()
-        found = {
+        entries = {
             "name": controller.name,
             "verdict": verdict,
             "domain": domain,
@@ -155,15 +150,15 @@ class GainProblem(Generic[Designed]):
             "setup": self.setup,
             **more,
         }
-        found["disturbance_class"] = self.disturbance_class
-        known = (*premises, *own, *controller.premises(self.fault, certificate))
-        return self.answer(fault=self.fault, controller=controller, certificate=certificate, premises=known, **found)
+        entries["disturbance_class"] = self.disturbance_class
+        entries["premises"] = (*premises, *own, *controller.premises(self.fault, certificate))
+        return self.result_type(fault=self.fault, controller=controller, certificate=certificate, **entries)
 
     def undecided(self, name: str, reason: str, runs: NoProof | None = None, **more: Any) -> Designed:
         """Result without gains."""
         none: dict[str, Any] = {"controller": None, "certificate": None, "premises": (), "details": {"reason": reason}}
         none |= {"disturbance_class": self.disturbance_class, "setup": self.setup}
-        return self.answer(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
+        return self.result_type(fault=self.fault, name=name, verdict=Verdict.UNDECIDED, runs=runs, **none, **more)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,7 +180,7 @@ class Wanted:
 
 
 def linear_about_a_reference(controller: Controller) -> bool:
-    """Whether the loop that a law states is x2' = s·x1 − w·x2 + β·b·p with its own p and ξ', as an e-LQR's."""
+    """Whether the closed loop is x2' = s·x1 − w·x2 + β·b·p with the law's own p and ξ'."""
     try:
         model = controller.loop_field()
     except UnsupportedError:
@@ -230,12 +225,12 @@ class DesignMethod(Generic[L]):
         Raises
         ------
         UnsupportedError
-            Where no way is known.
+            For a law without a design method.
         """
         raise UnsupportedError(f"no way to design {law.title} is known. Give its class a classmethod design(problem).")
 
     def assess(self, problem: GainProblem[Designed], controller: L) -> Designed:
-        """Verdict on given gains, by a quadratic V if the closed loop is linear about any constant reference."""
+        """Verdict on given gains by a quadratic V, for a linear law about any constant reference."""
         if not linear_about_a_reference(controller):
             return problem.judged(controller, details={"reason": f"no way to prove {controller.title} is known"})
         loop = sector_loop(controller, sectors(problem.fault))
@@ -245,8 +240,8 @@ class DesignMethod(Generic[L]):
         self, fault: Fault, controller: L, certificate: Certificate | None
     ) -> tuple[tuple[Premise, ...], Domain | None]:
         """Premises and certified domain of the certificate."""
-        known = linear_about_a_reference(controller)
-        return tuple(linear_premises(fault, controller, certificate)) if known else (), None
+        linear = linear_about_a_reference(controller)
+        return tuple(linear_premises(fault, controller, certificate)) if linear else (), None
 
     def guarantee(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> FaultProof | NoProof:
         """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
@@ -256,12 +251,12 @@ class DesignMethod(Generic[L]):
         """Certified peaks of slip, slip rate and pressure in continuous time."""
         return NoProof(reason=f"no bound of peaks of {controller.title} is known here")
 
-    def compensation(self, controller: L, found: FaultProof | NoProof) -> Compensation | None:
+    def compensation(self, controller: L, proof: FaultProof | NoProof) -> Compensation | None:
         """Sampled sliding mode with its guarantee; None for other laws."""
         return None
 
     def base_law(self, task: FaultPlant, law: type[L], gains: tuple[str, ...]) -> SlidingMode | None:
-        """Sliding mode with base gains, or the first ones known for it; None for other laws."""
+        """Sliding mode with base gains, by default the first stored ones; None for other laws."""
         return None
 
     def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:
@@ -269,7 +264,7 @@ class DesignMethod(Generic[L]):
         return None
 
     def variants(self, fault: Fault, controller: L, certificate: Certificate | None) -> tuple[Variant, ...]:
-        """Premises and domain of the same gains with every named feed-forward; none for laws without."""
+        """Premises and domain of the same gains with every named feed-forward; may be empty."""
         return ()
 
     def sampled(
@@ -300,9 +295,9 @@ def methods() -> dict[str, DesignMethod[Any]]:
 
 
 def method_of(law: type[Controller]) -> DesignMethod[Any]:
-    """Method of the family that a law belongs to: that of the nearest class that it derives from."""
-    known = {method.family: method for method in methods().values()}
-    return next(known[base] for base in law.__mro__ if base in known)
+    """Design method of a law: that of the nearest class from which the law derives."""
+    by_family = {method.family: method for method in methods().values()}
+    return next(by_family[base] for base in law.__mro__ if base in by_family)
 
 
 def designable(fault: Fault | None = None) -> tuple[str, ...]:
@@ -332,8 +327,8 @@ class Samples(DesignMethod[SampledController]):
 
     def assess(self, problem: GainProblem[Designed], controller: SampledController) -> Designed:
         """Verdict of the guarantee."""
-        found = self.guarantee(problem.fault, problem.task, controller, problem.setup)
-        return problem.judged(controller.behind(**problem.setup.path), runs=found)
+        proof = self.guarantee(problem.fault, problem.task, controller, problem.setup)
+        return problem.judged(controller.behind(**problem.setup.path), runs=proof)
 
     def premises(
         self, fault: Fault, controller: SampledController, certificate: Certificate | None
@@ -344,13 +339,13 @@ class Samples(DesignMethod[SampledController]):
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingProof | NoProof:
-        """Guarantee at the law's T_s, with its delay, lag and diffusion path where the loop setup gives none."""
+        """Guarantee at the law's T_s; its own path applies where the loop setup has none."""
         law, step = controller.law, controller.step
         if setup.step is not None and setup.step != step:
-            own, asked = apart(step, setup.step)
+            own, requested = apart(step, setup.step)
             raise ParameterError(
-                f"step of the loop setup must be that of the law, {own} s. Received {asked} s. Omit step, or give a "
-                "law for that step."
+                f"step of the loop setup must be that of the law, {own} s. Received {requested} s. Omit step, or give "
+                "a law for that step."
             )
         if setup.measured == MEASURED[2] or (setup.measured == MEASURED[1] and not law.of_slip_alone):
             raise ParameterError(
@@ -365,12 +360,12 @@ class Samples(DesignMethod[SampledController]):
         except ParameterError:
             return NoProof(reason=_STANDING)
         held = replace(exact, **path).held(law, step)
-        found = best_guarantee(task, held)
-        if found.proved or found.small_gain is not None or held.longest_step:
-            return found
+        proof = best_guarantee(task, held)
+        if proof.proved or proof.small_gain is not None or held.longest_step:
+            return proof
         largest, opposite = (spectral_radius(replace(held, law=_times(f, law)).loop(task)) for f in (1, -1))
         if largest < _STABLE:
-            return found
+            return proof
         text = "the nominal closed loop is not asymptotically stable: its largest eigenvalue over a period has modulus "
         text += f"{largest:.4g}"
         if not any(row[0] for row in (*law.measured, law.feedback)):
@@ -378,25 +373,25 @@ class Samples(DesignMethod[SampledController]):
                 "; the law does not use the slip, so that any constant slip error remains (eigenvalue 1): add "
                 "slip_error or slip to its inputs"
             )
-        return replace(found, reason=text + _OPPOSITE * (opposite < _STABLE))
+        return replace(proof, reason=text + _OPPOSITE * (opposite < _STABLE))
 
     def given(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingGuarantee:
         """Guarantee with the worst case found, for a law of the errors alone."""
-        found = self.guarantee(fault, task, controller, setup)
-        answer = given_with_worst_case(fault, found, controller.notes)
-        if found.proved or found.pressed or found.reason == _STANDING or setup.longest_step:
-            return answer
+        proof = self.guarantee(fault, task, controller, setup)
+        result = given_law_with_worst_case(fault, proof, controller.notes)
+        if proof.proved or proof.pressed or proof.reason == _STANDING or setup.longest_step:
+            return result
         for factor in _FACTORS:
             other = self.guarantee(fault, task, replace(controller, law=_times(factor, controller.law)), setup)
             if other.proved:
-                return replace(answer, nearest=(FACTOR, other), factor=factor)
+                return replace(result, nearest=(FACTOR, other), factor=factor)
         for share in _DELAYS if setup.delay else ():
             other = self.guarantee(fault, task, controller, setup.with_given(delay=share * setup.delay))
             if other.proved:
-                return replace(answer, nearest=("delay", other))
-        return answer
+                return replace(result, nearest=("delay", other))
+        return result
 
 
 def _times(factor: Fraction | int, law: LinearLaw) -> LinearLaw:

@@ -23,7 +23,7 @@ _UNSEEN = 1e-9
 def guarantee_plant(
     plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup, *, decentralised: bool = False
 ) -> PlantProof | NoProof:
-    """Peaks of a plant's outputs under a law, a gain matrix, or a law that is designed for several blocks.
+    """Peaks of a plant's outputs under a law, a gain matrix or a law designed for blocks.
 
     Parameters
     ----------
@@ -35,10 +35,6 @@ def guarantee_plant(
         Step, delay and lag.
     decentralised : bool
         Of a law that is designed: whether the pressure of each well depends on its own measurements alone.
-
-    Raises
-    ------
-    ParameterError
     """
     if unknown := setup.given().keys() - _KNOWN:
         raise ParameterError(
@@ -57,8 +53,8 @@ def guarantee_plant(
             reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
             f"steepest the states ({shape}) grow by {radius:.4g} a sample",
         )
-    found = plant_guarantee(around, exact)
-    return replace(found, notes=notes) if found.proved else found
+    proof = plant_guarantee(around, exact)
+    return replace(proof, notes=notes) if proof.proved else proof
 
 
 def _shown(plant: UncertainPlant) -> int:
@@ -70,8 +66,8 @@ def _law_of(
     plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup, decentralised: bool
 ) -> tuple[MatrixLaw, tuple[str, ...]]:
     """A law in exact numbers, and what was changed for it."""
-    given: Any = gains if hasattr(gains, "shape") else list(gains)
-    empty = len(given) == 0
+    entries: Any = gains if hasattr(gains, "shape") else list(gains)
+    empty = len(entries) == 0
     if (law is None) == empty and not (law is None and "slope of block 1" in plant.sectors and not setup.delay):
         raise ParameterError(
             "an uncertain plant needs a law, or gains with a step. Received "
@@ -82,7 +78,7 @@ def _law_of(
             raise ParameterError("gains of an uncertain plant need a step. Received none. Give step='0.1 s', say.")
         if empty:
             return block_law(plant, setup.step, decentralised=decentralised), ()
-        rows = exact_matrix(np.atleast_2d(np.asarray(given, dtype=object)), "gains")
+        rows = exact_matrix(np.atleast_2d(np.asarray(entries, dtype=object)), "gains")
         feedback = tuple(tuple(-v for v in row) for row in rows)
         output: tuple[Any, ...] = ((),) * len(feedback)
         static: dict[str, Any] = {"update": (), "measured": (), "output": output, "feedback": feedback}
@@ -101,7 +97,7 @@ def _law_of(
             "r or r' as an input": linear.of_reference,
             "other first states": linear.first,
         }
-        if received := [said for said, part in others.items() if part]:
+        if received := [feature for feature, part in others.items() if part]:
             raise ParameterError(
                 "a law of an uncertain plant must be linear in what is measured, and begin with z = 0. Received one "
                 f"with {' and '.join(received)}. Give law=control.ss(A, B, C, D, dt) of the measurements."

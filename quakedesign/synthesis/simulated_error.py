@@ -41,7 +41,7 @@ class TrialSampling:
     gain_range : tuple of two
         b_m and b_M that the gains must be proved for.
     scale, divisor : Fraction
-        λ and μ0N̂0 [m²/kg] of the controller; λ makes |h'| ≤ 1 of the base gains enough for the bound asked for.
+        λ and μ0N̂0 [m²/kg] of the controller; λ scales |h'| ≤ 1 of the base gains to the required bound.
     metric, scheme : str
     step, duration : float
         [s].
@@ -119,9 +119,9 @@ def sampling(
         raise ParameterError(f"sampled errors are searched for sliding modes. Received {law!r}.")
     require_known(metric, [name for name in Metrics.__dataclass_fields__ if name not in _NO_AIM], "metric")
     simulation_scheme(scheme)
-    for name, given in (("step", step), ("duration", duration)):
-        if given is not None and not 0 < given < math.inf:
-            raise ParameterError(f"{name} must be positive. Received {given} s.")
+    for name, value in (("step", step), ("duration", duration)):
+        if value is not None and not 0 < value < math.inf:
+            raise ParameterError(f"{name} must be positive. Received {value} s.")
     needed = required_lipschitz(fault, divisor) * _HEADROOM if lipschitz is None else rational(lipschitz)
     if not needed > 0:
         raise ParameterError(f"lipschitz must be positive. Received {lipschitz}.")
@@ -143,11 +143,11 @@ def sampling(
 def synthesise_sampled(
     trial: TrialSampling, *, degrees: Iterable[int] | None = None, rounds: int = 80
 ) -> Synthesis | None:
-    """Find base gains with a proof for |h'| ≤ 1 and a range of β, with the least simulated error.
+    """Find proved base gains with the least simulated error, for |h'| ≤ 1 and a range of β.
 
-    By the method of Nelder and Mead on the logarithms of the gains, from the gains of the smallest norm and from the
-    best of the literature; every point is screened before it is simulated. The figure is measured on one window of one
-    run, and no part of the proof.
+    The search uses the Nelder–Mead method on the logarithms of the gains, from the gains of the smallest norm and from
+    the best published ones. Every point is screened before it is simulated. The error is that of one window of one run;
+    it is not part of the proof.
 
     Parameters
     ----------
@@ -162,20 +162,20 @@ def synthesise_sampled(
     Synthesis or None
         Its value is the metric, in its unit; never worse than that of gains from the literature that are proved.
     """
-    asked = question(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
-    known = [_measured(trial, asked, loop) for loop in asked.published]
+    problem = question(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
+    measured = [_measured(trial, problem, loop) for loop in problem.published]
     small = synthesise(
-        trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=asked.degrees, starts=1, compare=False
+        trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=problem.degrees, starts=1, compare=False
     )
     begin = [tuple(small.gains.values())] if small else []
-    good = [one for one in known if one.value is not None]
+    good = [one for one in measured if one.value is not None]
     begin += [tuple(one.gains.values()) for one in sorted(good, key=lambda one: one.value or 0.0)[:1]]
     tried = {one.value: tuple(one.gains.values()) for one in good if one.value is not None}
     for gains in begin:
-        tried |= _tried(trial, asked, gains, rounds // len(begin))
+        tried |= _tried(trial, problem, gains, rounds // len(begin))
     for error, gains in sorted(tried.items(), key=lambda item: item[0]):
-        loop = with_gains(asked.loop, dict(zip(asked.loop.gains, gains, strict=True)))
-        certificate = find_certificate(loop, asked.degrees, subject=trial.law)
+        loop = with_gains(problem.loop, dict(zip(problem.loop.gains, gains, strict=True)))
+        certificate = find_certificate(loop, problem.degrees, subject=trial.law)
         if certificate is None:
             continue
         return Synthesis(
@@ -185,24 +185,24 @@ def synthesise_sampled(
             gains=loop.gains,
             certificate=certificate,
             value=error,
-            norm=scaled_norm(loop, asked.setting.exponents),
-            compared=tuple(replace(c, ratio=c.value and c.value / error) for c in known),
+            norm=scaled_norm(loop, problem.setting.exponents),
+            compared=tuple(replace(c, ratio=c.value and c.value / error) for c in measured),
         )
     return None
 
 
 def _tried(
-    trial: TrialSampling, asked: SynthesisProblem, begin: Sequence[Fraction], rounds: int
+    trial: TrialSampling, problem: SynthesisProblem, begin: Sequence[Fraction], rounds: int
 ) -> dict[float, tuple[Fraction, ...]]:
     """Screened gains by their errors, from some gains on."""
-    base = {name: float(k) for name, k in zip(asked.loop.gains, begin, strict=True)}
+    base = {name: float(k) for name, k in zip(problem.loop.gains, begin, strict=True)}
     free = [name for name, k in base.items() if k]
-    setting = replace(asked.setting, degree=asked.degrees[-1])
+    setting = replace(problem.setting, degree=problem.degrees[-1])
     tried: dict[float, tuple[Fraction, ...]] = {}
 
     def error(factors: Any) -> float:
         grown = {**base, **{n: base[n] * math.exp(x) for n, x in zip(free, factors, strict=True)}}
-        loop = with_gains(asked.loop, short(asked.loop, grown))
+        loop = with_gains(problem.loop, short(problem.loop, grown))
         if look(setting, loop, scaled_norm(loop, setting.exponents)) is None:
             return _WORST
         value = trial.error(tuple(loop.gains.values()))
@@ -216,9 +216,9 @@ def _tried(
     return tried
 
 
-def _measured(trial: TrialSampling, asked: SynthesisProblem, loop: Loop) -> ComparedGains:
-    """Error of gains from the literature in the same trial; None for those without a proof."""
-    certificate = find_certificate(loop, asked.degrees, subject=trial.law)
+def _measured(trial: TrialSampling, problem: SynthesisProblem, loop: Loop) -> ComparedGains:
+    """Error of published gains in the same trial; None for those without a proof."""
+    certificate = find_certificate(loop, problem.degrees, subject=trial.law)
     error = trial.error(tuple(loop.gains.values())) if certificate else None
-    norm = scaled_norm(loop, asked.setting.exponents)
+    norm = scaled_norm(loop, problem.setting.exponents)
     return ComparedGains(gains=dict(loop.gains), value=error, norm=norm, ratio=None, certificate=certificate)

@@ -15,9 +15,9 @@ from quakedesign.guarantees import (
     StickSlipProof,
     TrackingGuarantee,
     TrackingProof,
-    attacked,
     guarantee_of,
     sampled_sliding_mode,
+    with_worst_case,
 )
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import GUARANTEED, design_sticking
@@ -52,7 +52,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
     )
 
     def design(self, problem: GainProblem[Designed], law: type[SlidingMode]) -> Designed:
-        """λ for what is guaranteed in the scheme ``stick-slip`` or ``compensated``, or for L̄ in continuous time."""
+        """λ for the scheme ``stick-slip`` or ``compensated``, or for L̄ in continuous time."""
         if problem.setup.measured != MEASURED[0]:
             raise ParameterError(
                 f"a sliding mode needs slip and slip rate. Received {problem.setup.measured!r} for {law.name}. "
@@ -105,12 +105,12 @@ class SlidingModes(DesignMethod[SlidingMode]):
         return guarantee_of(task, controller, ExactSetup(**setup.noise))
 
     def base_law(self, task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...]) -> SlidingMode:
-        """Given base gains, or the first ones known."""
+        """Given base gains, by default the first stored ones."""
         return deadbeat(task, law, gains).controller
 
-    def compensation(self, controller: SlidingMode, found: FaultProof | NoProof) -> Compensation:
+    def compensation(self, controller: SlidingMode, proof: FaultProof | NoProof) -> Compensation:
         """With the weight and the authority of its scheme."""
-        return Compensation(controller=controller, proof=found)
+        return Compensation(controller=controller, proof=proof)
 
     def variants(self, fault: Fault, controller: SlidingMode, certificate: Certificate | None) -> tuple[Variant, ...]:
         """Every named feed-forward, its own first; takes a few seconds."""
@@ -119,7 +119,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
     def sampled(
         self, fault: Fault, task: FaultPlant, law: type[SlidingMode], step: Fraction, wanted: Wanted
     ) -> TrackingGuarantee:
-        """In a scheme, with given base gains or the first ones known."""
+        """Guarantee in a scheme, with given base gains or the first stored ones."""
         wanted.require_all_measured()
         options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}
         setup = ExactSetup.of(wanted.setup)
@@ -133,28 +133,28 @@ class SlidingModes(DesignMethod[SlidingMode]):
             if again is None:
                 nearest = nearest_setup(task, step, kind=laws, pressed=none.pressed, setup=setup)
                 shorter = None if longest is None else laws.at(task, longest).proof
-                known = shorter if isinstance(shorter, TrackingProof) else None
-                asked = step if known else None
-                return TrackingGuarantee(fault=fault, proof=none, shorter=known, asked_step=asked, nearest=nearest)
+                near = shorter if isinstance(shorter, TrackingProof) else None
+                entries: Any = {"shorter": near, "unproved_step": step if near else None, "nearest": nearest}
+                return TrackingGuarantee(fault=fault, proof=none, **entries)
             made = again
-        return replace(attacked(fault, made.without_stick), compensation=made)
+        return replace(with_worst_case(fault, made.without_stick), compensation=made)
 
 
 def _proved_base(fault: Fault, law: type[SlidingMode]) -> tuple[BaseGains[SlidingMode], Certificate | None]:
-    """First base gains of a law that are proved for the fault's range of β, else the first of all."""
-    beta, known = coefficient_range(fault, least_authority(fault)), law.base_gains()
-    for base in known:
+    """First base gains of a law that are proved for the fault's range of β, else the first."""
+    beta, candidates = coefficient_range(fault, least_authority(fault)), law.base_gains()
+    for base in candidates:
         loop = sliding_mode_loop(base.law, base.lipschitz, beta)
         certificate = find_certificate(loop, law.loop_field().degree, subject=law)
         if certificate is not None:
             return base, certificate
-    return known[0], None
+    return candidates[0], None
 
 
 def _compensated(
     problem: GainProblem[Designed], base: BaseGains[SlidingMode], certificate: Certificate | None
 ) -> Designed:
-    """On the stick–slip plant where that is proved, else on the plant without; in continuous time if no T_s has one."""
+    """Design on the stick–slip plant, else without stick, else in continuous time."""
     fault = problem.fault
     law = base.law.with_divisor(least_authority(fault))
     step = rational(fault.sampling_time)
@@ -173,20 +173,20 @@ def _compensated(
             }
             return problem.judged(sticking.controller, certificate, details=details, runs=sticking.proof)
         without = {"not_at_rest": sticking.reason}
-    made, found = sampled_sliding_mode(problem.task, law, step, problem.objective, ExactSetup(**problem.setup.noise))
-    if found.runs is None:
-        none = NoProof(reason=f"run in the scheme compensated, {found.reason}")
+    made, designed = sampled_sliding_mode(problem.task, law, step, problem.objective, ExactSetup(**problem.setup.noise))
+    if designed.runs is None:
+        none = NoProof(reason=f"run in the scheme compensated, {designed.reason}")
         return _scaled(problem, base, certificate, runs=none)
     details = {
         "objective": problem.objective,
-        "step": str(found.runs.held.step),
-        "reason": found.reason or None,
-        **{name: str(value) for name, value in found.runs.held.noise.items()},
+        "step": str(designed.runs.held.step),
+        "reason": designed.reason or None,
+        **{name: str(value) for name, value in designed.runs.held.noise.items()},
         "rho": str(smallest_root(made.controller.scale)),
         **_origin(base),
         **without,
     }
-    return problem.judged(made.limited, certificate, details=details, runs=found.runs, premises=found.premises())
+    return problem.judged(made.limited, certificate, details=details, runs=designed.runs, premises=designed.premises())
 
 
 def _scaled(
@@ -195,7 +195,7 @@ def _scaled(
     certificate: Certificate | None,
     runs: NoProof | None = None,
 ) -> Designed:
-    """In continuous time, with the smallest scale for the fault's |h'|; with why nothing is proved of what runs."""
+    """Design in continuous time; `runs` has the reason why there is no sampled guarantee."""
     law, divisor, added = base.law, least_authority(problem.fault), problem.feedforward
     why = {"reason": runs.reason} if runs else {}
     if certificate is None:
@@ -212,7 +212,7 @@ def _origin(base: BaseGains[SlidingMode]) -> dict[str, str]:
 
 
 def required_lipschitz(fault: Fault, divisor: Fraction, added: FeedForward = NONE) -> Fraction:
-    """Bound on |h'| [m/s³] that the reference, the disturbance and the uncertainty need while the errors are zero."""
+    """Bound on |h'| [m/s³] that reference, disturbance and uncertainty need at zero errors."""
     return largest_matched_rate(fault, divisor, Errors(), feedforward=added)
 
 

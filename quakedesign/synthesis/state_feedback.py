@@ -1,4 +1,4 @@
-"""Design of linear state feedback with integral action: Riccati equations, quadratic V, guarantees."""
+"""Design of linear state feedback: Riccati equations, quadratic V, guarantees."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -15,14 +15,14 @@ from quakedesign.guarantees import (
     NoProof,
     TrackingGuarantee,
     TrackingProof,
-    attacked,
     best_guarantee,
     certified_peaks,
     design_held,
     sampled_design,
+    with_worst_case,
 )
 from quakedesign.guarantees.exact.limit_theorems import hopeless
-from quakedesign.guarantees.exact.sampled_loop import ExactSetup, Held
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup, SampledLoop
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
@@ -47,7 +47,7 @@ from quakedesign.text import quantity
 
 
 class StateFeedback(DesignMethod[ExtendedLQR]):
-    """Feedback with an estimate of the disturbance for what runs, the Riccati equation in continuous time."""
+    """Sampled feedback with a disturbance estimate; Riccati equation in continuous time."""
 
     name: ClassVar[str] = "state-feedback"
     family: ClassVar[type] = ExtendedLQR
@@ -78,7 +78,8 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
             return super().guarantee(fault, task, controller, setup)
         step = rational(fault.sampling_time)
-        return best_guarantee(task, Held(law=summed_integrals(tuple(controller.gains.values()), step), step=step))
+        law = summed_integrals(tuple(controller.gains.values()), step)
+        return best_guarantee(task, SampledLoop(law=law, step=step))
 
     def certified_peaks(
         self, fault: Fault, controller: ExtendedLQR, disturbance_class: str
@@ -93,7 +94,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
     def sampled(
         self, fault: Fault, task: FaultPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
     ) -> TrackingGuarantee:
-        """Integrals of given gains are summed; without gains, a law with an estimate of the disturbance."""
+        """Guarantee of given gains with summed integrals, or of a law with an estimate."""
         setup, differs = wanted.setup, wanted.setup.measured == MEASURED[2]
         if wanted.gains and not differs:
             wanted.require_all_measured()
@@ -105,27 +106,27 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
             if differs and (reason := why_no_law(step, setup.measured, exact)):
                 return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
             summed = by_differences(summed, step) if differs else summed
-            given = best_guarantee(task, exact.held(summed, step))
-            if given.proved:
-                return attacked(fault, given)
+            proof = best_guarantee(task, exact.held(summed, step))
+            if proof.proved:
+                return with_worst_case(fault, proof)
             other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
             if other.proof.proved:
-                return TrackingGuarantee(fault=fault, proof=given, nearest=(GAINS, other.proof))
-            return replace(other, proof=given)
+                return TrackingGuarantee(fault=fault, proof=proof, nearest=(GAINS, other.proof))
+            return replace(other, proof=proof)
         entries: Any = {"measured": setup.measured, "setup": exact}
-        found = design_held(task, step, objective=wanted.objective, **entries)
-        if found.proved:
-            return attacked(fault, found)
-        if setup.longest_step or found.pressed:
-            nearest = nearest_setup(task, step, pressed=found.pressed, **entries)
-            if nearest is not None or not found.pressed:
-                return TrackingGuarantee(fault=fault, proof=found, nearest=nearest)
+        designed = design_held(task, step, objective=wanted.objective, **entries)
+        if designed.proved:
+            return with_worst_case(fault, designed)
+        if setup.longest_step or designed.pressed:
+            nearest = nearest_setup(task, step, pressed=designed.pressed, **entries)
+            if nearest is not None or not designed.pressed:
+                return TrackingGuarantee(fault=fault, proof=designed, nearest=nearest)
         longest = longest_step(task, **entries)
         if (again := continued(task, step, longest, **entries)) is not None:
-            return attacked(fault, again)
-        shorter, asked = (None, None) if longest is None else (design_at(task, longest), step)
+            return with_worst_case(fault, again)
+        shorter, tried = (None, None) if longest is None else (design_at(task, longest), step)
         nearest = nearest_setup(task, step, **entries)
-        return TrackingGuarantee(fault=fault, proof=found, shorter=shorter, asked_step=asked, nearest=nearest)
+        return TrackingGuarantee(fault=fault, proof=designed, shorter=shorter, unproved_step=tried, nearest=nearest)
 
 
 def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
@@ -135,9 +136,9 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
 
 
 def may_stick(law: type[Controller], setup: LoopSetup, disturbance_class: str) -> bool:
-    """Whether a design is one that the theorem of the stick–slip plant takes, which does not use a bounded change."""
-    known = law is ExtendedLQR or method_of(law).takes_base_gains
-    return known and not setup.given().keys() - TAKEN and disturbance_class == CLASSES[0]
+    """Whether the stick–slip theorem covers a law, setup and disturbance class."""
+    covered = law is ExtendedLQR or method_of(law).takes_base_gains
+    return covered and not setup.given().keys() - TAKEN and disturbance_class == CLASSES[0]
 
 
 def sticking_options(problem: GainProblem[Any]) -> dict[str, Any]:
@@ -163,19 +164,19 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     most = rational(fault.effective_normal_stress)
     if beyond := hopeless(task, most, exact.delay, setup.diffusion):
         return problem.undecided(law.name, beyond, NoProof(reason=beyond))
-    found = sampled_design(task, step, problem.objective, measured=setup.measured, setup=exact)
-    if found.runs is None:
-        return problem.undecided(law.name, found.reason)
-    runs, held = found.runs, found.runs.held
+    designed = sampled_design(task, step, problem.objective, measured=setup.measured, setup=exact)
+    if designed.runs is None:
+        return problem.undecided(law.name, designed.reason)
+    runs, held = designed.runs, designed.runs.held
     details = {
         "objective": problem.objective,
         "step": str(held.step),
-        "reason": found.reason or None,
+        "reason": designed.reason or None,
         "measured": setup.measured,
         **{name: str(value) for name, value in (*held.noise.items(), *held.path.items()) if value},
         **without,
     }
-    return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=found.premises())
+    return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=designed.premises())
 
 
 def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: type[ExtendedLQR]) -> Designed:
@@ -189,46 +190,46 @@ def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: typ
         )
     fault = problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))
-    answer = guarantee_sliding(
+    result = guarantee_sliding(
         fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
     )
-    reason = answer.proof.reason if not answer.proof.proved else None
-    if answer.held is None:
-        return problem.undecided(law.name, str(reason), sliding=answer)
+    reason = result.proof.reason if not result.proof.proved else None
+    if result.held is None:
+        return problem.undecided(law.name, str(reason), sliding=result)
     near = quantity(float(path) ** 0.5, "m")
     assumed = (
         None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):.3g} s ({near} at D = 1 m^2/s)"
     )
-    details = {"step": str(answer.held.step), "diffusion": str(path), "measured": MEASURED[1]}
-    details |= {name: said for name, said in {"assumed": assumed, "reason": reason}.items() if said}
-    return problem.judged(answer.held.controller, name=law.name, details=details, runs=answer.proof, sliding=answer)
+    details = {"step": str(result.held.step), "diffusion": str(path), "measured": MEASURED[1]}
+    details |= {name: text for name, text in {"assumed": assumed, "reason": reason}.items() if text}
+    return problem.judged(result.held.controller, name=law.name, details=details, runs=result.proof, sliding=result)
 
 
 def _continuous(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
     bounds = sectors(problem.fault)
     try:
-        found = riccati_design(problem.fault)
+        designed = riccati_design(problem.fault)
     except ParameterError as error:
         return problem.undecided(law.name, str(error))
-    loop = sector_loop(found.controller, bounds)
-    certificate = _of_riccati(loop, found) or quadratic_certificate(loop, theta=found.theta)
+    loop = sector_loop(designed.controller, bounds)
+    certificate = _of_riccati(loop, designed) or quadratic_certificate(loop, theta=designed.theta)
     details = {
-        "R": found.R,
-        "poles": [[float(z.real), float(z.imag)] for z in found.E],
-        "fastest_pole": found.fastest_pole,
+        "R": designed.R,
+        "poles": [[float(z.real), float(z.imag)] for z in designed.E],
+        "fastest_pole": designed.fastest_pole,
     }
-    return _judged(problem, found.controller, certificate, details)
+    return _judged(problem, designed.controller, certificate, details)
 
 
-def _of_riccati(loop: Loop, found: RiccatiDesign) -> Certificate | None:
+def _of_riccati(loop: Loop, designed: RiccatiDesign) -> Certificate | None:
     """Certificate with the V of the Riccati equation."""
-    margin = quadratic_margin(loop, found.lyapunov)
-    claims = claims_of(loop, found.lyapunov, (margin, Fraction(0)))
-    return finish(loop, found.lyapunov, claims) if min(claims.values()) > 0 else None
+    margin = quadratic_margin(loop, designed.lyapunov)
+    claims = claims_of(loop, designed.lyapunov, (margin, Fraction(0)))
+    return finish(loop, designed.lyapunov, claims) if min(claims.values()) > 0 else None
 
 
 def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certificate | None:
-    """Quadratic V for a linear loop: searched in two scalings, then a known one, whose rate is decided exactly.
+    """Quadratic V for a linear loop: search in two scalings, then V = xᵀΘx, decided exactly.
 
     Parameters
     ----------
@@ -236,8 +237,8 @@ def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certifi
     theta : matrix (4 × 4) of Fraction, optional
         V = xᵀΘx in SI that may be a proof.
     """
-    found = find_certificate(loop, 2) or robust_stability(loop)
-    return found or (finished_exactly(loop, theta) if theta is not None else None)
+    certificate = find_certificate(loop, 2) or robust_stability(loop)
+    return certificate or (finished_exactly(loop, theta) if theta is not None else None)
 
 
 def _judged(

@@ -288,7 +288,7 @@ def test_a_run_is_told_with_all_that_is_known_of_it(monkeypatch, full):
     )
     monkeypatch.setattr("quakedesign.simulation.earthquake.waiting", lambda *_: named("waiting") if full else None)
     monkeypatch.setattr("quakedesign.studies.comparison.shortfall", lambda *_: "a shortfall")
-    assert simulate_commands._answer(run, None, [named("premise")]) == {
+    assert simulate_commands._values(run, None, [named("premise")]) == {
         "outcome": {"name": "outcome"},
         "waiting": {"name": "waiting"} if full else None,
         "shortfall": "a shortfall",

@@ -9,7 +9,7 @@ import xarray as xr
 
 import quakedesign as qd
 from quakedesign.cli import main
-from quakedesign.guarantees import Held, TrackingProof, guarantee, save_guarantee
+from quakedesign.guarantees import SampledLoop, TrackingProof, guarantee, save_guarantee
 from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
 
@@ -20,7 +20,7 @@ LAW = disturbance_estimate(
     F("0.57"),
     ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
-HELD = Held(law=LAW, step=STEP, lag=F(1, 50), slip_noise=F(1, 10**7))
+HELD = SampledLoop(law=LAW, step=STEP, lag=F(1, 50), slip_noise=F(1, 10**7))
 CLAIM = guarantee(uncertain_plant(REAL), HELD)
 SHORT = ("--duration", "30 s")
 

@@ -18,7 +18,7 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.simulation.slow_sliding import simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, SlidingVariation, Tide
 from quakedesign.studies import single_runs as state_runs
-from quakedesign.studies.single_runs import run_held
+from quakedesign.studies.single_runs import run_sliding
 
 FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "sliding_crustal-patch.json"
 CRUSTAL = qd.load_fault("crustal-patch")
@@ -90,11 +90,13 @@ def test_it_is_for_its_fault_and_as_it_is(capsys, fault, more, said):
 
 def test_a_delay_and_noise_of_the_proof_are_in_the_run(capsys, monkeypatch, tmp_path):
     late = replace(CLAIM, held=replace(CLAIM.held, delay=CLAIM.held.step, slip_noise=F(1, 10**6)))
-    assert run_held(CRUSTAL, claim=late, duration=1000.0)[1]["stages"] == ["delay"]
+    assert run_sliding(CRUSTAL, claim=late, duration=1000.0)[1]["stages"] == ["delay"]
     save_guarantee(late, tmp_path / "late.json")
     monkeypatch.setattr(type(CLAIM), "check", lambda claim: Verdict.PROVED)
     seen = {}
-    monkeypatch.setattr(state_runs, "run_held", lambda fault, **told: seen.update(told) or run_held(fault, **told))
+    monkeypatch.setattr(
+        state_runs, "run_sliding", lambda fault, **told: seen.update(told) or run_sliding(fault, **told)
+    )
     code, out, _ = told(
         capsys, "simulate", "crustal-patch", "--certificate", tmp_path / "late.json", "--duration", "1000 s", "--json"
     )
@@ -145,7 +147,7 @@ def test_a_fault_within_the_box_of_a_proof_runs_with_the_plan_of_the_proof(capsy
     monkeypatch.setattr(type(CLAIM), "check", lambda claim: Verdict.PROVED)
     true = replace(CRUSTAL, friction=replace(CRUSTAL.friction, direct_effect=1.005 * CRUSTAL.friction.direct_effect))
     assert LawOptions(certificate=file).choose(true).claim.task.ranges == wide
-    found = run_held(true, claim=claim, stress=1000.0, duration=3000.0)[0]
+    found = run_sliding(true, claim=claim, stress=1000.0, duration=3000.0)[0]
     expected = simulate_sliding(
         CRUSTAL,
         CLAIM.held.law,

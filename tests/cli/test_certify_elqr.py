@@ -82,9 +82,9 @@ def test_the_slip_alone_is_refused_without_the_elqr(capsys, tmp_path):
 
 
 def test_of_the_slip_alone_the_laws_that_need_more_are_left_out_and_noise_is_for_all():
-    asked = DesignOptions(measured="slip", slip_noise="1/1000000").asked("lab-fault")[1]
+    asked = DesignOptions(measured="slip", slip_noise="1/1000000").problem("lab-fault")[1]
     assert asked["names"] == ["elqr"]
-    assert DesignOptions().asked("lab-fault")[1]["names"] == ["cta", "dia", "elqr"]
+    assert DesignOptions().problem("lab-fault")[1]["names"] == ["cta", "dia", "elqr"]
     assert asked["options"]["setup"] == LoopSetup(measured="slip", slip_noise="1 um")
 
 

@@ -56,7 +56,7 @@ def test_all_laws_of_a_fault_are_designed_in_samples_unless_told(asked, command)
     shown = {"published_scheme": "continuous", "plant": None, "whole_task": False}
     assert more == {**shown, "scheme": None, "options": DEFAULTS}
     assert setup == qd.LoopSetup()
-    assert DesignOptions().asked("lab-fault")[1] == {"names": names, **more, "options": {**DEFAULTS, "setup": setup}}
+    assert DesignOptions().problem("lab-fault")[1] == {"names": names, **more, "options": {**DEFAULTS, "setup": setup}}
 
 
 @pytest.mark.parametrize(

@@ -155,7 +155,7 @@ def test_where_to_look_is_told():
 
 
 def test_options_that_were_given_are_those_that_are_not_none():
-    assert shared.given({"a": None, "b": 0, "c": "", "d": False}) == {"b": 0, "c": "", "d": False}
+    assert shared.specified({"a": None, "b": 0, "c": "", "d": False}) == {"b": 0, "c": "", "d": False}
     assert shared.refuse({"a": None}, "a certificate") is None
     with pytest.raises(ParameterError, match=r"^step, lag cannot be used with a certificate\. Omit step, lag\.$"):
         shared.refuse({"step": 0.0, "delay": None, "lag": 1.0}, "a certificate")

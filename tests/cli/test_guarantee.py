@@ -19,7 +19,7 @@ from quakedesign.cli.options import SetupOptions
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.fault.fault_toml import source_text as load_text
-from quakedesign.guarantees import Held, NoProof, TrackingGuarantee, guarantee
+from quakedesign.guarantees import NoProof, SampledLoop, TrackingGuarantee, guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import linear_design as design
@@ -120,7 +120,7 @@ def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
         np.array((0.6, 1.0, 0.1))
     )
     found = TrackingGuarantee(
-        fault=fault, proof=guarantee(uncertain_plant(fault), Held(law=law, step=late, delay=late))
+        fault=fault, proof=guarantee(uncertain_plant(fault), SampledLoop(law=law, step=late, delay=late))
     )
     assert found.proved
     rows, seen = (np.array(m, dtype=float) for m in (law.update, law.measured))
@@ -289,7 +289,7 @@ def test_what_cannot_be_understood_is_one_line(call, arguments, words):
 def unattacked(monkeypatch):
     """Without the search for the worst, which has tests of its own."""
     module = import_module("quakedesign.guarantees.tracking_result")
-    monkeypatch.setattr(module, "worst_found", lambda *_, **__: None)
+    monkeypatch.setattr(module, "worst_tracking", lambda *_, **__: None)
 
 
 @pytest.mark.slow
@@ -447,16 +447,16 @@ def test_a_well_is_told_by_its_distance_and_the_diffusivity_of_the_rock():
     """(40 m)²/(0.5 m²/s) = 3200 s, exactly."""
     assert SetupOptions(well="40", diffusivity="0.5").setup().diffusion == 3200
     assert SetupOptions(diffusion="7").setup().diffusion == 7
-    told = DesignOptions(well="1/3", diffusivity="2").told()["options"]
-    assert (told["setup"].diffusion, DesignOptions().told()["options"]["setup"]) == (F(1, 18), LoopSetup())
-    behind = DesignOptions(well="40", diffusivity="0.5").asked("real-fault")[1]
+    told = DesignOptions(well="1/3", diffusivity="2").arguments()["options"]
+    assert (told["setup"].diffusion, DesignOptions().arguments()["options"]["setup"]) == (F(1, 18), LoopSetup())
+    behind = DesignOptions(well="40", diffusivity="0.5").problem("real-fault")[1]
     assert behind["names"] == ["elqr"]
     for wrong in ({"well": "40"}, {"diffusivity": "1"}, {"well": "40", "diffusivity": "1", "diffusion": "3"}):
         with pytest.raises(ParameterError, match="needs the distance of the well and the diffusivity"):
             SetupOptions(**wrong).setup()
     for wrong in ({"well": "0", "diffusivity": "1"}, {"well": "40", "diffusivity": "-1"}):
         with pytest.raises(ParameterError, match="must be positive"):
-            DesignOptions(**wrong).told()
+            DesignOptions(**wrong).arguments()
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from quakedesign.cli import main
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.fault.fault_toml import fault_toml
-from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof, sliding_result
+from quakedesign.guarantees import NoProof, SampledLoop, SlidingClaims, SlidingProof, sliding_result
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
@@ -23,7 +23,7 @@ from quakedesign.synthesis import design as synthesise
 from quakedesign.synthesis import state_feedback
 
 LAW = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction(1), Fraction(0)))
-HELD = Held(law=LAW, step=Fraction(300))
+HELD = SampledLoop(law=LAW, step=Fraction(300))
 CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaims.__dataclass_fields__})
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
 NONE = NoProof(reason="too much")

@@ -279,7 +279,7 @@ def test_a_stage_without_options_is_for_python_alone(monkeypatch):
 
 def test_nothing_is_added_unless_it_is_asked_for():
     told = {"averaging": 1, "differentiator_order": 1, "filter_order": 0, "differentiator_steps": 1}
-    assert EstimateOptions().told() == told | {"differentiator_bound": None}
+    assert EstimateOptions().values() == told | {"differentiator_bound": None}
     assert (RunOptions().substeps, RunOptions().step, RunOptions().scheme) == (1, None, None)
 
 
@@ -292,25 +292,25 @@ def test_jitter_has_the_seed_of_the_run():
 
 
 def test_a_stage_is_made_of_its_options_and_no_part_stands_alone():
-    told = ActuatorOptions(diffusion=2.0, storage=3.0).told()
+    told = ActuatorOptions(diffusion=2.0, storage=3.0).values()
     assert options._stage(Delay, told, 0.1) is None
     assert options._stage(Diffusion, told, 0.1).storage == 3.0
     with pytest.raises(
         ParameterError, match=r"^storage needs diffusion\. Received storage 3 .* alone\. Add diffusion, or omit storage"
     ):
-        options._stage(Diffusion, ActuatorOptions(storage=3.0).told(), 0.1)
-    assert options._stage(Diffusion, ActuatorOptions().told(), 0.1) is None
+        options._stage(Diffusion, ActuatorOptions(storage=3.0).values(), 0.1)
+    assert options._stage(Diffusion, ActuatorOptions().values(), 0.1) is None
 
 
 @pytest.mark.parametrize(("order", "text", "value"), [(1, "2", 2.0), (1, "3 mm/s^2", 0.003), (2, "3 mm/s^3", 0.003)])
 def test_the_bound_of_a_differentiator_has_the_unit_of_its_order(order, text, value):
     found = EstimateOptions(differentiator_bound=text, differentiator_order=order)
     assert found.bound == value
-    told = found.told()
+    told = found.values()
     assert (told["differentiator_bound"], told["averaging"], told["differentiator_order"]) == (value, 1, order)
     assert EstimateOptions().bound is None
     with pytest.raises(UnitError, match="differentiator bound"):
-        EstimateOptions(differentiator_bound="3 mm/s^3", differentiator_order=1).told()
+        EstimateOptions(differentiator_bound="3 mm/s^3", differentiator_order=1).values()
 
 
 def test_a_sensor_is_made_of_its_options():
@@ -406,16 +406,16 @@ def test_a_designed_elqr_alone_controls_friction_with_a_state(controller, gains,
 
 
 def test_what_has_no_meaning_with_a_state_is_named():
-    told = options._told(CRUSTAL, {"drift": 1.0, "method": "idas", "json": True, "out": "a"}, options._FREE)
+    told = options._named(CRUSTAL, {"drift": 1.0, "method": "idas", "json": True, "out": "a"}, options._FREE)
     assert told == {"loading_rate": 1.0, "method": "idas"}
     with pytest.raises(
         ParameterError, match=r"^scheme, averaging cannot be used for friction with a state without control\."
     ):
-        options._told(CRUSTAL, {"scheme": "explicit", "averaging": 2, "plant": "smooth"}, options._FREE)
+        options._named(CRUSTAL, {"scheme": "explicit", "averaging": 2, "plant": "smooth"}, options._FREE)
     with pytest.raises(
         ParameterError, match=r"^drift cannot be used for friction with a state with control\. .*, saturation and"
     ):
-        options._told(CRUSTAL, {"drift": 1.0}, options._HELD, ("saturation",))
+        options._named(CRUSTAL, {"drift": 1.0}, options._HELD, ("saturation",))
 
 
 def test_spread_and_stress_are_for_friction_with_a_state(monkeypatch):
@@ -508,7 +508,7 @@ def run_with_state(monkeypatch, tmp_path, capsys):
 
         return run
 
-    for kind in ("held", "state"):
+    for kind in ("sliding", "state"):
         monkeypatch.setattr(runs, f"run_{kind}", done(kind))
     for name in ("sliding_run_lines", "state_run_lines"):
         monkeypatch.setattr(f"quakedesign.report.sentences.{name}", lambda answer, name=name: [name, str(answer)])
@@ -526,30 +526,30 @@ def run_with_state(monkeypatch, tmp_path, capsys):
     [
         ((), "state", {}),
         (("--drift", "1 mm/s", "--hold", "2 s"), "state", {"loading_rate": 0.001, "hold": 2.0}),
-        (("--controller", "elqr"), "held", {"stages": (), "transducer": None}),
-        (("--controller", "elqr", "--seed", "3"), "held", {"stages": (), "transducer": None}),
+        (("--controller", "elqr"), "sliding", {"stages": (), "transducer": None}),
+        (("--controller", "elqr", "--seed", "3"), "sliding", {"stages": (), "transducer": None}),
         (
             ("--controller", "elqr", "--lag", "2 s", "--stress", "1 kPa"),
-            "held",
+            "sliding",
             {"stages": (), "transducer": None, "lag": 2.0, "stress": 1e3},
         ),
         (
             ("--controller", "elqr", "--slip-noise-deviation", "1 um", "--seed", "3", "--saturation", "1 MPa"),
-            "held",
+            "sliding",
             {"stages": (Saturation(lowest=-1e6, highest=1e6),), "transducer": Transducer(deviation=1e-6, seed=3)},
         ),
         (
             ("--controller", "elqr", "--slip-quantum", "1 um", "--step", "2 s"),
-            "held",
+            "sliding",
             {"stages": (), "transducer": Transducer(quantum=1e-6), "step": 2.0},
         ),
     ],
 )
-def test_a_run_with_a_state_is_free_or_held(run_with_state, given, kind, told):
+def test_a_run_with_a_state_is_free_or_sliding(run_with_state, given, kind, told):
     code, out, asked, saved = run_with_state(*given)
     assert (code, saved) == (0, kind)
     assert asked == {**told, "kind": kind}
-    lines = "sliding_run_lines" if kind == "held" else "state_run_lines"
+    lines = "sliding_run_lines" if kind == "sliding" else "state_run_lines"
     assert out.splitlines() == ["the run", f"  {lines}", f"  { ({'kind': kind}) }"]
     assert json.loads(run_with_state(*given, "--json")[1]) == {"kind": kind}
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, SlowGain
+from quakedesign.guarantees import SampledLoop, SlowGain
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import summed_integrals
@@ -37,7 +37,7 @@ def random_task(number: int) -> tuple[FaultPlant, F]:
     ), F(f"{random.uniform(0.05, 0.3):.3f}")
 
 
-def random_loop(number: int) -> tuple[FaultPlant, Held, SlowGain | None] | None:
+def random_loop(number: int) -> tuple[FaultPlant, SampledLoop, SlowGain | None] | None:
     """A loop of any kind, with a delay, a lag, rock, noise and a start or without; None where there is no law."""
     random = np.random.default_rng(10**6 + number)
     task, step = random_task(number)
@@ -76,4 +76,4 @@ def random_loop(number: int) -> tuple[FaultPlant, Held, SlowGain | None] | None:
         return None
     if random.random() < 0.3:
         slow = SlowGain(parts=int(random.integers(1, 4)), growth=short(random.uniform(0.01, 0.1) / period))
-    return task, Held(law=law, step=step, **around), slow
+    return task, SampledLoop(law=law, step=step, **around), slow

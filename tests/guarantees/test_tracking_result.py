@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import TrackingGuarantee, WorstCase, attacked, guarantee
+from quakedesign.guarantees import TrackingGuarantee, WorstCase, guarantee, with_worst_case
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -28,8 +28,8 @@ def stuck(monkeypatch, slip, rate):
     """Answer where a search on the sticking fault ends at these errors."""
     seen = WorstCase(slip_error=slip, slip_rate_error=rate)
     quiet = WorstCase(slip_error=0.0, slip_rate_error=0.0)
-    monkeypatch.setattr(MODULE, "worst_found", lambda _, sticks=False: seen if sticks else quiet)
-    return attacked(load_fault("real-fault"), SLOW)
+    monkeypatch.setattr(MODULE, "worst_tracking", lambda _, sticks=False: seen if sticks else quiet)
+    return with_worst_case(load_fault("real-fault"), SLOW)
 
 
 def test_claims_that_no_course_leaves_stay(monkeypatch):

@@ -26,7 +26,7 @@ def test_what_is_not_kept_is_derived(monkeypatch):
     name, found = field_of(bare)
     assert (name, found.field) == ("custom", {"x": (Term(F(-2), (), (("x", F(1), "s"),)),)})
     expected = field_of("cta")
-    monkeypatch.setattr(known_fields, "_kept", dict)
+    monkeypatch.setattr(known_fields, "_stored", dict)
     assert field_of("cta") == expected
     assert is_law("cta")
     assert not is_law("nothing")

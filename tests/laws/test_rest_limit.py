@@ -13,8 +13,8 @@ from quakedesign import simulate
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, guarantee
-from quakedesign.guarantees.search.worst_case import _Limit, _searched, worst_found
+from quakedesign.guarantees import SampledLoop, guarantee
+from quakedesign.guarantees.search.worst_case import _Limit, _searched, worst_tracking
 from quakedesign.laws import (
     ErrorModel,
     RestLimit,
@@ -48,7 +48,7 @@ LOOSE = RestLimit(width=F(100), per_slip=F(7), resolution=F(10**9))  # wherever 
 def proved():
     model = ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), GAIN)
     law = disturbance_estimate(GAINS, F("0.57"), model)
-    return guarantee(uncertain_plant(REAL), Held(law=law, step=STEP))
+    return guarantee(uncertain_plant(REAL), SampledLoop(law=law, step=STEP))
 
 
 def stepped(controller, z, slip_error, rate_error, reference):
@@ -217,10 +217,10 @@ def test_a_guarantee_cuts_off_what_it_proves_never_to_be_passed(proved):
 @pytest.mark.slow
 def test_where_the_fault_sticks_no_course_takes_the_pressure_beyond_what_is_certified(proved):
     """The limit at rest alone allows twice the proved |p − p*|: before, courses left the interval."""
-    seen, claims = worst_found(proved, sticks=True), proved.claims
+    seen, claims = worst_tracking(proved, sticks=True), proved.claims
     assert claims.least_pressure <= seen.least_pressure < 0.97 * claims.least_pressure
     assert 0.97 * claims.largest_pressure < seen.largest_pressure <= claims.largest_pressure
-    assert worst_found(proved).pressures is None
+    assert worst_tracking(proved).pressures is None
 
 
 def test_an_independent_adversary_does_not_leave_the_certified_pressure(proved):
@@ -307,7 +307,7 @@ def test_what_the_adversary_cuts_off_moves_all_that_stands_at_the_valve(proved):
         claims = replace(proved.claims, **(asked if behind else {}))
         claim = replace(proved, claims=claims, held=replace(proved.held, **around))
         states = claim.loop.states
-        told = _Limit.of(claim, claim.held, len(states) + 1, np.zeros(1)).told
+        told = _Limit.of(claim, claim.held, len(states) + 1, np.zeros(1)).correction
         expected |= {name: float(v / proved.task.authority) for name, v in own.items()}
         assert told == pytest.approx([expected.get(name, 0.0) for name in (*states, "disturbance of the class")])
 

@@ -15,7 +15,7 @@ from thinned import few
 from quakedesign import assess, simulate
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, TrackingProof, guarantee
+from quakedesign.guarantees import SampledLoop, TrackingProof, guarantee
 from quakedesign.laws import (
     ErrorModel,
     SampledController,
@@ -37,7 +37,7 @@ LAW = disturbance_estimate(
     F("0.57"),
     ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
-HELD = Held(law=LAW, step=STEP)
+HELD = SampledLoop(law=LAW, step=STEP)
 
 
 def test_a_run_asks_for_the_pressure_of_the_matrices():
@@ -95,7 +95,7 @@ OBSERVER = slip_observer(
 
 def test_a_run_of_the_slip_alone_asks_for_the_pressure_of_the_matrices_and_for_that_of_the_noisy_slip():
     """Without noise, and within what noise of a bound makes of it by the law's own gains."""
-    controller = Held(law=OBSERVER, step=STEP).controller
+    controller = SampledLoop(law=OBSERVER, step=STEP).controller
     run = simulate(REAL, controller, duration=18.4, samples=101)
     assert np.allclose(run.pressure, recursion(run, OBSERVER), rtol=1e-9, atol=1e-6)
     noise = Measurement(slip_noise=1e-6, rate_noise=1.0, bounded=True)
@@ -205,7 +205,7 @@ def test_its_expressions_are_those_of_the_matrices():
     every=2,
 )
 def test_what_a_law_is_designed_for_stands_in_every_run_unless_told(around, stages, substeps):
-    law, told = Held(law=LAW, step=STEP, **around).controller, Actuator(stages=stages)
+    law, told = SampledLoop(law=LAW, step=STEP, **around).controller, Actuator(stages=stages)
     short = {"duration": 9.2, "samples": 51}
     own, same = simulate(REAL, law, **short), simulate(REAL, law, actuator=told, substeps=substeps, **short)
     free = simulate(REAL, law, actuator=Actuator(), **short)
@@ -221,7 +221,7 @@ def test_what_a_law_is_designed_for_stands_in_every_run_unless_told(around, stag
 @few("delay", [STEP / 3, STEP + F(1, 10)], every=2)
 def test_a_pressure_arrives_between_samples(delay, lag):
     """The law by its recursion, the plant by SciPy between changes of the pressure; friction has a kink at slip 0."""
-    law, periods = Held(law=LAW, step=STEP, delay=delay, lag=lag).controller, 10
+    law, periods = SampledLoop(law=LAW, step=STEP, delay=delay, lag=lag).controller, 10
     told = {"duration": periods * float(STEP), "samples": periods + 1, "initial_slip_rate": 1e-5}
     run = simulate(REAL, law, substeps=16, **told, plant="printed")
     plant, reference = ClosedLoop(REAL, law).plant, ClosedLoop(REAL, law).reference
@@ -251,7 +251,7 @@ def test_a_pressure_arrives_between_samples(delay, lag):
 
 
 def test_a_verdict_on_a_law_of_samples_is_about_what_it_is_designed_for():
-    late = Held(law=LAW, step=STEP, lag=F(1, 50))
+    late = SampledLoop(law=LAW, step=STEP, lag=F(1, 50))
     found = assess(REAL, late.controller).guarantee
     assert found.held.lag == F(1, 50)
     assert found.claims.slip_rate_error > assess(REAL, HELD.controller).guarantee.claims.slip_rate_error

@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.cli.options import SetupOptions
 from quakedesign.errors import ParameterError, UnitError
-from quakedesign.guarantees.exact.sampled_loop import ExactSetup, Held
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup, SampledLoop
 from quakedesign.laws import summed_integrals
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Pump, quantities
 
@@ -56,7 +56,7 @@ def test_what_is_given_reaches_the_loop_and_the_delay_counts_from_the_middle_of_
         F(1, 10**7),
     )
     assert held.pump == Pump(least=F(0), largest=F(5))
-    assert ExactSetup.of(IDEAL).held(law, F(1, 10)) == Held(law=law, step=F(1, 10))
+    assert ExactSetup.of(IDEAL).held(law, F(1, 10)) == SampledLoop(law=law, step=F(1, 10))
 
 
 def test_every_quantity_is_an_option_with_its_unit_and_help():

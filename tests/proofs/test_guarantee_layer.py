@@ -10,7 +10,7 @@ from standalone_guarantee import checker
 from thinned import few
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, SlowGain, TrackingProof, guarantee
+from quakedesign.guarantees import SampledLoop, SlowGain, TrackingProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.small_gain import grown
@@ -26,7 +26,7 @@ LAW = disturbance_estimate(
     F("0.1"),
     ErrorModel.delayed(((F(1), F(0)), (F("0.07"), F("0.752"))), ((F(0), F("0.16")),), F("2.282e-8")),
 )
-HELD = Held(law=LAW, step=STEP, diffusion=F("0.1"))
+HELD = SampledLoop(law=LAW, step=STEP, diffusion=F("0.1"))
 OUTPUTS = ("slip_error", "slip_rate_error", "push", "left_out", "asked")
 ORDER = ("acceleration", "drift", "left_out", "awaited", "awaited_told")
 

@@ -13,7 +13,7 @@ from thinned import few
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees import Bounds, Claims, ContinuousProof, Held, TrackingProof
+from quakedesign.guarantees import Bounds, Claims, ContinuousProof, SampledLoop, TrackingProof
 from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import channels_of
@@ -111,7 +111,7 @@ def some_held(random):
     noise = {f"{name}_noise": random.choice([F(0), some(random, 0, 9, 4)]) for name in ("slip", "rate")}
     if law.of_slip_alone:
         noise["rate_noise"] = F(0)
-    return Held(law=law, step=step, delay=delay, lag=random.choice([F(0), F(1, 3)]), **noise)
+    return SampledLoop(law=law, step=step, delay=delay, lag=random.choice([F(0), F(1, 3)]), **noise)
 
 
 def off_schedule(held, number):
@@ -339,9 +339,9 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkey
         assert (theirs is None) == (not isinstance(found, Bounds))
         if theirs:
             proved += 1
-            each = found.slip_error, found.slip_rate_error, found.push, found.asked, found.stepped
+            each = found.slip_error, found.slip_rate_error, found.push, found.valve_push, found.stepped
             assert theirs[0] == [v for v in each if v is not None]
-            assert (found.asked is None, found.stepped is None) == (not asked, not late)
+            assert (found.valve_push is None, found.stepped is None) == (not asked, not late)
             assert abs(theirs[1] - found.small_gain) <= max(found.small_gain / 2**19, F(1, 2**40))
     assert 2 < proved < 8
     assert not held or entered == 8 * [name in ("root", *NOISES) for name in names]  # with the sample alone

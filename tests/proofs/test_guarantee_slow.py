@@ -15,7 +15,7 @@ from standalone_guarantee import checker
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, NoProof, SlowGain, TrackingProof, guarantee
+from quakedesign.guarantees import NoProof, SampledLoop, SlowGain, TrackingProof, guarantee
 from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import Bounds, grown, slow_gains
@@ -31,7 +31,7 @@ LAW = disturbance_estimate(
     F("0.1"),
     ErrorModel.delayed(((F(1), F(0)), (F("0.07"), F("0.752"))), ((F(0), F("0.16")),), GAIN),
 )
-HELD = Held(law=LAW, step=STEP)
+HELD = SampledLoop(law=LAW, step=STEP)
 BETA = tuple(map(float, TASK.beta))
 SLOPE = TASK.friction.weakening * TASK.area_per_mass[1] / TASK.authority
 

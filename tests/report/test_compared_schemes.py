@@ -51,7 +51,9 @@ def compared(kept):
 def test_a_search_of_other_sampling_times_is_named_only_where_there_was_one():
     none = NoProof(reason="the gain is 2")
     in_continuous_time = undecided(SHORT, published("lab-fault")["elqr"])
-    lines = [study._answer(SHORT, replace(in_continuous_time, runs=runs), given=False).lines() for runs in (None, none)]
+    lines = [
+        study._guarantee_of(SHORT, replace(in_continuous_time, runs=runs), given=False).lines() for runs in (None, none)
+    ]
     assert [len(one) for one in lines] == [1, 2]
     assert lines[1][1].startswith("no T_s was found for which a design is proved")
 

@@ -180,7 +180,7 @@ def test_a_brief_account_leaves_out_what_holds_and_says_once_what_is_the_same(co
     assert max(map(len, brief.getvalue().splitlines())) <= 80
     entries = (*comparison.of("designed"), *comparison.of("published"))
     assert any(p.holds for entry in entries for p in entry.design.premises)
-    shared = {line for entry in entries if entry.answer for line in entry.answer.limit_lines()}
+    shared = {line for entry in entries if entry.guarantee for line in entry.guarantee.limit_lines()}
     assert shared
     whole, brief = (" ".join(out.getvalue().split()) for out in (whole, brief))
     assert " holds: required" in whole
@@ -195,7 +195,7 @@ def test_the_overview_has_lines_at_the_proved_bound_the_worst_case_and_the_limit
     (designed,) = comparison.of("designed")
     rate, slip = comparison.figures()["overview"].axes
     levels = {line.get_label(): line.get_ydata()[0] for line in rate.lines if len(set(line.get_ydata())) == 1}
-    answer = designed.answer
+    answer = designed.guarantee
     bounds = [value for label, value in levels.items() if "proved" in label]
     assert bounds == [float(answer.proof.peak_slip_rate)]
     assert [v for label, v in levels.items() if "worst case" in label] == [answer.worst.slip_rate_error]
@@ -209,9 +209,9 @@ def test_the_overview_has_lines_at_the_proved_bound_the_worst_case_and_the_limit
 
 def test_the_overview_is_of_the_design_with_the_smallest_proved_bound(comparison):
     (best,) = comparison.of("designed")
-    claims = replace(best.answer.proof.claims, peak_slip_rate=UpperBound(1))
-    answer = replace(best.answer, proof=replace(best.answer.proof, claims=claims))
-    worse = replace(best, label="worse", answer=answer)
+    claims = replace(best.guarantee.proof.claims, peak_slip_rate=UpperBound(1))
+    answer = replace(best.guarantee, proof=replace(best.guarantee.proof, claims=claims))
+    worse = replace(best, label="worse", guarantee=answer)
     both = Comparison(fault=comparison.fault, uncontrolled=comparison.uncontrolled, entries=(worse, best))
     lines = {line.get_label(): line for line in overview(both).axes[0].lines}
     assert best.label in lines

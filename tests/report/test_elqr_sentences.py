@@ -13,7 +13,7 @@ from quakedesign.linear.sampled_stability import HeldLoop, LargestVaryingStep, V
 from quakedesign.loop import exact_integrals
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
-from quakedesign.report.sentences import held_sentences, margin_lines, peaks_sentence
+from quakedesign.report.sentences import hold_sentences, margin_lines, peaks_sentence
 
 LONGEST = LargestVaryingStep(proved=LowerBound("0.15769"), refuted=UpperBound("0.15822"), proofs=())
 
@@ -34,7 +34,7 @@ def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
     ],
 )  # fmt: skip
 def test_a_held_pressure(loop, said):
-    assert said in "; ".join(held_sentences(loop))
+    assert said in "; ".join(hold_sentences(loop))
 
 
 def test_peaks_of_one_or_no_class():

@@ -78,11 +78,11 @@ def test_rows_have_columns_of_their_own_for_screened_and_proved(made_up):
 
 
 def test_facts_count_what_is_there(made_up, drawn):
-    facts = report.gain_map_facts(made_up)
+    facts = report.gain_map_values(made_up)
     assert (facts["points"], facts["screened"], facts["proved"], facts["tried"]) == (4, 3, 1, 2)
     assert facts["levels"] == [{"lipschitz": "1/2", "screened": 3, "proved": 1, "edge": 2, "edge_proved": 0}]
     assert (facts["gains"], facts["units"]["k2"]) == ({}, "m/s^3")
-    json.dumps(report.gain_map_facts(drawn), allow_nan=False)
+    json.dumps(report.gain_map_values(drawn), allow_nan=False)
     assert "3 points screened (floating point), 1 proved exactly" in report.gain_map_lines(made_up)[1]
 
 

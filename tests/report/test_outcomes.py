@@ -124,7 +124,7 @@ def test_a_held_pressure_is_not_what_is_proved(slow):
     runs = SimpleNamespace(verdict=Verdict.REFUTED)
     unstable = HeldLoop(runs=runs, longest=None, radius=1.1)
     assert (
-        grade(entry(slow, FINE, held=unstable))
+        grade(entry(slow, FINE, zero_order_hold=unstable))
         == "proved for this loop and task; UNSTABLE with zero-order hold over T_s"
     )
 

@@ -11,7 +11,7 @@ from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.linear.verdict import judge
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.premises import Premise
-from quakedesign.report.sentences import domain_sentence, held_sentences, peaks_sentence, sentences, verdict_lines
+from quakedesign.report.sentences import domain_sentence, hold_sentences, peaks_sentence, sentences, verdict_lines
 from quakedesign.report.terminal import _line
 from quakedesign.studies.comparison import Entry
 
@@ -55,7 +55,7 @@ def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
     for pattern, bounds in expected.items():
         shown = numbers(pattern, said)
         assert all(outward(bound, text) for bound, text in zip(bounds, shown, strict=True)), pattern
-    assert "; ".join(held_sentences(held)) in said
+    assert "; ".join(hold_sentences(held)) in said
     assert peaks_sentence({"rate": peaks}) in said
 
 

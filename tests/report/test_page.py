@@ -200,7 +200,7 @@ def test_the_report_says_behind_what_its_runs_are():
 def test_a_linear_law_is_shown_as_difference_equation_and_for_python_control():
     """The text for python-control builds the law of the certificate, matrix by matrix."""
     found = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
-    entry = SimpleNamespace(guaranteed=found)
+    entry = SimpleNamespace(proof=found)
     names = {}
     exec("\n".join(page._python(entry)), names)
     law, own = names["law"], found.held.law
@@ -212,19 +212,19 @@ def test_a_linear_law_is_shown_as_difference_equation_and_for_python_control():
     assert len(equations) == 2
     assert f"{float(own.feedback[0]):.4g}".split("e")[0].lstrip("-") in equations[1]
     sliding = parse_guarantee((PROOFS / "guarantee_cta_real-fault.json").read_text())
-    implicit = SimpleNamespace(guaranteed=sliding)
+    implicit = SimpleNamespace(proof=sliding)
     assert page._python(implicit) == page._difference(implicit) == []
     large = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    many = SimpleNamespace(guaranteed=large)
+    many = SimpleNamespace(proof=large)
     assert len(large.held.law.states) > 4
     assert page._python(many)
     assert page._difference(many) == []
-    assert page._python(SimpleNamespace(guaranteed=None)) == []
+    assert page._python(SimpleNamespace(proof=None)) == []
 
 
 def test_controllers_of_which_everything_is_the_same_share_a_card():
     empty = {"badge": "b", "good": True, "limits": [], "proof": [], "law": [], "python": [], "gains": []}
-    empty |= {"premises": [], "base_premises": [], "known": []}
+    empty |= {"premises": [], "base_premises": [], "feedforward": []}
     made = [
         page.Account(label=label, guarantee=guarantee, run=["r"], verdict=["v"], **empty)
         for label, guarantee in [

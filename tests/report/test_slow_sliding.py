@@ -67,11 +67,11 @@ def folder(comparison, tmp_path_factory):
 
 def test_the_run_is_told_by_the_outcomes_of_all_faults_and_stays_inside_its_guarantee(comparison):
     (entry,) = comparison.entries
-    run, claims = entry.run, entry.guaranteed.claims
+    run, claims = entry.run, entry.proof.claims
     assert run.outcome.kind == "tracked"
-    assert run.outcome.peak_slip_rate == np.max(run.slip_rate) < entry.guaranteed.peak_slip_rate
+    assert run.outcome.peak_slip_rate == np.max(run.slip_rate) < entry.proof.peak_slip_rate
     assert run.metrics.max_slip_error <= np.max(np.abs(run.slip - 1e-6 * run.time)) <= claims.slip_error
-    assert float(np.max(run.stress)) == pytest.approx(float(entry.guaranteed.task.stress), rel=1e-4)
+    assert float(np.max(run.stress)) == pytest.approx(float(entry.proof.task.stress), rel=1e-4)
     late = run.slip_error[run.time > 7.5e4]
     assert run.metrics.rms_slip_error == pytest.approx(np.linalg.norm(late) / len(late) ** 0.5, rel=1e-12)
     assert run.metrics.settled_from == 7.5e4
@@ -84,8 +84,8 @@ def test_the_folder_holds_the_certificate_the_figures_and_the_keys_of_all_design
     elqr = found["controllers"]["elqr"]
     assert elqr["verdict"] == "proved"
     assert elqr["outcome"]["kind"] == "tracked"
-    assert elqr["guarantee"]["stress"] == str(comparison.entries[0].guaranteed.task.stress)
-    assert parse_guarantee((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].guarantee.claims
+    assert elqr["guarantee"]["stress"] == str(comparison.entries[0].proof.task.stress)
+    assert parse_guarantee((folder / elqr["certificate"]).read_text()).claims == comparison.entries[0].proof.claims
     assert found["uncontrolled"]["cycle"] == {"recurrence_interval": None, "slip": None, "magnitude": None}
     assert set(found["not_applicable"]) == {"cta", "dia"}
     assert {path.stem for path in (folder / "figures").iterdir()} == {
@@ -110,10 +110,10 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     assert said.startswith(f"crustal-patch: guaranteed. {proved}")
     assert "the slip stays within 83.3 µm of the reference" in said
     (row,) = (line.split() for line in lines if line.startswith("e-LQR  "))
-    claims, worst = comparison.entries[0].guarantee.claims, comparison.entries[0].answer.worst
-    assert row[2] == f"{UpperBound(10**6 * Fraction(comparison.entries[0].guarantee.peak_slip_rate)):.3g}"
-    assert row[3] == f"{1e6 * math.exp(worst.log_rate) * float(comparison.entries[0].guarantee.task.rate):.3g}"
-    ends = comparison.entries[0].guarantee.valve_pressures
+    claims, worst = comparison.entries[0].proof.claims, comparison.entries[0].guarantee.worst
+    assert row[2] == f"{UpperBound(10**6 * Fraction(comparison.entries[0].proof.peak_slip_rate)):.3g}"
+    assert row[3] == f"{1e6 * math.exp(worst.log_rate) * float(comparison.entries[0].proof.task.rate):.3g}"
+    ends = comparison.entries[0].proof.valve_pressures
     assert [row[-3], row[-1]] == [f"{type(end)(Fraction(end) / 10**6):.3g}" for end in ends]
     assert "Without control: the fault creeps" in said
     assert "Run and proof begin in steady sliding at V = 1 µm/s; bringing a locked fault there is not covered" in said
@@ -135,7 +135,7 @@ def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(compar
     why = (
         "no law with a hold over 300 s was found whose loop is stable; a proof was found for a stress of at most 7 kPa"
     )
-    guarantee = comparison.entries[0].guarantee
+    guarantee = comparison.entries[0].proof
     none = SlidingGuarantee(proof=NoProof(reason=why), task=guarantee.task, held=None)
     monkeypatch.setattr(state_feedback, "guarantee_sliding", lambda fault, **asked: none)
     monkeypatch.setattr(compared_in, "natural_run", lambda fault: comparison.uncontrolled)
@@ -316,7 +316,7 @@ def test_figures_of_slow_sliding_show_rates_over_the_reference_and_errors_with_t
     rate = slow_sliding(entry, entry.run).axes[1]
     assert (rate.get_yscale(), rate.get_ylabel()) == ("linear", "slip rate / V [-]")
     (never,) = (line.get_ydata()[0] for line in rate.lines if line.get_label() == "never exceeded, proved")
-    assert never == pytest.approx(float(entry.guaranteed.peak_slip_rate) / 1e-6)
+    assert never == pytest.approx(float(entry.proof.peak_slip_rate) / 1e-6)
     slip, speed = errors(entry, entry.run).axes
     assert (slip.get_yscale(), slip.get_ylabel(), speed.get_ylabel()) == (
         "linear",
@@ -344,7 +344,7 @@ def test_of_a_slow_task_the_beginning_is_run_and_the_report_says_so(comparison, 
     run = state_runs.designed_run(entry.design, None, lambda done: None)
     assert 0 <= run.time[-1] - 3 * ageing <= 300
     lowest = np.interp(3 / 4 * (3 * ageing / 4), run.time, run.stress)  # of a sine whose period is a quarter of the run
-    assert lowest == pytest.approx(-float(entry.guaranteed.task.stress), rel=1e-3)
+    assert lowest == pytest.approx(-float(entry.proof.task.stress), rel=1e-3)
     said = "shown: the first 2.43e+04 s (6.75 hours) of 3e+05 s (3.47 days); --whole-task runs all of it"
     assert part_of_task(run, SHORT) == said
     assert said in sentences(replace(entry, run=run))

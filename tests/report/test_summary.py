@@ -57,7 +57,12 @@ def made(**changes):
             pressure=(-0.8e6, 0.2),
         ),
     )
-    parts = {"answer": "f: guaranteed", "rows": rows, "conditions": "e-LQR, proved: " + "from rest " * 20, "notes": ()}
+    parts = {
+        "guarantee": "f: guaranteed",
+        "rows": rows,
+        "conditions": "e-LQR, proved: " + "from rest " * 20,
+        "notes": (),
+    }
     return Summary(**(parts | changes))
 
 
@@ -116,9 +121,9 @@ def entry(label, peak=None, slip=None, *, compensation=None, origin="designed", 
         conditions=(),
         details={},
     )
-    named = {"label": label, "origin": origin, "guaranteed": found or None, "answer": answer, "run": run}
+    named = {"label": label, "origin": origin, "proof": found or None, "guarantee": answer, "run": run}
     named |= {"given": given, "kind": "given" if given else origin}
-    return SimpleNamespace(**named, design=design, held=None, growth_per_step=None, peaks={})
+    return SimpleNamespace(**named, design=design, zero_order_hold=None, growth_per_step=None, peaks={})
 
 
 def compared(monkeypatch, *entries, natural="earthquake"):
@@ -140,27 +145,27 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
     said = summary(
         compared(monkeypatch, entry("A (designed)", "3e-4", "1e-5"), entry("B (designed)", "1/7000", "2e-5"))
     )
-    assert said.answer == (
+    assert said.guarantee == (
         "mine: guaranteed. With the B (designed) the slip rate never exceeds 143 µm/s (1.5 % of the natural "
         "earthquake's 10 mm/s, magnitude 5.2), and the slip stays within 20 µm of the reference, which moves 50 mm in "
         "5 days"
     )
     unknown = compared(monkeypatch, entry("B (designed)", "1/7000", "2e-5"))
     unknown.fault.magnitude = float("nan")
-    assert "(1.5 % of the natural earthquake's 10 mm/s)," in summary(unknown).answer
+    assert "(1.5 % of the natural earthquake's 10 mm/s)," in summary(unknown).guarantee
     assert said.conditions == "B (designed), proved: the sentence of B (designed)"
     assumed, box, model, limit = said.notes
     assert model.startswith("model: one block under a uniform pressure")
     assert (assumed, limit) == ("assumed: a well", "no controller does better")
     assert box.startswith("box paper: every friction from 0.2353 to 0.3353")
     stable = summary(compared(monkeypatch, entry("A (designed)", 3e-4, 1e-5), natural="creep"))
-    assert "earthquake" not in stable.answer
+    assert "earthquake" not in stable.guarantee
 
 
 def test_the_worst_case_on_the_stick_slip_plant_is_reported_with_why_nothing_is_proved_there(monkeypatch):
     one = entry("A (designed)", "3e-4", "1e-5")
-    one.answer.worst_with_stick = WorstCase(slip_error=1.2e-6, slip_rate_error=3e-5)
-    one.answer.not_at_rest = "T_s is too long"
+    one.guarantee.worst_with_stick = WorstCase(slip_error=1.2e-6, slip_rate_error=3e-5)
+    one.guarantee.not_at_rest = "T_s is too long"
     (note,) = (note for note in summary(compared(monkeypatch, one)).notes if "stick-slip" in note)
     assert note == (
         "worst case found on the stick-slip plant: slip error 1.2 µm, slip-rate error 30 µm/s; no proof there: T_s is "
@@ -173,14 +178,14 @@ def test_proofs_without_stick_are_named_where_the_best_one_is_with_it(monkeypatc
     folder = Path(__file__).parents[2] / "proofs" / "certificates"
     stick, plain = (qd.load_guarantee(folder / f"{name}_real-fault.json") for name in ("stick_slip", "guarantee"))
     one, two, three = (entry(f"{name} (designed)", "1e-4", "1e-5") for name in "ABC")
-    one.guaranteed, two.guaranteed, three.guaranteed = stick, plain, plain
+    one.proof, two.proof, three.proof = stick, plain, plain
     said = summary(compared(monkeypatch, one, two, three))
-    assert ". With the A (designed) the slip rate" in said.answer
-    assert ", whether the fault slides or sticks, and the slip stays" in said.answer
+    assert ". With the A (designed) the slip rate" in said.guarantee
+    assert ", whether the fault slides or sticks, and the slip stays" in said.guarantee
     assert "B, C: proved on the plant without stick" in said.notes
     without = summary(compared(monkeypatch, two, three))
-    assert ". On the plant without stick, with the B (designed), the slip rate" in without.answer
-    assert "whether the fault slides or sticks" not in without.answer
+    assert ". On the plant without stick, with the B (designed), the slip rate" in without.guarantee
+    assert "whether the fault slides or sticks" not in without.guarantee
     assert not any("proved on the plant without stick" in note for note in without.notes)
     assert not any("proved on the plant" in note for note in summary(compared(monkeypatch, one)).notes)
 
@@ -189,7 +194,7 @@ def test_a_share_is_rounded_up_from_the_numbers_themselves(monkeypatch):
     """0.109/12.4996 = 0.87203 %, which is less over 12.5, the earthquake as it is printed."""
     one = compared(monkeypatch, entry("A (designed)", "0.000109", "1e-5"))
     one.uncontrolled.outcome.peak_slip_rate = 0.0124996
-    assert "(0.88 % of the natural earthquake's 12.5 mm/s, magnitude 5.2)" in summary(one).answer
+    assert "(0.88 % of the natural earthquake's 12.5 mm/s, magnitude 5.2)" in summary(one).guarantee
 
 
 def test_a_design_for_another_sampling_time_is_not_said_to_be_guaranteed(monkeypatch):
@@ -197,9 +202,9 @@ def test_a_design_for_another_sampling_time_is_not_said_to_be_guaranteed(monkeyp
     other, own = entry("A (designed)", "1e-4", "1e-5"), entry("B (designed)", "2e-4", "1e-5")
     other.design.other_step = 2
     other.design.other_step_first = "not guaranteed at T_s = 0.1 s; designed for T_s = 0.05 s"
-    said = summary(compared(monkeypatch, other)).answer
+    said = summary(compared(monkeypatch, other)).guarantee
     assert said.startswith("mine: not guaranteed at T_s = 0.1 s; designed for T_s = 0.05 s. With the A (designed) the")
-    assert summary(compared(monkeypatch, other, own)).answer.startswith("mine: guaranteed. With the B (designed)")
+    assert summary(compared(monkeypatch, other, own)).guarantee.startswith("mine: guaranteed. With the B (designed)")
 
 
 @pytest.mark.parametrize(
@@ -241,7 +246,7 @@ def test_numbers_of_any_size_stay_apart():
 
 def test_without_a_guarantee_each_reason_is_given(monkeypatch):
     said = summary(compared(monkeypatch, entry("A (designed)"), entry("B (designed)")))
-    assert said.answer == "mine: no guarantee for any designed controller"
+    assert said.guarantee == "mine: no guarantee for any designed controller"
     assert said.conditions.split("; ") == [
         "A (designed): none: the reason of A (designed)",
         "B (designed): none: the reason of B (designed)",
@@ -256,10 +261,10 @@ def test_a_design_without_a_guarantee_beside_one_that_has_it_is_named(monkeypatc
 
 def test_a_given_law_without_a_guarantee_has_its_reason_and_is_no_design(monkeypatch):
     known, other = entry("A (given)", given=True), entry("B (given)", 3e-4, 1e-5, given=True)
-    assert summary(compared(monkeypatch, known)).answer == "mine: no guarantee for any given controller"
-    both = summary(compared(monkeypatch, entry("C (designed)"), known)).answer
+    assert summary(compared(monkeypatch, known)).guarantee == "mine: no guarantee for any given controller"
+    both = summary(compared(monkeypatch, entry("C (designed)"), known)).guarantee
     assert both == "mine: no guarantee for any designed or given controller"
-    other.answer.stick_slip_gap = "nothing is searched there"
+    other.guarantee.stick_slip_gap = "nothing is searched there"
     said = summary(compared(monkeypatch, known, other))
     assert "A (given): none: the reason of A (given)" in said.notes
     assert "nothing is searched there" in said.notes
@@ -289,12 +294,12 @@ def test_friction_that_is_extrapolated_to_the_rate_of_the_task_is_said(monkeypat
 def test_two_sliding_modes_with_deadbeat_steps_and_the_same_bounds_say_why(monkeypatch):
     law = SimpleNamespace(deadbeat=True)
     one, other = (entry(f"{name} (designed)", 3e-4, 1e-5, compensation=law) for name in ("2-CTA", "2-DIA"))
-    other.guaranteed.claims = one.guaranteed.claims
+    other.proof.claims = one.proof.claims
     assert any("2-CTA and 2-DIA act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
     law.deadbeat = False
     assert not any("act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
     law.deadbeat = True
-    other.guaranteed.claims = SimpleNamespace(slip_error=UpperBound(1))
+    other.proof.claims = SimpleNamespace(slip_error=UpperBound(1))
     assert not any("act identically" in note for note in summary(compared(monkeypatch, one, other)).notes)
 
 

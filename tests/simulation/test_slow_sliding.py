@@ -13,7 +13,7 @@ from scipy.special import lambertw
 from quakedesign import simulate
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Reference, friction_law, load_fault
-from quakedesign.guarantees import Held
+from quakedesign.guarantees import SampledLoop
 from quakedesign.guarantees.search.lqg import growth_rate, sliding_law, sliding_model
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Saturation, sliding_loop
@@ -256,7 +256,7 @@ def test_a_pump_that_is_late_and_cut_off_and_readings_in_steps_are_those_of_an_i
     assert -30e3 <= run.pressure.min() < -29e3
     assert run.asked.min() < -60e3
     given = {"actuator": Actuator(stages=stages), "measurement": Transducer(quantum=step), "plant": "quasi-dynamic"}
-    controller = Held(law=law, step=STEP).controller
+    controller = SampledLoop(law=law, step=STEP).controller
     same = simulate(fault(), controller, tide=tide, duration=2000.0, samples=200, **given)
     assert same.slip_rate[-1] == run.slip_rate[-1]
 
@@ -272,7 +272,7 @@ def test_a_pump_acts_between_samples_as_with_an_independent_integrator():
 
 
 def test_it_moves_with_inertia_unless_asked_otherwise():
-    controller = Held(law=sliding_law(sliding_model(fault()), STEP), step=STEP).controller
+    controller = SampledLoop(law=sliding_law(sliding_model(fault()), STEP), step=STEP).controller
     assert simulate(fault(), controller, duration=80.0, samples=2).provenance["plant"] == "smooth"
 
 
@@ -338,7 +338,7 @@ def test_a_stress_that_has_come_at_once_makes_the_rate_jump(inertia):
 def test_simulate_runs_what_a_design_found_in_its_own_way():
     path, tide = Fraction(500), Tide(amplitude=5e3, period=3000.0)
     law = sliding_law(sliding_model(fault()), STEP, diffusion=path)
-    controller = Held(law=law, step=STEP, diffusion=path).controller
+    controller = SampledLoop(law=law, step=STEP, diffusion=path).controller
     given = {"duration": 400.0, "tide": tide}
     run = simulate(fault(), controller, **given, plant="quasi-dynamic", samples=10)
     own = simulate_sliding(fault(), law, STEP, diffusion=path, **given)
@@ -388,7 +388,7 @@ def test_simulate_runs_what_a_design_found_in_its_own_way():
 def test_what_a_run_in_slow_sliding_does_not_take_is_refused(wrong, said):
     law = sliding_law(sliding_model(fault()), STEP)
     with pytest.raises((ParameterError, UnknownNameError), match=said):
-        simulate(fault(), **({"controller": Held(law=law, step=STEP).controller, "duration": 80.0} | wrong))
+        simulate(fault(), **({"controller": SampledLoop(law=law, step=STEP).controller, "duration": 80.0} | wrong))
 
 
 def test_an_uncontrolled_fault_with_a_state_is_loaded_at_its_operating_rate():

@@ -10,7 +10,7 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Disturbance
-from quakedesign.guarantees import Claims, Held, NoProof, TrackingProof
+from quakedesign.guarantees import Claims, NoProof, SampledLoop, TrackingProof
 from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.linear_design import Longest
 from quakedesign.laws import summed_integrals
@@ -45,14 +45,14 @@ def designs(monkeypatch):
         if objective == "tracking":
             assert (step, delay) == (rational(REAL.sampling_time), 0)
             claims = dataclasses.replace(CLAIMS, slip_rate_error=UpperBound(longest["tracking"]))
-            return TrackingProof(task=task, held=Held(law=LAW, step=step, delay=delay), claims=claims)
+            return TrackingProof(task=task, held=SampledLoop(law=LAW, step=step, delay=delay), claims=claims)
         asked.append((step, delay))
         if step > longest["step"] or delay > longest["delay"]:
             return NoProof(reason="too long")
-        return TrackingProof(task=task, held=Held(law=LAW, step=step, delay=delay), claims=CLAIMS)
+        return TrackingProof(task=task, held=SampledLoop(law=LAW, step=step, delay=delay), claims=CLAIMS)
 
     def claimed(task, step, **around):
-        return TrackingProof(task=task, held=Held(law=LAW, step=step, **around), claims=CLAIMS)
+        return TrackingProof(task=task, held=SampledLoop(law=LAW, step=step, **around), claims=CLAIMS)
 
     def longest_step(task, **told):
         tellings.append(told)
@@ -158,16 +158,16 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
     assert {key: found.to_dict()[key] for key in told} == {key: str(value) for key, value in told.items()}
     said = "even for one that measures the slip with errors of no more than 1 µm up to each sample"
     assert said in " ".join(" ".join(limits_lines(found)).split())
-    assert found.smallest_peaks()[0][1] > 2 * found.smallest_peaks(told=False)[0][1]
+    assert found.smallest_peaks()[0][1] > 2 * found.smallest_peaks(measured=False)[0][1]
     label = "and with measurements of the slip with errors of no more than 1 µm"
     assert label in limits_figure(found).axes[0].get_legend_handles_labels()[1]
-    assert found.smallest_peaks(told=False) == plain.smallest_peaks()
+    assert found.smallest_peaks(measured=False) == plain.smallest_peaks()
 
 
 def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
     both = study(REAL, slip_noise="1e-6", rate_noise="1e-5", prove=False)
     errors = "the slip with errors of no more than 1 µm, the slip rate with errors of no more than 10 µm/s"
-    assert both.told.words() == errors
+    assert both.sensing.words() == errors
     assert f"even for one that measures {errors} up to each sample" in " ".join(" ".join(limits_lines(both)).split())
     plain = study(REAL, prove=False).peak_slip_rate_error
     assert both.peak_slip_rate_error.impossible_beyond > plain.impossible_beyond

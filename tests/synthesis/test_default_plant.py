@@ -18,7 +18,7 @@ from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
 from quakedesign.laws import StickSlipController, control_law
 from quakedesign.plant import uncertain_plant
 from quakedesign.report.sentences import sentences
-from quakedesign.report.summary import _answer
+from quakedesign.report.summary import _first_sentence
 from quakedesign.studies.comparison import Entry
 
 PROOFS = Path(__file__).parents[2] / "proofs" / "certificates"
@@ -78,7 +78,7 @@ def test_loops_that_the_theorem_does_not_know_are_proved_without_stick(monkeypat
     sampled = SimpleNamespace(runs=plain, reason="", premises=tuple)
     monkeypatch.setattr(FEEDBACK, "sampled_design", lambda *_, **__: sampled)
     monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
-    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: SimpleNamespace(proof=found, proved=True))
+    monkeypatch.setattr(FEEDBACK, "with_worst_case", lambda fault, found: SimpleNamespace(proof=found, proved=True))
     assert qd.design(REAL, "elqr", **asked).guarantee is plain
     assert qd.guarantee(REAL, **asked).proof is plain
 
@@ -198,7 +198,7 @@ def test_a_guarantee_takes_the_first_that_is_proved(monkeypatch, sticking, plain
     )
     monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", lambda *_, **__: replace(answer, proof=NONE))
     monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
-    monkeypatch.setattr(FEEDBACK, "attacked", lambda fault, found: TrackingGuarantee(fault=fault, proof=found))
+    monkeypatch.setattr(FEEDBACK, "with_worst_case", lambda fault, found: TrackingGuarantee(fault=fault, proof=found))
     found = qd.guarantee(REAL)
     assert found.proof is plain
     assert "not proved on the stick-slip plant: no polytope" in found.lines()
@@ -223,8 +223,8 @@ def test_the_answer_of_a_summary_names_the_plant(sticking, plain):
     compared = SimpleNamespace(uncontrolled=natural, fault=REAL)
 
     def said(found):
-        best = SimpleNamespace(guaranteed=found, label="e-LQR", design=SimpleNamespace(other_step_first=""))
-        return _answer(compared, best)
+        best = SimpleNamespace(proof=found, label="e-LQR", design=SimpleNamespace(other_step_first=""))
+        return _first_sentence(compared, best)
 
     assert "guaranteed. With the e-LQR the slip rate never" in said(sticking)
     assert "m/s, whether the fault slides or sticks, and" in said(sticking)

@@ -88,7 +88,7 @@ def referred():
 def stuck(monkeypatch):
     """A quick search that finds the same on the stick-slip plant whatever the law."""
     seen = tracking_result.WorstCase(slip_error=1e-3, slip_rate_error=2e-5)
-    monkeypatch.setattr(tracking_result, "worst_found", lambda claim, sticks=False: seen)
+    monkeypatch.setattr(tracking_result, "worst_tracking", lambda claim, sticks=False: seen)
 
 
 def test_an_lqg_of_four_states_has_its_verdict_within_two_seconds(found):
@@ -376,7 +376,7 @@ def test_a_law_is_compared_and_assessed_in_its_setup():
     seen = qd.compare(qd.load_fault("lab-fault"), [qd.SampledLaw.from_pid(1, 0.1, step=0.01)], with_published=False)
     (entry,) = seen.of("designed")
     assert entry.label == "PID (given)"
-    assert entry.guaranteed is None
+    assert entry.proof is None
 
 
 def test_a_comparison_judges_and_runs_a_given_law_in_its_setup(monkeypatch, stuck):
@@ -395,9 +395,9 @@ def test_a_comparison_judges_and_runs_a_given_law_in_its_setup(monkeypatch, stuc
     assert (entry.label, entry.given, entry.design.controller.delay) == ("weak (given)", True, Fraction("0.046"))
     assert "part=0.25" in str(entry.run.provenance["actuator"])  # 46 of 184 ms
     assert entry.run.provenance["measurement"] != "exact"
-    assert entry.answer.lines() == [f"none: {entry.design.guarantee.reason}"]
+    assert entry.guarantee.lines() == [f"none: {entry.design.guarantee.reason}"]
     assert "no T_s was found" not in repr(seen)
-    assert summary(seen).answer == "real-fault: no guarantee for any given controller"
+    assert summary(seen).guarantee == "real-fault: no guarantee for any given controller"
 
 
 def test_assess_and_compare_take_quantities_of_the_setup_by_name():

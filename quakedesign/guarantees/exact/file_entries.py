@@ -1,4 +1,4 @@
-"""Objects shared by several kinds of guarantee files: fault, reference, disturbance, implicit step.
+"""Objects shared by several kinds of guarantee files: fault, reference, disturbance, step.
 
 Each object says what its keys are and how it becomes a value of the package, and back.
 """

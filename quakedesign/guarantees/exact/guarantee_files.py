@@ -1,4 +1,4 @@
-"""Certificate files of guarantees (proofs/FORMAT.md): objects with typed fields, reading, writing.
+"""Certificate files of guarantees (proofs/FORMAT.md): typed objects, reading, writing.
 
 An object says what its keys are; `quakedesign.sos.exact.strict` reads and writes it by their types. Numbers are in SI
 units.
@@ -31,7 +31,7 @@ from quakedesign.guarantees.exact.file_entries import (
 )
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, require_fit
 from quakedesign.guarantees.exact.plant_proof import PlantProof, plant_entries, read_plant_guarantee
-from quakedesign.guarantees.exact.sampled_loop import Held
+from quakedesign.guarantees.exact.sampled_loop import SampledLoop
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
 from quakedesign.guarantees.exact.small_gain import SlowGain
@@ -100,7 +100,7 @@ class SampledLoopEntries(Entries, kw_only=True):
     output: Row
     feedback: Row
 
-    def held(self, start: SlipAndRate | None) -> Held:
+    def held(self, start: SlipAndRate | None) -> SampledLoop:
         """The loop with bounds of its initial errors."""
         law = made(LinearLaw, self, root=None if self.root is None else self.root.value())
         need(not law.of_reference or any(map(any, law.of_reference)), "of_reference must not be zero where it is given")
@@ -115,7 +115,7 @@ class SampledLoopEntries(Entries, kw_only=True):
                 (pump.rate is not None) == (pump.ramp != 0) and pump.ramp >= 0, "a rate of a pump needs a ramp above 0"
             )
         return made(
-            Held,
+            SampledLoop,
             self,
             law=law,
             slip_noise=noise[0],
@@ -301,7 +301,7 @@ def _read_sliding(raw: dict[str, Any]) -> SlidingProof:
     task = made(SlidingPlant, file.fault, file.reference, ranges=ranges, stress=file.stress)
     measured = tuple((gain, _ZERO) for gain in file.loop.measured)
     law = made(LinearLaw, file.loop, measured=measured, feedback=(file.loop.feedback, _ZERO))
-    claim = SlidingProof(task=task, held=made(Held, file.loop, law=law), cuts=_cuts(file), claims=file.claims)
+    claim = SlidingProof(task=task, held=made(SampledLoop, file.loop, law=law), cuts=_cuts(file), claims=file.claims)
     cells(task, claim.cuts)
     model = model_of(task, claim.claims)
     _require_few(loop_of(claim.held, model, task).states if model is not None else ())
@@ -342,7 +342,7 @@ def guarantee_text(claim: Claim | PlantProof) -> str:
 
 
 def load_guarantee(path: str | Path) -> Claim | PlantProof:
-    """Read a file of `guarantee`; reading verifies nothing, `check` of what is read does.
+    """Read a certificate file of a guarantee; `check` of the result verifies it.
 
     Parameters
     ----------
@@ -351,8 +351,8 @@ def load_guarantee(path: str | Path) -> Claim | PlantProof:
     Returns
     -------
     TrackingProof, ContinuousProof, SlidingProof, StickSlipProof or PlantProof
-        The first has a ``controller`` for `simulate`, `export_controller` and `loop_transfer`: the law with its T_s and
-        its limit at rest, behind the delay, lag and rock that it is proved for.
+        The first has a ``controller`` for `simulate`, `export_controller` and `loop_transfer`: the law with its T_s,
+        its limit at rest, and the delay, lag and diffusion path of the proof.
 
     Raises
     ------

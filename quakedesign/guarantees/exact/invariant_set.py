@@ -1,18 +1,18 @@
 """Invariant polytope of a loop with aperiodic sampling, verified in ball arithmetic.
 
-**Loop.** The next sample comes any time T after the last, T_s ≤ T ≤ T_m, each time anew; all else is as it is with a
-clock, and the law is not told T. Let the map of a sample be J = CB, B its reduced row echelon form without rows of
-zeros and C its columns at B's pivots: ξ = By, y the state just before a sample, is all that a sample keeps, and θ after
-it x(θ) = e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
+**Loop.** Every sampling interval T is arbitrary within T_s ≤ T ≤ T_m; all else is as with periodic sampling, and T is
+not an input of the law. Let the map of a sample be J = CB, B its reduced row echelon form without rows of
+zeros and C its columns at B's pivots. With y the state just before a sample, ξ = By is all that a sample keeps; θ after
+it, x(θ) = e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
 
 **Theorem.** Let X = {ξ: |h_l·ξ| ≤ 1 for all l}, 0 ∈ X, and let every input be at most W_i. Suppose |h_l·Bx(T)| ≤ 1 for
 all l and T_s ≤ T ≤ T_m, and |c_y·x(θ)| ≤ Y_y for 0 ≤ θ ≤ T_m, whatever ξ ∈ X and the inputs are. If W_i ≥ F_i + Σ_y
 c_iy·Y_y for every input (`inputs`), then from rest every output stays below Y_y for all t.
 
 **Proof.** By induction ξ stays in X while the inputs obey their bounds. Along a trajectory of the loop s, w, β and φ
-are some functions of time, with which the inputs are linear in the state. Cut what they make off at ±W_i: a solution of
-that obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t, so that nothing was cut off and it solves the
-loop as well; that solution is unique. ∎
+are some functions of time, with which the inputs are linear in the state. Saturate the inputs at ±W_i: a solution
+obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t. So no input saturates, and the solution is that of
+the loop, which is unique. ∎
 
 **What is verified.** With r facets l ∈ L that are independent, |gξ| ≤ |gH_L⁻¹|·1 on X: a file says which r facets to
 take for every row g at every end of a piece. For c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) =
@@ -35,7 +35,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.norms import BALLS, Arithmetic, absolute, ball, beside, column, matrix, upper
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import Channel, Held, channels_of
+from quakedesign.guarantees.exact.sampled_loop import Channel, SampledLoop, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds, unshifted
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.fault_plant import FaultPlant
@@ -130,11 +130,11 @@ def _listed(numbers: list[int]) -> str:
 
 
 def _even(table: tuple[tuple[Basis, ...], ...]) -> bool:
-    """Whether all rows have the same pieces."""
+    """Whether all rows have equally many pieces."""
     return len({len(row) for row in table}) == 1 and 2 <= len(table[0]) <= MOST_PIECES + 1
 
 
-def reached_bounds(task: FaultPlant, held: Held, reach: InvariantPolytope) -> Bounds | NoProof:
+def reached_bounds(task: FaultPlant, held: SampledLoop, reach: InvariantPolytope) -> Bounds | NoProof:
     """Bounds of the theorem, or the condition that fails."""
     loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
     with ctx.workprec(_BITS):
@@ -198,7 +198,7 @@ class _SampleMap:
 
     between: BetweenSamples
     seen: Any
-    kept: Any
+    lift: Any
     facets: fmpq_mat
     rows: Any
     bounds: list[Any]
@@ -207,12 +207,12 @@ class _SampleMap:
     @classmethod
     def of(cls, loop: PeriodicLoop, channels: Sequence[Channel], reach: InvariantPolytope) -> "_SampleMap":
         """Of a loop with one jump, and a set that fits it."""
-        seen, kept = reduced(loop.segments[0].jump)
+        seen, lift = reduced(loop.segments[0].jump)
         bounds = {channel.name: ball(bound) for channel, bound in zip(channels, reach.inputs, strict=True)}
         return cls(
             between=BetweenSamples(BALLS, matrix(loop.flow), beside([column(v) for v in loop.inputs.values()])),
             seen=arb_mat(seen),
-            kept=arb_mat(kept),
+            lift=arb_mat(lift),
             facets=_exact(reach.facets),
             rows=matrix(tuple(loop.outputs.values())),
             bounds=[bounds[name] for name in loop.inputs],
@@ -243,19 +243,19 @@ class _SampleMap:
             (self._height(now, basis) + area[0, 0], more[0, 0])
             for (now, area, more), basis in zip(places, bases, strict=True)
         ]
-        found = (a.max(b) + more for (a, more), (b, _) in pairwise(pieces))
-        return reduce(arb.max, found, arb(0)).abs_upper()
+        peaks = (a.max(b) + more for (a, more), (b, _) in pairwise(pieces))
+        return reduce(arb.max, peaks, arb(0)).abs_upper()
 
     def _height(self, row: Any, basis: Basis) -> Any:
         """Bound of |c·x| right after a sample."""
-        size = _sum(absolute(row * self.kept * arb_mat(self._inverse(basis))))
+        size = _sum(absolute(row * self.lift * arb_mat(self._inverse(basis))))
         return sum((abs((row * entry)[0, 0]) * bound for entry, bound in self.sampled), size)
 
     @cached_property
     def _largest_state(self) -> Any:
         """Right after a sample, entry by entry."""
         frame = absolute(arb_mat(self._inverse(tuple(range(self.facets.ncols())))))
-        total = absolute(self.kept) * BALLS.sums(frame)
+        total = absolute(self.lift) * BALLS.sums(frame)
         for entry, bound in self.sampled:
             total += absolute(entry) * bound
         return total
@@ -270,23 +270,19 @@ class _SampleMap:
 
 
 def require_fit(loop: PeriodicLoop, reach: InvariantPolytope) -> None:
-    """Reject a set whose sizes differ from those of a loop.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Reject a set whose sizes differ from those of a loop."""
     sizes = reduced(loop.segments[0].jump)[0].nrows(), len(loop.outputs), len(loop.inputs) + len(loop.sampled)
-    given = len(reach.facets[0]), len(reach.between), len(reach.inputs)
-    if sizes != given:
+    stated = len(reach.facets[0]), len(reach.between), len(reach.inputs)
+    if sizes != stated:
         raise ParameterError(
             f"an invariant set of this loop must have facets of {sizes[0]} entries, {sizes[1]} outputs and {sizes[2]} "
-            f"inputs. Received {given[0]} entries, {given[1]} outputs and {given[2]} inputs. Search for the set again."
+            f"inputs. Received {stated[0]} entries, {stated[1]} outputs and {stated[2]} inputs. "
+            "Search for the set again."
         )
 
 
 def reduced(jump: Sequence[Row]) -> tuple[fmpq_mat, fmpq_mat]:
-    """B and C with J = CB: the rows of the reduced row echelon form that are not zero, and J at their pivots."""
+    """B and C with J = CB: nonzero rows of the reduced echelon form, and J at their pivots."""
     whole = _exact(jump)
     form, rank = whole.rref()
     rows = form.tolist()[:rank]

@@ -41,7 +41,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 # size. ∎  By continuity t = T may be taken as well.
 #
 # **Theorem 2 (push).** Let λ > 0 be an eigenvalue without control, G the transfer function of the path from well to
-# fault, whose impulse response is not negative, and q the path's answer to the well's u, |u| ≤ P. If a stress d = D
+# fault, whose impulse response is not negative, and q the path's response to the well's u, |u| ≤ P. If a stress d = D
 # begins while x = z = u = 0 and u stays 0 until T later, no controller keeps x and z bounded if D·e^{λT} > μP·G(λ).
 # *Proof.* The plant is controllable from y, so that a left eigenvector w can be scaled to give ζ = w·(x, z) with
 # ζ′ = λζ + μq + d. With what u up to now will still do, η: η′ = λη + μG(λ)u + D, η(0) = 0. Until T η grows to
@@ -80,7 +80,7 @@ class SlidingPush:
 
     @property
     def grows(self) -> bool:
-        """Whether there is a real λ > 0: both eigenvalues are ρ times the roots of s² + (1 + κ − β)s + κ."""
+        """Whether a real λ > 0 exists: the roots of s² + (1 + κ − β)s + κ times ρ."""
         kappa, beta = self._ratios
         return beta > 1 + kappa and (beta - 1 - kappa) ** 2 >= 4 * kappa
 
@@ -92,7 +92,7 @@ class SlidingPush:
         return ball(self.model.state_rate) * (ball(trace) + ball(trace**2 - 4 * kappa).sqrt()) / 2
 
     def smallest_rate_error(self, step: Fraction) -> LowerBound:
-        """V·D·h [m/s] of theorem 1 for samples a step [s] apart, the larger of both ends of a period."""
+        """V·D·h [m/s] of theorem 1 for samples a step [s] apart: the larger end of a period."""
         kappa, beta = self._ratios
         flow = ((-kappa, -beta, _ONE), (kappa, beta - 1, -_ONE), (_ZERO, _ZERO, _ZERO))
         with ctx.workprec(_BITS):
@@ -150,7 +150,7 @@ class SlidingPush:
 # then slip exceeds E = (μ* − μ_res)/m, where friction has its residual value, under every controller, even if it
 # knows φ and the plant from the onset on; also on the stick–slip plant. *Proof.* For 0 ≤ x1 ≤ E: x2′
 # ≥ s·x1 − w·x2 + N̂(μ* − m·x1)p_f + H, an equality unless the fault sticks, and the third term is at least c·min(p_f,
-# 0), c = N̂μ*, and min(p_f, 0) at least the path's answer to u = min(p, 0). With z = (λ + w)x1 + x2, z′ = λz + … so
+# 0), c = N̂μ*, and min(p_f, 0) at least the path's response to u = min(p, 0). With z = (λ + w)x1 + x2, z′ = λz + … so
 # that z ≥ ζ, ζ = z0 + what u up to now will still do; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ grows to H(e^{λT} −
 # 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 at all later t: ζ grows exponentially. x1′ = z − (λ + w)x1 with z ≥ ζ > 0
 # keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
@@ -207,8 +207,8 @@ class _Surprised:
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
-    """What a controller is told: bounds n [m] and n′ [m/s] of the noise; None for a slip rate that is not measured."""
+class _Measurements:
+    """Bounds n [m] and n′ [m/s] of the measurement noise; None for an unmeasured slip rate."""
 
     slip_noise: Fraction
     rate_noise: Fraction | None
@@ -219,7 +219,9 @@ class _Told:
         return bool(self.slip_noise) and self.rate_noise != 0
 
     def hides(self, slip: Fraction, rate: Fraction, push: Fraction, step: Fraction) -> Fraction:
-        """τ [s], within a small part of T: for how long a turned push [m/s²] is hidden with σ₊ = `slip`, w = `rate`.
+        """τ [s]: time for which noise hides a reversed disturbance.
+
+        Within a small part of T, for a disturbance `push` [m/s²], σ₊ = `slip` and w = `rate`.
 
         A larger σ₊ hides it for less. Answers with σ₊ of at least 0 only grow: it is enough to look at their ends.
         """
@@ -227,10 +229,10 @@ class _Told:
             return _IMPOSSIBILITY_ZERO
 
         def hidden(time: Fraction) -> bool:
-            told = zip(
+            responses = zip(
                 _moved(max(slip, _IMPOSSIBILITY_ZERO), rate, time), (self.slip_noise, self.rate_noise), strict=True
             )
-            return all(noise is None or bool(ball(push) * answer <= ball(noise)) for answer, noise in told)
+            return all(noise is None or bool(ball(push) * response <= ball(noise)) for response, noise in responses)
 
         low, high = _IMPOSSIBILITY_ZERO, step
         while hidden(high):
@@ -251,7 +253,7 @@ class _Pushed:
 
     @property
     def pole(self) -> Any:
-        """λ [1/s], without the difference of two numbers that are nearly the same where damping is large."""
+        """λ [1/s], in a form without cancellation where damping is large."""
         w, twice = ball(self.rate), 2 * ball(self.slip)
         root = (w * w + 2 * twice).sqrt()
         return twice / (root + w) if self.rate > 0 else (root - w) / 2
@@ -283,11 +285,11 @@ def smallest_peak(
     _require(step > 0 and delay >= 0, "a step above 0 and a delay of at least 0", step, delay)
     noise = (slip_noise, *([] if rate_noise is None else [rate_noise]))
     _require(min(noise) >= 0, "bounds of noise of at least 0", *noise)
-    told = _Told(slip_noise, rate_noise)
+    measurements = _Measurements(slip_noise, rate_noise)
     with ctx.workprec(_BITS):
         peaks = [
             SmallestPeak(
-                slip_rate_error=LowerBound(_surprise(plant, step, delay, told, task.amplitude)),
+                slip_rate_error=LowerBound(_surprise(plant, step, delay, measurements, task.amplitude)),
                 slip_error=None if plant.reach is None else UpperBound(plant.reach),
             )
             for plant in _surprised(task)
@@ -297,7 +299,7 @@ def smallest_peak(
 
 
 def smallest_stick_slip_rate(task: FaultPlant, step: Fraction) -> LowerBound | None:
-    """Theorem 3: slip rate [m/s] that a fault that sticks reaches under every controller; None without a disturbance.
+    """Theorem 3: slip rate [m/s] under every controller; None without a disturbance.
 
     Parameters
     ----------
@@ -308,13 +310,13 @@ def smallest_stick_slip_rate(task: FaultPlant, step: Fraction) -> LowerBound | N
     _require(step > 0, "a step above 0", step)
     plants = [_Surprised(-kappa, w, _IMPOSSIBILITY_ZERO, task.friction.static, None) for kappa, w, _ in _corners(task)]
     with ctx.workprec(_BITS):
-        told = _Told(_IMPOSSIBILITY_ZERO, _IMPOSSIBILITY_ZERO)
-        found = max(_surprise(plant, step, _IMPOSSIBILITY_ZERO, told, task.amplitude) for plant in plants)
-    return LowerBound(found) if found > 0 else None
+        measurements = _Measurements(_IMPOSSIBILITY_ZERO, _IMPOSSIBILITY_ZERO)
+        peak = max(_surprise(plant, step, _IMPOSSIBILITY_ZERO, measurements, task.amplitude) for plant in plants)
+    return LowerBound(peak) if peak > 0 else None
 
 
 def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
-    """T + θ [s] beyond which no controller holds the fault, without a diffusive path; None where none is proved."""
+    """T + θ [s] beyond which every controller fails, without a diffusion path; or None."""
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
     def longest(plant: _Pushed | SlidingPush) -> Any:
@@ -325,7 +327,7 @@ def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> Up
 
 
 def longest_diffusion(task: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
-    """L²/D [s] beyond which no controller holds the fault with samples T apart; None where none is proved."""
+    """L²/D [s] beyond which every controller with samples T apart fails; or None."""
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
     def longest(plant: _Pushed | SlidingPush) -> Any:
@@ -344,14 +346,14 @@ def farthest_well(diffusion_time: UpperBound, diffusivity: Fraction) -> UpperBou
 
 
 def nearest_proved_well(diffusion_time: LowerBound, diffusivity: Fraction) -> LowerBound:
-    """L [m] of a diffusion time L²/D [s] up to which something is proved, at a diffusivity D [m²/s]."""
+    """L [m] of a proved diffusion time L²/D [s], at a diffusivity D [m²/s]."""
     _require(diffusivity > 0, "a diffusivity above 0", diffusivity)
     with ctx.workprec(_BITS):
         return LowerBound(end_of(ball(diffusion_time * diffusivity).sqrt().lower()))
 
 
 def smallest_withdrawal(task: FaultPlant | SlidingPush, step: Fraction) -> LowerBound | None:
-    """P [Pa] below which no controller holds the fault with samples T apart; None where none is proved."""
+    """P [Pa] below which every controller with samples T apart fails; or None."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
         needed = (ball(task.amplitude / plant.authority) * (plant.pole * ball(step)).exp() for plant in _pushed(task))
@@ -360,7 +362,7 @@ def smallest_withdrawal(task: FaultPlant | SlidingPush, step: Fraction) -> Lower
 
 
 def too_slow(task: FaultPlant, withdrawal: Fraction, step: Fraction, delay: Fraction) -> str:
-    """Why no controller with such a withdrawal [Pa] holds the fault with T_s and a delay [s]; empty where none is."""
+    """Reason why T_s and delay are infeasible for every controller; else empty. SI units."""
     late = longest_reaction(task, withdrawal) if task.change is None else None
     if late is None or step + delay <= late:
         return ""
@@ -370,7 +372,7 @@ def too_slow(task: FaultPlant, withdrawal: Fraction, step: Fraction, delay: Frac
 
 
 def hopeless(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
-    """Why no controller with such a withdrawal [Pa] holds the fault, whatever its T_s; empty where that is not proved.
+    """Reason why the path is infeasible for every controller and every T_s; else empty.
 
     Parameters
     ----------
@@ -411,7 +413,7 @@ def _corners(task: FaultPlant) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
 
 
 def _pushed(task: FaultPlant | SlidingPush) -> Sequence[_Pushed | SlidingPush]:
-    """Plants of theorem 2, which is that of `SlidingPush` too."""
+    """Plants of theorem 2, of a fault or of slow sliding."""
     if isinstance(task, SlidingPush):
         return [task] if task.grows else []
     law = task.friction
@@ -435,26 +437,28 @@ def _surprised(task: FaultPlant) -> Iterator[_Surprised]:
             yield _Surprised(slip, w, law.weakening, middle - law.weakening * reach, reach)
 
 
-def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, told: _Told, amplitude: Fraction) -> Fraction:
+def _surprise(
+    plant: _Surprised, step: Fraction, delay: Fraction, measurements: _Measurements, amplitude: Fraction
+) -> Fraction:
     """X, or 0 where the theorem says nothing."""
     pace = sqrt(abs(plant.slip))
     most = _GROWN if plant.slip > 0 else _TURNED
-    held = step / max(1, ceil(float(step) * pace / most))
+    interval = step / max(1, ceil(float(step) * pace / most))
 
     def shortened(time: Fraction) -> Fraction:
         return time if float(time) * pace <= most else Fraction(most / pace)
 
     def hidden(slip: Fraction) -> Fraction:
-        return shortened(told.hides(slip, plant.rate, amplitude, step))
+        return shortened(measurements.hides(slip, plant.rate, amplitude, step))
 
     def bound(slip: Fraction, unseen: Fraction) -> Any:
-        return 2 * ball(amplitude) * _moved(slip, plant.rate, held + shortened(delay) + unseen)[1]
+        return 2 * ball(amplitude) * _moved(slip, plant.rate, interval + shortened(delay) + unseen)[1]
 
     reach = plant.reach or _IMPOSSIBILITY_ZERO
 
     def gained(peak: Fraction, more: Fraction = _IMPOSSIBILITY_ZERO) -> Fraction:
-        """What friction's slope makes of the pressure's force."""
-        force = 2 * peak / held + plant.slip * reach + abs(plant.rate) * peak + more
+        """Change of σ by the slope of friction under the pressure force."""
+        force = 2 * peak / interval + plant.slip * reach + abs(plant.rate) * peak + more
         return plant.weakening * force / plant.friction
 
     def largest(share: Fraction) -> Fraction:
@@ -471,10 +475,10 @@ def _surprise(plant: _Surprised, step: Fraction, delay: Fraction, told: _Told, a
         return low
 
     best = _IMPOSSIBILITY_ZERO
-    for share in _SHARES if told.noisy else _SHARES[:1]:
-        if (found := largest(share)) <= best:
+    for share in _SHARES if measurements.noisy else _SHARES[:1]:
+        if (error := largest(share)) <= best:
             break
-        best = found
+        best = error
     return best
 
 

@@ -257,8 +257,8 @@ class _SegmentFlow:
     @cached_property
     def within(self) -> list[Any]:
         """Upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h, of every piece: e^{Mh} with M = |A|, but max(A, 0) on the diagonal."""
-        found = {h: absolute((majorant(self.flow) * ball(h)).exp()) for h in set(self.lengths)}
-        return [found[h] for h in self.lengths]
+        bounds = {h: absolute((majorant(self.flow) * ball(h)).exp()) for h in set(self.lengths)}
+        return [bounds[h] for h in self.lengths]
 
     @cached_property
     def whole(self) -> Any:
@@ -653,9 +653,9 @@ def _peaks(columns: Any, weights: list[Any]) -> Any:
 
 def _but(column: Any, place: int) -> Any:
     """A column with 0 in one place."""
-    found = column * 1
-    found[place, 0] = 0
-    return found
+    copied = column * 1
+    copied[place, 0] = 0
+    return copied
 
 
 # ----------------------------------------------------------------------
@@ -745,7 +745,7 @@ class LoopResponses:
     @cached_property
     def _seen(self) -> list[tuple[list[Any], list[Any]]]:
         """Rows of every segment just before it and before all earlier ones; what bends its pieces, of a proof."""
-        by, found = self.by, []
+        by, all_rows = self.by, []
         for number, flow in enumerate(self.flows):
             phases, bends = flow.phases(self.rows), list[Any]()
             rows = by.above([*phases, by.identity(self.periods.size)] if by.proves else phases) * flow.jump
@@ -753,8 +753,8 @@ class LoopResponses:
                 pieces = zip(phases, flow.within, strict=False)
                 bends = [absolute(phase * flow.square) * within for phase, within in pieces]
             before = (part.whole for part in self.earlier[number - 1 :: -1]) if number else ()
-            found.append((list(accumulate(before, mul, initial=rows)), bends))
-        return found
+            all_rows.append((list(accumulate(before, mul, initial=rows)), bends))
+        return all_rows
 
     def sums(self, name: str) -> Iterator[list[tuple[Any, Any, tuple[Any, ...]]]]:
         """For an input, on every piece of every segment: sums for every output at both ends, and remainders."""
@@ -763,18 +763,18 @@ class LoopResponses:
         earlier = parts if self.earlier is self.flows else responses(self.loop, self.earlier, name)
         past = _Past.of(earlier, self.periods, self.places)
         for number, (part, (rows, bends)) in enumerate(zip(parts, self._seen, strict=True)):
-            before, found = past.of_rows(rows, number), list[tuple[Any, Any, tuple[Any, ...]]]()
+            before, result = past.of_rows(rows, number), list[tuple[Any, Any, tuple[Any, ...]]]()
             pieces = len(part.of.lengths)
             ends = [by.part(before, i * count, (i + 1) * count) for i in range(pieces + 1)]
             units = by.part(before, before.nrows() - size, before.nrows())
             for i, (start, end, more) in enumerate(part.since_jump(self.rows)):
                 rest = (more, bends[i] * units * part.of.chord(i)) if by.proves else ()
-                found.append((ends[i] + start, ends[i + 1] + end, rest))
-            yield found
+                result.append((ends[i] + start, ends[i + 1] + end, rest))
+            yield result
 
     def free(self) -> list[Any]:
         """Largest outputs of the free response from the box: of a proof on every piece, else at all ends of pieces."""
-        by, found = self.by, []
+        by, peaks = self.by, []
         period = reduce(lambda now, flow: flow.whole * now, self.flows, by.identity(self.periods.size))
         periods = _Periods(self.flows, period) if by.proves else self.periods
         groups = _followed(periods, by.beside([by.column(s) for s in self.loop.start]))
@@ -789,9 +789,9 @@ class LoopResponses:
                     rest = (by.grouped(bend * flow.chord(i), weights) for i, bend in enumerate(bends))
                     ends = [larger(*both) + more for both, more in zip(pairwise(ends), rest, strict=True)]
                 parts.append([by.highest(end) for end in ends])
-            found += [reduce(by.larger, both) for both in zip(*parts, strict=True)]
+            peaks += [reduce(by.larger, both) for both in zip(*parts, strict=True)]
             groups = [(flow.whole * columns, weights) for columns, weights in groups]
-        return found
+        return peaks
 
 
 @dataclass(frozen=True, slots=True)
@@ -834,12 +834,12 @@ class _Past:
         `rows` are these, and what they are just before all earlier segments, the last first.
         """
         by = self.parts[0].of.by
-        found = by.sums(rows[-1] * self.columns) + by.absolute(rows[-1] * self.far) * self.bound
+        sums = by.sums(rows[-1] * self.columns) + by.absolute(rows[-1] * self.far) * self.bound
         for part, line in zip(self.parts[:segment], rows[-2::-1], strict=True):
             unit = by.identity(line.ncols())
             ends = [part.columns(unit), *([_diagonal(part.rest(unit))] if by.proves else [])]
-            found = by.sums(line * by.beside(ends)) + found
-        return found
+            sums = by.sums(line * by.beside(ends)) + sums
+        return sums
 
 
 def _whole(left: Any, sums: Any) -> Any:
@@ -861,5 +861,5 @@ def _whole(left: Any, sums: Any) -> Any:
 
 def _diagonal(column: Any) -> Any:
     """One column for every entry that is not zero."""
-    kept = [i for i, v in enumerate(column.entries()) if not v.is_zero()]
-    return arb_mat([[column[i, 0] if i == j else arb(0) for j in kept] for i in range(column.nrows())])
+    nonzero = [i for i, v in enumerate(column.entries()) if not v.is_zero()]
+    return arb_mat([[column[i, 0] if i == j else arb(0) for j in nonzero] for i in range(column.nrows())])

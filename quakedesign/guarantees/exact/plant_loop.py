@@ -1,4 +1,4 @@
-"""Sampled loop of an uncertain plant and a linear law of several signals, and bounds of its responses.
+"""Sampled loop of an uncertain plant and a linear multivariable law; response bounds.
 
 Chapters: the loop in exact matrices; L1 norms of all outputs for all inputs at once, in ball arithmetic.
 """
@@ -43,7 +43,7 @@ MOST_LOOP_STATES = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatrixLaw:
-    """u = Cz + Dy and z⁺ = Az + By at every sample, y measured, z = 0 at first; u acts `delay` later for T_s."""
+    """Sampled law u = Cz + Dy, z⁺ = Az + By with z = 0 at first; u acts `delay` later."""
 
     step: Fraction
     delay: Fraction
@@ -112,32 +112,32 @@ class LinearPart:
         """
         n, m, q, zero = len(self.A), len(self.B[0]), len(law.update), Fraction(0)
         seen = len(self.C)
-        for name, given, height, width in (
+        for name, entries, height, width in (
             ("A", law.update, q, q),
             ("B", law.measured, q, seen),
             ("C", law.output, m, q),
             ("D", law.feedback, m, seen),
         ):
-            if [len(row) for row in given] != [width] * height:
+            if [len(row) for row in entries] != [width] * height:
                 raise ParameterError(
                     f"matrix {name} of a law for this plant must be {height} x {width}, as {seen} signals are measured "
-                    f"and there are {m} controls. Received {len(given)} rows of "
-                    f"{', '.join(map(str, sorted({len(row) for row in given}))) or 'no'} entries."
+                    f"and there are {m} controls. Received {len(entries)} rows of "
+                    f"{', '.join(map(str, sorted({len(row) for row in entries}))) or 'no'} entries."
                 )
         part = law.delay % law.step
         waiting = int(law.delay // law.step) + (part > 0)
         size = n + q + m * (waiting + 1)
         if size > MOST_LOOP_STATES:
             raise ParameterError(f"a loop must have at most {MOST_LOOP_STATES} states. Received {size}.")
-        held = size - m
+        first = size - m
         flow = [[zero] * size for _ in range(size)]
         for i in range(n):
-            flow[i][:n], flow[i][held:] = self.A[i], self.B[i]
+            flow[i][:n], flow[i][first:] = self.A[i], self.B[i]
         for sector in self.sectors:
             middle = sum(sector.slopes, zero) / 2
             for i, entered in enumerate(sector.entry):
                 for j, weight in enumerate(sector.row):
-                    flow[i][j if j < n else held + j - n] += middle * entered * weight
+                    flow[i][j if j < n else first + j - n] += middle * entered * weight
         jump = [list(unit(size, i)) for i in range(size)]
         for target, own, fed in (
             *((n + i, law.update[i], law.measured[i]) for i in range(q)),
@@ -145,13 +145,13 @@ class LinearPart:
         ):
             line = [sum((fed[a] * self.C[a][j] for a in range(seen) if fed[a]), zero) for j in range(n)]
             jump[target] = [*line, *own, *[zero] * (size - n - q)]
-        for place in range(n + q + m, size if not part else held):  # controls on their way move one place on
+        for place in range(n + q + m, size if not part else first):  # controls on their way move one place on
             jump[place] = list(unit(size, place - m))
-        arrival = [list(unit(size, i if i < held else i - m)) for i in range(size)]
+        arrival = [list(unit(size, i if i < first else i - m)) for i in range(size)]
         segments = [(jump, part or law.step), *([(arrival, law.step - part)] if part else [])]
         rows = [(*row, *[zero] * (size - n)) for row in self.outputs]
-        rows += [(*s.row[:n], *[zero] * (held - n), *s.row[n:]) for s in self.sectors]
-        rows += [unit(size, held + k) for k in range(m)]
+        rows += [(*s.row[:n], *[zero] * (first - n), *s.row[n:]) for s in self.sectors]
+        rows += [unit(size, first + k) for k in range(m)]
         columns = [(*entry, *[zero] * (size - n)) for entry, _ in self.disturbances]
         columns += [self._moved(load, law, waiting + 1) for load in self.loads]
         columns += [(*s.entry, *[zero] * (size - n)) for s in self.sectors]
@@ -170,7 +170,7 @@ class LinearPart:
         )
 
     def _moved(self, load: SlowLoad, law: MatrixLaw, places: int) -> Row:
-        """What a change of a load does to the states, which are counted from those that balance it."""
+        """Effect of a load rate on the states, which are relative to the equilibrium."""
         q, zero = len(law.update), Fraction(0)
         rows = [[*(v - (i == j) for j, v in enumerate(row)), zero] for i, row in enumerate(law.update)]
         rows += [[*row, e] for row, e in zip(law.output, load.control, strict=True)]
@@ -187,21 +187,21 @@ def solved(rows: Sequence[Sequence[Fraction]], unknowns: int) -> Row:
         When there is none.
     """
     if not rows or not unknowns:
-        consistent, found = all(row[-1] == 0 for row in rows), [Fraction(0)] * unknowns
+        consistent, solution = all(row[-1] == 0 for row in rows), [Fraction(0)] * unknowns
     else:
         reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows]).rref()
-        found, consistent = [Fraction(0)] * unknowns, True
+        solution, consistent = [Fraction(0)] * unknowns, True
         for i in range(rank):
             pivot = next(j for j in range(unknowns + 1) if reduced[i, j] != 0)
             consistent = consistent and pivot < unknowns
             if pivot < unknowns:
-                found[pivot] = Fraction(int(reduced[i, unknowns].p), int(reduced[i, unknowns].q))
+                solution[pivot] = Fraction(int(reduced[i, unknowns].p), int(reduced[i, unknowns].q))
     if not consistent:
         raise ParameterError(
             "a law must hold every load without an error at balance. Received a law without integral action for one. "
             "Add an integral, or an estimate of the load."
         )
-    return tuple(found)
+    return tuple(solution)
 
 
 # ----------------------------------------------------------------------
@@ -221,7 +221,7 @@ _FAINT = Fraction(1, 1 << 60)
 
 @dataclass(frozen=True, slots=True)
 class ResponseBounds:
-    """Bounds of every row: for each flowing input, each sampled input of size 1, and from the box of starts."""
+    """Bounds of every row: per flowing input, per sampled input, and of the initial states."""
 
     inputs: tuple[Row, ...]
     sampled: tuple[Row, ...]
@@ -383,7 +383,7 @@ def _raised(part: Any) -> Any:
 
 
 def _require_fading(leap: Any, work: int) -> None:
-    """Reject a map of some periods none of whose powers is small, far beyond those that are followed."""
+    """Reject a map of several periods that has no small power within the work limit."""
     power, periods = leap, _AT_ONCE
     while not all(v < 1 for v in absolute(power).entries()):
         if periods * work > _BEYOND * _MOST_WORK or not all(v < 1 << 80 for v in absolute(power).entries()):

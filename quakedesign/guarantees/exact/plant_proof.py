@@ -1,4 +1,4 @@
-"""Guarantee of a sampled loop around an uncertain plant: vector small gain, claims that check themselves, files.
+"""Guarantee of a sampled loop with an uncertain plant: vector small gain, claims, files.
 
 **Theorem.** Of a loop about the balance of its loads, with every sector at its middle, let P_r be a bound of a row r by
 the sizes of the disturbances, the rates of the loads, the noise, the box of starts and numbers W_s ≥ 0 for what the
@@ -39,7 +39,7 @@ _MOST_LAW_STATES = 48
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantClaims:
-    """Claimed peaks for all t ≥ 0, in the order of the plant: outputs, then controls less what balances the loads."""
+    """Claimed peaks for all t ≥ 0: outputs, then controls relative to their equilibrium."""
 
     outputs: tuple[UpperBound, ...]
     controls: tuple[UpperBound, ...]
@@ -55,19 +55,19 @@ class PlantProof(Proof):
         The plant in exact numbers.
     law : MatrixLaw
     pieces : int
-        Into how many pieces each flow is cut for the bounds.
+        Number of pieces of each flow for the bounds.
     inputs : Row
         W_s, one for every sector.
     claims : PlantClaims
     outputs, controls : tuple of str
-        Names for people.
+        Names for display.
     units : tuple of str
-        Those of outputs, controls and disturbances, for people; without entries numbers have none.
+        Units of outputs, controls and disturbances for display; empty for none.
     name : str
     remarks : mapping of str to str
         As of `UncertainPlant`.
     notes : tuple of str
-        What was changed when the law became one in exact numbers.
+        Changes of the law by rounding to exact numbers.
     """
 
     kind: ClassVar[str] = UNCERTAIN_PLANT
@@ -91,7 +91,7 @@ class PlantProof(Proof):
         bounds = (*self.claims.outputs, *self.claims.controls)
         named = named if len(named) == len(bounds) else [f"row {i}" for i in range(1, len(bounds) + 1)]
         units = self.units[: len(bounds)] or [""] * len(bounds)
-        return [f"|{name}| <= {_told(bound, unit)}" for name, bound, unit in zip(named, bounds, units, strict=True)]
+        return [f"|{name}| <= {_shown(bound, unit)}" for name, bound, unit in zip(named, bounds, units, strict=True)]
 
     @property
     def bounds(self) -> Mapping[str, Bound]:
@@ -101,19 +101,19 @@ class PlantProof(Proof):
     def check(self) -> Verdict:
         """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
         try:
-            found = peaks(self.part, response_bounds(self.part.loop(self.law), self.pieces), self.inputs)
+            largest = peaks(self.part, response_bounds(self.part.loop(self.law), self.pieces), self.inputs)
         except ParameterError:
             return Verdict.UNDECIDED
         claimed = (*self.claims.outputs, *self.claims.controls)
-        holds = found is not None and all(a <= b for a, b in zip(found, claimed, strict=True))
+        holds = largest is not None and all(a <= b for a, b in zip(largest, claimed, strict=True))
         return Verdict.PROVED if holds else Verdict.UNDECIDED
 
     def statement(self) -> list[str]:
-        """The statement, and what was changed in the law, for people."""
+        """Lines of text: the statement, then the changes of the law."""
         return [f"proved: {self.sentence()}", *self.notes]
 
     def sentence(self) -> str:
-        """What is guaranteed, for people, of the plant and the law in the file; what it covers is rounded inward."""
+        """Statement of the guarantee; the covered ranges are rounded inward."""
         part, law = self.part, self.law
         size = f"{counted(len(part.A), 'state')}, {counted(len(part.B[0]), 'control')}"
         of_plant, of_forces = (self.remarks.get(name, "") for name in ("plant", "disturbances"))
@@ -144,21 +144,21 @@ class PlantProof(Proof):
 
 def _listed(values: Iterable[Fraction], units: Iterable[str] = ()) -> str:
     """Different numbers that are covered, in their order."""
-    return ", ".join(dict.fromkeys(_told(LowerBound(v), unit) for v, unit in zip_longest(values, units, fillvalue="")))
+    return ", ".join(dict.fromkeys(_shown(LowerBound(v), unit) for v, unit in zip_longest(values, units, fillvalue="")))
 
 
-def _told(bound: LowerBound | UpperBound, unit: str) -> str:
+def _shown(bound: LowerBound | UpperBound, unit: str) -> str:
     """With four digits, and an engineering prefix of its unit."""
     if unit.startswith("MPa"):
         bound, unit = type(bound)(bound * 10**6), unit[1:]
     return bound.quantity(unit, 4) if unit and bound else f"{bound:.4g}"
 
 
-def peaks(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row | None:
+def peaks(part: LinearPart, responses: ResponseBounds, inputs: Row) -> Row | None:
     """Bounds of outputs and controls by numbers for the sectors; None where these do not close."""
     if min(inputs, default=Fraction(0)) < 0:  # the comparison of Collatz and Wielandt is one of numbers >= 0
         return None
-    bounds = row_bounds(part, found, inputs)
+    bounds = row_bounds(part, responses, inputs)
     count = len(part.outputs)
     for sector, bound, most in zip(part.sectors, bounds[count:], inputs, strict=False):
         half = (sector.slopes[1] - sector.slopes[0]) / 2
@@ -167,14 +167,14 @@ def peaks(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row | None:
     return bounds[:count] + bounds[count + len(part.sectors) :]
 
 
-def row_bounds(part: LinearPart, found: ResponseBounds, inputs: Row) -> Row:
+def row_bounds(part: LinearPart, responses: ResponseBounds, inputs: Row) -> Row:
     """P_r of every row of the loop: outputs, arguments of sectors, controls."""
     own = [size for _, size in part.disturbances] + [load.rate for load in part.loads]
     halves = [(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors]
     sizes = [*own, *(w if h else Fraction(0) for w, h in zip(inputs, halves, strict=True))]
     noise = [size for size in part.noise if size]
-    parts = (*zip(found.inputs, sizes, strict=True), *zip(found.sampled, noise, strict=True))
-    bounds = list(found.start)
+    parts = (*zip(responses.inputs, sizes, strict=True), *zip(responses.sampled, noise, strict=True))
+    bounds = list(responses.start)
     for gains, size in parts:
         if size:
             bounds = [b + g * size for b, g in zip(bounds, gains, strict=True)]
@@ -279,9 +279,9 @@ def read_plant_guarantee(raw: dict[str, Any]) -> PlantProof:
         When it breaks a rule of FORMAT.md.
     """
     file = read_as(PlantFile, raw)
-    part, given = file.plant.part(), file.law
-    need(len(given.A) <= _MOST_LAW_STATES, f"a law must have at most {_MOST_LAW_STATES} states")
-    law = made(MatrixLaw, given, update=given.A, measured=given.B, output=given.C, feedback=given.D)
+    part, matrices = file.plant.part(), file.law
+    need(len(matrices.A) <= _MOST_LAW_STATES, f"a law must have at most {_MOST_LAW_STATES} states")
+    law = made(MatrixLaw, matrices, update=matrices.A, measured=matrices.B, output=matrices.C, feedback=matrices.D)
     part.loop(law)  # rejects sizes that do not fit, and a load that the law cannot hold
     count = {"output": len(part.outputs), "control": len(part.B[0])}
     names = {kind: [f"{kind}_{i}" for i in range(1, most + 1)] for kind, most in count.items()}
@@ -295,7 +295,7 @@ def read_plant_guarantee(raw: dict[str, Any]) -> PlantProof:
 
 
 def named(claim: PlantProof, plant: "UncertainPlant") -> PlantProof:
-    """A claim with the names and units of its plant, for people."""
+    """Claim with the names and units of its plant."""
     outputs, controls, units = tuple(plant.outputs or ()), tuple(plant.controls), plant.units
-    told = tuple(units.get(name, "") for name in (*outputs, *controls, *plant.disturbances)) if units else ()
-    return replace(claim, outputs=outputs, controls=controls, units=told, name=plant.name, remarks=plant.remarks)
+    symbols = tuple(units.get(name, "") for name in (*outputs, *controls, *plant.disturbances)) if units else ()
+    return replace(claim, outputs=outputs, controls=controls, units=symbols, name=plant.name, remarks=plant.remarks)

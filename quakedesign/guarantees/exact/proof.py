@@ -1,4 +1,4 @@
-"""Interface of all proofs about a loop: `Proof`, and `NoProof` with a reason where there is none."""
+"""Base class of all proofs about a loop, and `NoProof` with its reason."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -22,9 +22,9 @@ class Proof(ABC):
     plant : str
         Plant of `simulate` that it is about; empty where only one applies.
     scope : str
-        What sets its plant apart, for people; empty for the plant that exists.
+        Idealisation of its plant, as text; empty for the stick–slip plant and slow sliding.
     motion : str
-        What the slip rate is bounded for, for people.
+        Condition of the slip-rate bound, as text.
     lasts : str
         For how long.
     covers_healing : bool
@@ -32,7 +32,7 @@ class Proof(ABC):
     slides : bool
         Whether it is about slow sliding with friction that has a state.
     sampled : bool
-        Whether its law runs once per sample.
+        Whether its law is sampled.
     root : ImplicitRoot or None
         Implicit step of its law.
     slip_rate_error : UpperBound or None
@@ -72,12 +72,12 @@ class Proof(ABC):
 
     @property
     def motion(self) -> str:
-        """What the slip rate is bounded for."""
+        """Condition of the slip-rate bound, as text."""
         return ""
 
     @property
     def cells(self) -> tuple[Any, ...]:
-        """Parts of a box of constants for which the claims are proved one by one; none where it is not divided."""
+        """Cells of the box of constants, each with its own proof; empty if not divided."""
         return ()
 
     @property

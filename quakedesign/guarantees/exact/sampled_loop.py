@@ -16,7 +16,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.norms import START
 from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, NominalModel
-from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_known_area
+from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_response_area
 from quakedesign.loop.loop_setup import LoopSetup, Pump
 from quakedesign.plant.fault_plant import FaultPlant
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ExactSetup:
-    """Loop setup of a proof beside the law and T_s, in exact numbers.
+    """Loop setup of a proof in exact numbers; the law and T_s are in `SampledLoop`.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class ExactSetup:
 
     @classmethod
     def of(cls, setup: LoopSetup) -> "ExactSetup":
-        """That of a loop setup, whose delay counts from the end of the averaging time: here from its middle."""
+        """Exact loop setup; the delay counts from the middle of the averaging time."""
         own = {part.name for part in fields(ExactSetup)} - {"averaging", "ramp"}
         shared: dict[str, Any] = {name: getattr(setup, name) for name in own}
         shared["delay"] += setup.averaging_time / 2
@@ -78,7 +78,7 @@ class ExactSetup:
 
     @property
     def setup(self) -> "ExactSetup":
-        """Loop setup alone; a search for another law chooses the ramp anew."""
+        """Loop setup alone, without the ramp time of this law."""
         return replace(ExactSetup(**{part.name: getattr(self, part.name) for part in fields(ExactSetup)}), ramp=_ZERO)
 
     @property
@@ -86,9 +86,9 @@ class ExactSetup:
         """Delay, lag and L²/D [s] between law and fault."""
         return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
 
-    def held(self, law: LinearLaw, step: Fraction) -> "Held":
+    def held(self, law: LinearLaw, step: Fraction) -> "SampledLoop":
         """A law in this setup, with zero-order hold over T_s [s]."""
-        return Held(law=law, step=step, **{part.name: getattr(self, part.name) for part in fields(ExactSetup)})
+        return SampledLoop(law=law, step=step, **{part.name: getattr(self, part.name) for part in fields(ExactSetup)})
 
 
 PLAIN = ExactSetup()
@@ -96,7 +96,7 @@ PLAIN = ExactSetup()
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class Held(ExactSetup):
+class SampledLoop(ExactSetup):
     """A sampled law with zero-order hold over T_s in its loop setup, see `ExactSetup`.
 
     Attributes
@@ -147,7 +147,7 @@ class Held(ExactSetup):
             self._require_no_clock()
 
     def _require_no_clock(self) -> None:
-        """Reject an empty range of intervals, and a setup that needs periodic sampling or an initial state of rest."""
+        """Reject an empty range of intervals, and a setup that needs periodic sampling."""
         if self.longest_step <= self.step:
             raise ParameterError(
                 "the longest step must exceed the step, which is the shortest sampling interval. Received "
@@ -174,7 +174,7 @@ class Held(ExactSetup):
 
     @property
     def noise(self) -> dict[str, Fraction]:
-        """Bounds of the measurement noise by input of the loop; with jitter every measurement has some."""
+        """Bounds of the measurement noise by input of the loop; not empty with jitter."""
         measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.off else ()
         return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
 
@@ -201,10 +201,10 @@ class Held(ExactSetup):
         off, part = self.jitter + self.delay_jitter, self.delay % self.step
         return min(self.step - part - off, self.step - 2 * off)
 
-    def told(self, task: FaultPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
+    def measured_errors(self, task: FaultPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
         """Bounds of the measured errors from those of the true errors at any time [m], [m/s].
 
-        A measurement that is early or late may be compared with the reference at its instant.
+        A measurement with a timing error may be compared with the reference at its nominal instant.
         """
         off = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
         slip, rate = (error + noise + self.off * moves for error, noise, moves in off)
@@ -212,7 +212,7 @@ class Held(ExactSetup):
 
     @property
     def controller(self) -> "SampledController":
-        """The law for `simulate`, with the scheme ``explicit``, the step T_s, and the delay, lag and rock around it.
+        """Law for `simulate` with the scheme ``explicit``, T_s, delay, lag and diffusion path.
 
         Raises
         ------
@@ -240,7 +240,7 @@ class Held(ExactSetup):
         )
         if self.diffusion:
             gain = (model or task.model).gain / task.authority
-            loop = with_known_area(loop, gain, Layer(time=self.diffusion))
+            loop = with_response_area(loop, gain, Layer(time=self.diffusion))
         box = starts(self.law, len(loop.states), self.start, (self.slip_noise, self.rate_noise))
         return replace(loop, start=box)
 
@@ -304,7 +304,7 @@ def channels_of(
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> tuple[Channel, ...]:
-    """Inputs of the loop of a task, of a law with an implicit root or without, with noise or without.
+    """Inputs of the nominal loop of a task, with their bounds.
 
     `noise` has the bounds of those inputs of the loop that are noise, `jitter` [s] is that of the measurements.
     """
@@ -322,12 +322,12 @@ def channels_of(
         Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
         *implicit,
         *aged,
-        *_told(task, noise, jitter),
+        *_measurement_errors(task, noise, jitter),
     )
 
 
-def _told(task: FaultPlant, noise: Mapping[str, Fraction], jitter: Fraction) -> Iterator[Channel]:
-    """Measured minus true errors at the nominal instants: noise, and the motion during the timing error."""
+def _measurement_errors(task: FaultPlant, noise: Mapping[str, Fraction], jitter: Fraction) -> Iterator[Channel]:
+    """Measurement errors at the nominal instants: noise, and motion during the timing error."""
     forces = _task_inputs(task)[0]
     slopes = [max(map(abs, ends)) for ends in (task.slip_chord, task.rate_chord, task.beta)]
     moves = {
@@ -342,7 +342,7 @@ def _told(task: FaultPlant, noise: Mapping[str, Fraction], jitter: Fraction) -> 
 
 
 def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of reference (`continuous_loop`, `held_loop`), initial state and late pressures, as far as they exist."""
+    """Inputs of reference, initial state and late pressures, as far as the loop has them."""
     for name in ("reference", "reference_rate"):
         if name in names:
             yield Channel(name=name, own=task.reference_rates[0], shares={})
@@ -357,7 +357,7 @@ def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
 
 
 def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
-    """Inputs of a loop with a layer: its truncation error acts as v does; after a step it is a fading input."""
+    """Inputs of a loop with a diffusion path; its truncation error fades after each step."""
     fades = ("left_out", "left_out") in gains
     for channel in channels:
         share = {"left_out": channel.shares["push"]} if "push" in channel.shares else {}

@@ -1,7 +1,7 @@
 """Several blocks with rate-and-state friction in slow sliding, as an uncertain plant.
 
 Each block obeys the equations of `sliding_small_gain`, whose symbols are used here, and springs pull it towards its
-neighbours: with q the pressures of the wells beside the plan Kr/μ*, behind a lag, S their shares, and
+neighbours: with q the pressures of the wells less the plan Kr/μ*, after a lag, S their shares, and
 w = −Kx + Σk(x_j − x) + μ*Sq,
 
     y·B = ŝ − Nbz + w,  B = Na + HV·f/y,    x′ = V(f − ω),    z′ = −ρ(f + g),    q′ = (u − q)/lag.
@@ -52,7 +52,7 @@ class BlockClaims:
     pull : Fraction
         W: what springs and wells pull [Pa].
     push : Fraction
-        Q: pressure asked for at a well beside the plan [Pa]; those in the blocks are means of its past.
+        Q: commanded pressure at a well less the plan [Pa]; the pressures in the blocks are means of its past.
     """
 
     log_state: Fraction
@@ -73,7 +73,7 @@ class _Ranges:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SlidingBlocks:
-    """Blocks in slow sliding, a lag behind all wells, and the bound of the shear stress on every block.
+    """Blocks in slow sliding with a lag at all wells and a bound of the shear stress.
 
     Attributes
     ----------
@@ -83,10 +83,6 @@ class SlidingBlocks:
         [s].
     stress : Fraction
         [Pa].
-
-    Raises
-    ------
-    ParameterError, UnsupportedError
     """
 
     chain: BlockChain
@@ -134,7 +130,7 @@ class SlidingBlocks:
 
     @cached_property
     def springs(self) -> tuple[Row, ...]:
-        """Pull on every block (rows) per slip of every block [Pa/m], that of the far end included."""
+        """Stiffness matrix of the pulls on blocks [Pa/m], with the far end."""
         N, inertia = len(self.tasks), self.tasks[0].inertia
         rows = [[-task.stiffness * (i == j) for j in range(N)] for i, task in enumerate(self.tasks)]
         add_springs(rows, self.chain.springs, inertia)
@@ -147,20 +143,20 @@ class SlidingBlocks:
 
     def log_rate(self, claims: BlockClaims) -> UpperBound | None:
         """Y of all blocks [-] by claims; None where a block may open, or Y is beyond 3."""
-        found = self._ranges(claims)
-        return None if found is None else UpperBound(max(one.log_rate for one in found))
+        ranges = self._ranges(claims)
+        return None if ranges is None else UpperBound(max(one.log_rate for one in ranges))
 
     def _ranges(self, claims: BlockClaims) -> list[_Ranges] | None:
         """Of all blocks."""
         fastest = claims.log_state
         for _ in range(_TURNS):
-            found = [self._of_block(i, claims, fastest) for i in range(len(self.tasks))]
-            known = [one for one in found if one is not None]
-            if len(known) < len(found):
+            ranges = [self._of_block(i, claims, fastest) for i in range(len(self.tasks))]
+            bounded = [one for one in ranges if one is not None]
+            if len(bounded) < len(ranges):
                 return None
-            largest = max(one.log_rate for one in known)
+            largest = max(one.log_rate for one in bounded)
             if largest <= fastest:
-                return known
+                return bounded
             fastest = min(_outward(largest, largest * _WIDER)[1], Fraction(_LARGEST))
         return None
 
@@ -207,7 +203,7 @@ class SlidingBlocks:
             return None
         slip = [task.ranges["critical_slip"][0] for task in self.tasks]
         for i, task in enumerate(self.tasks):
-            found, place = ranges[i], i + 1
+            block, place = ranges[i], i + 1
             mu, D = sum(task.ranges["coefficient"]) / 2, task.ranges["critical_slip"][0]
             ageing = V / D
             state = unit(size, N + i)
@@ -217,19 +213,19 @@ class SlidingBlocks:
             pull = (*(v / MPA for v in scaled), *[zero] * N, *(mu * v for v in self.chain.shares[i]))
             pulls.append(pull)
             sectors[f"rate of block {place} by its state"] = Sector(
-                entry=tuple(-v for v in slips), row=state, slopes=found.by_state, within=claims.log_state
+                entry=tuple(-v for v in slips), row=state, slopes=block.by_state, within=claims.log_state
             )
             sectors[f"rate of block {place} by its pull"] = Sector(
-                entry=slips, row=pull, slopes=tuple(MPA * v for v in found.by_pull), within=claims.pull / MPA
+                entry=slips, row=pull, slopes=tuple(MPA * v for v in block.by_pull), within=claims.pull / MPA
             )
             sectors[f"ageing of block {place}"] = Sector(
-                entry=ages, row=state, slopes=found.ageing, within=claims.log_state
+                entry=ages, row=state, slopes=block.ageing, within=claims.log_state
             )
-            disturbances[f"stress on block {place}"] = (slips, _outward(*[found.by_pull[1] * found.stress] * 2)[1])
+            disturbances[f"stress on block {place}"] = (slips, _outward(*[block.by_pull[1] * block.stress] * 2)[1])
             if task.swing:
                 disturbances[f"reference of block {place}"] = (unit(size, i), ageing * task.swing)
         weights = measured_by(self.chain.shares)
-        more = UpperBound(max(found.stress for found in ranges) - self.stress)
+        more = UpperBound(max(block.stress for block in ranges) - self.stress)
         name = f"{self.chain.name}, {N} blocks, {counted(m, 'well')}"
         return UncertainPlant(
             A=[(zero,) * size] * (2 * N) + [tuple(-v / self.lag for v in unit(size, 2 * N + k)) for k in range(m)],

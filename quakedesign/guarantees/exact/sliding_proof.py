@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.guarantees.exact.proof import NoProof, Proof
-from quakedesign.guarantees.exact.sampled_loop import Held
+from quakedesign.guarantees.exact.sampled_loop import SampledLoop
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, cell_bounds, exponential, follows
 from quakedesign.lyapunov.exact.certificate_files import SLOW_SLIDING
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SlidingProof(Proof):
-    """Claims about one loop around slow sliding; `check` decides them.
+    """Claims about one loop in slow sliding; `check` decides them.
 
     Attributes
     ----------
     task : SlidingPlant
-    held : Held
+    held : SampledLoop
     cuts : Cuts
         Subdivision of the box of constants into cells.
     claims : SlidingClaims
@@ -35,13 +35,13 @@ class SlidingProof(Proof):
     kind: ClassVar[str] = SLOW_SLIDING
     slides: ClassVar[bool] = True
     task: SlidingPlant
-    held: Held
+    held: SampledLoop
     cuts: Cuts
     claims: SlidingClaims
 
     @property
     def motion(self) -> str:
-        """During which slip, and under which stress, for people."""
+        """Slip range and stress for which the slip rate is bounded, as text."""
         stress = LowerBound(self.task.stress).quantity("Pa")
         return f" {self.lasts}, under every shear stress disturbance of at most {stress}"
 
@@ -62,7 +62,7 @@ class SlidingProof(Proof):
 
     @property
     def controller(self) -> "SampledController":
-        """The law for `simulate`, with its T_s and the delay, lag and rock that it is proved for."""
+        """Law for `simulate` with the T_s, delay, lag and diffusion path of the proof."""
         return self.held.controller
 
     @cached_property
@@ -71,7 +71,7 @@ class SlidingProof(Proof):
         return cells(self.task, self.cuts)
 
     def check(self) -> Verdict:
-        """PROVED if the claims are self-consistent (fixed point) on every cell, in ball arithmetic; else UNDECIDED."""
+        """PROVED if the claims reproduce themselves on every cell, in ball arithmetic."""
         for cell in self.cells:
             bounds = cell_bounds(cell, self.held, self.claims)
             if isinstance(bounds, NoProof) or not follows(bounds, self.claims):
@@ -114,7 +114,7 @@ class SlidingProof(Proof):
         }
 
     def sentence(self) -> str:
-        """Statement of the guarantee as text; bounds rounded outward, bounds of its conditions down."""
+        """Statement of the guarantee; bounds are rounded outward, conditions inward."""
         task, held, claims = self.task, self.held, self.claims
         ratio = UpperBound(exponential(claims.log_rate))
         (low, high), (least, largest) = self.pressures, self.valve_pressures
@@ -132,7 +132,7 @@ class SlidingProof(Proof):
         )
 
 
-def _path(held: Held) -> str:
+def _path(held: SampledLoop) -> str:
     text = f"with zero-order hold over {float(held.step):.6g} s"
     text += f", with a delay of {float(held.delay):.6g} s" if held.delay else ""
     text += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""

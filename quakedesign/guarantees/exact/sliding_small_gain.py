@@ -1,4 +1,4 @@
-"""Robust small-gain theorem about slow sliding with rate-and-state friction: v ≤ Ve^Y.
+"""Robust small-gain theorem for slow sliding with rate-and-state friction: v ≤ Ve^Y.
 
 **Plant.** Per unit of area, with v = Ve^y, θ = (D/V)e^z, the slip error x, the pressure error q = p − p* and N = σ′ −
 p,
@@ -62,7 +62,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, shortly
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import Channel, Gains, Held
+from quakedesign.guarantees.exact.sampled_loop import Channel, Gains, SampledLoop
 from quakedesign.guarantees.exact.small_gain import channel_bounds
 from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
 from quakedesign.plant.sliding_plant import Range, SlidingPlant
@@ -110,13 +110,13 @@ class SlidingClaims:
             )
 
 
-def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | NoProof:
-    """What follows from the claims for a box of constants as one cell, by the names of the claims; ``small_gain`` too.
+def cell_bounds(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> dict[str, Any] | NoProof:
+    """Bounds that follow from the claims on one cell, by name, with ``small_gain``.
 
     Raises
     ------
     ParameterError
-        For a law that does not rest, or a pressure that reaches the fault without lag or rock.
+        For a law without a steady state, or a pressure without lag and diffusion path.
     """
     model = model_of(task, claims)
     if model is None:
@@ -131,13 +131,13 @@ def cell_bounds(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[s
 
 def bounds_from(
     task: SlidingPlant,
-    held: Held,
+    held: SampledLoop,
     claims: SlidingClaims,
     loop: PeriodicLoop,
     gains: Gains,
     phases: Sequence[Fraction],
 ) -> dict[str, Any] | NoProof:
-    """The same from the gains of the loop; of floats, what floats make of them.
+    """Bounds that follow from the gains of the loop; an estimate for gains in floats.
 
     `phases` are times [s] since a step reached the well, at the beginning of every part that has a gain.
     """
@@ -170,8 +170,8 @@ def follows(bounds: Mapping[str, Any], claims: SlidingClaims) -> bool:
     return all(bounds[name] < getattr(claims, name) for name in SlidingClaims.__dataclass_fields__)
 
 
-def loop_of(held: Held, model: SlidingModel, task: SlidingPlant) -> PeriodicLoop:
-    """The nominal loop; without the drift where the plan is exact, and without a reference where its rate is V.
+def loop_of(held: SampledLoop, model: SlidingModel, task: SlidingPlant) -> PeriodicLoop:
+    """Nominal loop; it has the inputs ``drift`` and ``reference`` only if their bounds are not 0.
 
     Raises
     ------
@@ -232,7 +232,9 @@ def _left(task: SlidingPlant, claims: SlidingClaims) -> str:
     return "regularised friction may come near 0"
 
 
-def channels_of(task: SlidingPlant, held: Held, claims: SlidingClaims, loop: PeriodicLoop) -> tuple[Channel, ...]:
+def channels_of(
+    task: SlidingPlant, held: SampledLoop, claims: SlidingClaims, loop: PeriodicLoop
+) -> tuple[Channel, ...]:
     """Inputs of the loop and what bounds them."""
     low, high = task.normal_stress(claims.push)
     rates, states = chords(claims.log_rate), _state_slopes(task, claims)
@@ -262,7 +264,7 @@ def channels_of(task: SlidingPlant, held: Held, claims: SlidingClaims, loop: Per
     return tuple(channels)
 
 
-def inertia(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
+def inertia(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> Fraction:
     """Stress equivalent of inertia, sup|r|/λ₀ [Pa]."""
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
@@ -286,7 +288,7 @@ def _least_exponent(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     return 2 * (mu - a * claims.log_rate - b * claims.log_state) / a
 
 
-def _fastest_push(task: SlidingPlant, held: Held, claims: SlidingClaims) -> Fraction:
+def _fastest_push(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> Fraction:
     """Bound of |q′| [Pa/s]."""
     late = held.diffusion / 2 + held.lag
     speed = Fraction(5, 2) / held.diffusion if held.diffusion else 1 / held.lag
@@ -307,9 +309,9 @@ def _fastest_state(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
 
 
 def _moved(
-    task: SlidingPlant, held: Held, claims: SlidingClaims, model: SlidingModel, time: Fraction
+    task: SlidingPlant, held: SampledLoop, claims: SlidingClaims, model: SlidingModel, time: Fraction
 ) -> dict[str, Fraction]:
-    """How far y and what is made of it can move within a time [s], but for what the stress adds at once."""
+    """Bounds of the change of y and its combinations within a time [s], without steps of e."""
     of_state = _fastest_state(task, claims)
     change = (
         _fastest_pull(task, claims) + model.weakening * of_state + model.coefficient * _fastest_push(task, held, claims)
@@ -329,7 +331,7 @@ def chords(size: Fraction) -> Range:
 
 
 def _state_slopes(task: SlidingPlant, claims: SlidingClaims) -> Range:
-    """What c_z stands in place of: of ageing (1 − e^{−z})/z, of the slip law (ρ/ρ₀)e^y."""
+    """Range around c_z: (1 − e^{−z})/z of the ageing law, (ρ/ρ₀)e^y of the slip law."""
     if task.state_law == "ageing":
         return chords(claims.log_state)
     grown, off = exponential(claims.log_rate), _off(task)
@@ -338,7 +340,7 @@ def _state_slopes(task: SlidingPlant, claims: SlidingClaims) -> Range:
 
 @lru_cache(maxsize=64, typed=True)
 def exponential(size: Fraction) -> Fraction:
-    """e^Y from above, for 0 ≤ Y ≤ 3: what Taylor's sum leaves out is below its next term over 1 − Y/(n + 1)."""
+    """Upper bound of e^Y for 0 ≤ Y ≤ 3, by Taylor's sum and its remainder."""
     term = _ONE
     for k in range(1, _TERMS + 1):
         term *= size / k
@@ -376,7 +378,7 @@ def _half(ends: Range) -> Fraction:
 
 
 def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
-    """Times [s] since a step reached the well, at the beginning of every part of the period; all 0 where none does."""
+    """Times [s] since the last step at the well, at the start of each part; 0 without steps."""
     first = {fading.first for fading in loop.fading.values()}
     starts = list(accumulate((part.duration for part in loop.segments), initial=_ZERO))
     origin = starts[max(first)] if first else None
@@ -388,7 +390,7 @@ def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
 
 
 def settled(loop: PeriodicLoop) -> Fraction:
-    """The first of these times at which what is left out has faded to a sixteenth [s]; 0 where it does not."""
+    """First of these times at which the truncation error is below 1/16 [s]; 0 without one."""
     times = sorted(after_a_step(loop))
     return next((t for t in times for fading in loop.fading.values() if fading.weight(t) <= _FADED), _ZERO)
 
@@ -396,7 +398,7 @@ def settled(loop: PeriodicLoop) -> Fraction:
 def _with_what_adds_at_once(
     loop: PeriodicLoop, model: SlidingModel, gains: Gains, phases: Sequence[Fraction]
 ) -> dict[tuple[str, str], tuple[Any, ...]]:
-    """Gains with what stress and left out pressure make of y at once, in every part of the period."""
+    """Gains with the direct feedthrough from stress and truncation error to y."""
     total = dict(gains)
     for (output, name), size in at_once(model).items():
         if name in loop.inputs:
@@ -410,7 +412,7 @@ def _with_what_adds_at_once(
 def _once_settled(
     gains: Mapping[tuple[str, str], tuple[Any, ...]], phases: Sequence[Fraction], late: Fraction
 ) -> dict[tuple[str, str], tuple[Any, ...]]:
-    """Gains of y and what is made of it, with those of the part that ends with a step in all parts soon after one."""
+    """Gains in which the last part of the period replaces all parts soon after a step."""
     last = max(range(len(phases)), key=lambda j: phases[j])
     return {
         (output, name): tuple(v[last] if output in _AT_ONCE and phases[j] < late else v[j] for j in range(len(v)))

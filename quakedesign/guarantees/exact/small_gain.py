@@ -142,7 +142,7 @@ class Bounds:
         |e2| [m/s].
     push : Fraction
         b·|p − p*| [m/s²].
-    asked : Fraction, optional
+    valve_push : Fraction, optional
         The same at the valve [m/s²]; None where both pressures are equal.
     stepped : Fraction, optional
         b times the change of the commanded pressure between samples [m/s²]; None where it is not needed.
@@ -155,7 +155,7 @@ class Bounds:
     slip_rate_error: Fraction
     push: Fraction
     small_gain: Fraction
-    asked: Fraction | None = None
+    valve_push: Fraction | None = None
     stepped: Fraction | None = None
 
 
@@ -166,7 +166,7 @@ def certified_bounds(
     noise: Mapping[str, Fraction] = NOISELESS,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
-    """Bounds of the theorem for the loop of `held_loop` or `continuous_loop` with the task's model.
+    """Bounds of the theorem for the nominal loop of a task.
 
     `noise` has the bounds of those inputs of the loop that are noise, in SI units, `jitter` that of measurements [s].
 
@@ -188,12 +188,12 @@ def best_bounds(
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
-    """Bounds of the theorem from the gains; of a disturbance of bounded rate, the better of both classes."""
+    """Bounds of the theorem from the gains; in class ``rate`` the smaller of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
-    answers = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
-    proved = [bounds for bounds in answers if bounds.proved]
+    results = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
+    proved = [bounds for bounds in results if bounds.proved]
     if not proved:
-        return answers[0]
+        return results[0]
     every = {part.name: [getattr(bounds, part.name) for bounds in proved] for part in fields(Bounds)}
     best: dict[str, Any] = {name: None if None in values else min(values) for name, values in every.items()}
     return Bounds(**best)
@@ -208,7 +208,7 @@ def bounds_from(
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
-    """Bounds of the theorem from the gains of the nominal loop; for gains in floats an estimate in floats."""
+    """Bounds of the theorem from the gains of the nominal loop; an estimate for floats."""
     channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
         channels = tuple(through_layer(channels, gains))
@@ -222,7 +222,7 @@ def bounds_from(
         slip_rate_error=Fraction(peaks["slip_rate_error"]),
         push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + unshifted(task)),
         small_gain=Fraction(small_gain),
-        asked=Fraction(peaks["asked"] + unshifted(task)) if "asked" in peaks else None,
+        valve_push=Fraction(peaks["asked"] + unshifted(task)) if "asked" in peaks else None,
         stepped=Fraction(peaks["stepped"]) if "stepped" in peaks else None,
     )
 
@@ -249,7 +249,7 @@ def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict
 
 
 def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:
-    """Upper bound of the spectral radius of a non-negative matrix by halving, within a millionth if it is not zero.
+    """Upper bound of the spectral radius of a non-negative matrix, by bisection to 1e-6.
 
     It is below v if, and only if, elimination of v − M has positive pivots (Hawkins and Simon 1949).
     """
@@ -289,7 +289,7 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
 
 
 def unshifted(task: FaultPlant) -> Fraction:
-    """Difference of b·(p − p*) and the loop's matched disturbance, p* shifted in class ``rate`` [m/s²]."""
+    """Bound of b·(p − p*) less the shifted matched disturbance of class ``rate`` [m/s²]."""
     if task.change is None:
         return _ZERO
     return task.amplitude / ((task.beta[0] + task.beta[1]) / 2 if task.friction.rate_slope else 1)
@@ -322,10 +322,6 @@ class SlowGain:
         Number of equal parts of the range of the gain, at most 16; each has its own nominal loop.
     growth : Fraction
         α [1/s]: weight e^{ασ} of the response a time σ ago.
-
-    Raises
-    ------
-    ParameterError
     """
 
     parts: int
@@ -407,7 +403,7 @@ _SECTOR_HALVINGS = 10
 
 
 def holds(root: ImplicitRoot, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
-    """Whether the sector is proved to enclose the root for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]."""
+    """Whether the sector encloses the root for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]."""
     last = slip / step
     low, high = root.slopes
     with ctx.workprec(_BITS):
@@ -429,7 +425,7 @@ def _above(root: ImplicitRoot, step: Fraction, rate: Fraction, slopes: Range, pa
 
 
 def _least(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
-    """Lower bound of q at given arguments, or larger ones; the bound and the arguments are exact balls."""
+    """Lower bound of q for arguments at or above given ones, in exact balls."""
     total = arb(0)
     for term in terms:
         inner = {"slip": slip, "rate": rate}

@@ -1,4 +1,4 @@
-"""Proof about a sampled loop on the stick–slip plant: claims, their check, and the statement."""
+"""Proof for a sampled loop on the stick–slip plant: claims, check, statement."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
@@ -38,7 +38,7 @@ class StickSlipProof(Proof):
     reach : StickSlipPolytope
     claims : StickSlipClaims
     healing : Fraction
-        Δμ_h [-] that a part of the task's disturbance stands for, see `covered_healing`; files do not state it.
+        Δμ_h [-] included in the task's disturbance, see `covered_healing`; not part of the file.
     """
 
     kind: ClassVar[str] = STICK_SLIP
@@ -55,17 +55,17 @@ class StickSlipProof(Proof):
 
     @property
     def peak_slip_rate(self) -> UpperBound:
-        """What the slip rate never exceeds [m/s]."""
+        """Bound of the slip rate [m/s]."""
         return self.claims.peak_slip_rate
 
     @property
     def slip_rate_error(self) -> UpperBound:
-        """Slip rate less that of the reference, absolute value [m/s]: both are at least 0."""
+        """Bound of the slip-rate error [m/s]; slip rate and reference rate are at least 0."""
         return UpperBound(max(self.claims.peak_slip_rate, self.task.reference_rates[0]))
 
     @property
     def motion(self) -> str:
-        """In which states, for people."""
+        """States for which the slip rate is bounded, as text."""
         return ", whether the fault slides or sticks"
 
     @property
@@ -101,7 +101,7 @@ class StickSlipProof(Proof):
         return laws.StickSlipController(law=self.held.law, step=self.held.step, longest=self.held.longest_step)
 
     def covered_healing(self, disturbance: Fraction = Fraction(0)) -> LowerBound:
-        """Healing Δμ_h [-] that these claims cover as well where the disturbance is at most the given one [m/s²].
+        """Healing Δμ_h [-] that these claims also cover, for a disturbance bound [m/s²].
 
         Friction that holds a fault at rest may then exceed that of the slide by up to Δμ_h, after a rest of any length.
         It adds at most Δ = N̂Δμ_h(σ' − p) to what holds the fault. Let H be the disturbance and G the force without it,
@@ -124,7 +124,7 @@ class StickSlipProof(Proof):
         return LowerBound((most - disturbance) / self._per_healing)
 
     def beside_healing(self, task: FaultPlant, healing: Fraction) -> tuple[FaultPlant, LowerBound | None]:
-        """Task whose disturbance and healing the claims cover as one disturbance; the healing covered if it is less."""
+        """Task with the disturbance of the claims, and the covered healing if it is too small."""
         if task.amplitude > self.task.amplitude:
             return task, None
         covered = self.covered_healing(task.amplitude)
@@ -132,7 +132,7 @@ class StickSlipProof(Proof):
 
     @property
     def disturbance(self) -> Fraction:
-        """Bound of the disturbance [m/s²] beside `healing`."""
+        """Bound of the disturbance [m/s²] without `healing`."""
         return self.task.amplitude - self.healing * self._per_healing
 
     @property
@@ -171,7 +171,7 @@ class StickSlipProof(Proof):
         }
 
     def sentence(self) -> str:
-        """What is guaranteed, for people; bounds rounded outward, what it is guaranteed for inward."""
+        """Statement of the guarantee; bounds are rounded outward, conditions inward."""
         task, held, claims = self.task, self.held, self.claims
         stress = LowerBound(self.disturbance / task.area_per_mass[1])
         size = f"{LowerBound(self.disturbance):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
@@ -191,7 +191,7 @@ class StickSlipProof(Proof):
         )
 
     def _measured(self) -> str:
-        """Sentence part about measurements; what they may be off is rounded inward."""
+        """Part of the statement on measurement errors, rounded inward."""
         if not self.held.slip_noise:
             return "exact measurements of slip and slip rate"
         return f"slip measured within {LowerBound(self.held.slip_noise).quantity('m')} and slip rate measured exactly"

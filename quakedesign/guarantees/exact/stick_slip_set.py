@@ -1,4 +1,4 @@
-"""Invariant polytope of the sampled loop on the stick–slip plant, verified in ball arithmetic.
+"""Invariant polytope of the sampled loop on the stick–slip plant, in ball arithmetic.
 
 **Plant.** Let y = x2 ≥ 0 be the slip rate, p*(x1) the pressure that balances the fault at rest at slip x1, b·β(x1) =
 μN̂, and U = p*(x1) − p at a sample with the held pressure p. For the slip ξ since the sample
@@ -180,7 +180,7 @@ class StickSlipPolytope:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledStickSlip:
-    """The law as it runs: once every T_s, its pressure held.
+    """A sampled law on the stick–slip plant, with zero-order hold over T_s.
 
     Attributes
     ----------
@@ -227,7 +227,7 @@ class SampledStickSlip:
 
     @property
     def noise(self) -> dict[str, Fraction]:
-        """Bounds of measurement errors, as `Held.noise`."""
+        """Bounds of measurement errors, as `SampledLoop.noise`."""
         return {"slip_noise": self.slip_noise} if self.slip_noise else {}
 
     @property
@@ -243,33 +243,33 @@ class SampledStickSlip:
         return tuple(self.step + (self.longest_step - self.step) * i / PIECES for i in range(PIECES + 1))
 
     @property
-    def told(self) -> Fraction:
-        """What noise adds at most to the rate of the reference in the law [m/s]."""
+    def target_noise(self) -> Fraction:
+        """Largest contribution of noise to the reference rate in the law [m/s]."""
         return 2 * self.law.return_rate * self.slip_noise
 
     @property
     def push_noise(self) -> Fraction:
-        """What noise adds to U at most [Pa]."""
+        """Largest contribution of noise to U [Pa]."""
         return self.law.slip_gain * self.slip_noise
 
     def errors(self, task: FaultPlant, slip: Fraction, rate: Fraction) -> tuple[Fraction, Fraction]:
-        """Bounds of the measured slip error [m] and slip-rate error [m/s] from those of slip error and slip rate."""
+        """Bounds of the measured slip error [m] and slip-rate error [m/s] from the true ones."""
         return slip + self.slip_noise, max(rate, task.reference_rates[0])
 
     @property
     def path(self) -> dict[str, Fraction]:
-        """Delay, lag and diffusion [s], as `Held.path`: none."""
+        """Delay, lag and diffusion [s], as `SampledLoop.path`: none."""
         return {}
 
     @property
     def start(self) -> tuple[Fraction, Fraction]:
-        """Bounds of the initial errors [m, m/s], as `Held.start`: rest."""
+        """Bounds of the initial errors [m, m/s], as `SampledLoop.start`: rest."""
         return Fraction(0), Fraction(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StickSlipClaims:
-    """What is never exceeded: as the theorem gives it, or as it is claimed.
+    """Bounds of slip error, slip rate and pressure, as proved or as claimed.
 
     Attributes
     ----------
@@ -329,7 +329,7 @@ class StickSlipClaims:
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """How numbers are computed: floats for a search, balls for a proof; arrays of both have the same operations."""
+    """Number type: floats for a search, balls for a proof; arrays have the same operations."""
 
     number: Callable[[Fraction], Any]
     exponential: Callable[[tuple[tuple[Fraction, ...], ...]], list[list[Any]]]
@@ -343,8 +343,8 @@ class Numbers:
 
 
 def _ball_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]:
-    found: list[list[Any]] = matrix(rows).exp().tolist()
-    return found
+    exponential: list[list[Any]] = matrix(rows).exp().tolist()
+    return exponential
 
 
 def curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[tuple[Any, Any], ...]:
@@ -352,7 +352,7 @@ def curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[t
     a = matrix(flow)
     within = absolute((majorant(a) * ball(step)).exp())
     powers = (within, absolute(a) * within, absolute(a * a) * within)
-    return tuple((found[0, 1].upper(), found[1, 1].upper()) for found in powers)
+    return tuple((power[0, 1].upper(), power[1, 1].upper()) for power in powers)
 
 
 def _ball_array(values: Any) -> np.ndarray:
@@ -405,7 +405,9 @@ class Ranges:
 
 
 def ranges(task: FaultPlant, ahead: Fraction, push: Range, moved: Fraction) -> Ranges:
-    """For a slip of at most `ahead` [m] beyond the target and `moved` [m] in a period, and U = p* − p in a range [Pa].
+    """Ranges of the plant for bounds of slip and of U = p* − p [Pa].
+
+    The slip is at most `ahead` [m] beyond the target, and at most `moved` [m] in a period.
 
     β changes within a period by at most N̂|μ′|/b·`moved`, so that σ is that share larger than s/(bβ) at most.
 
@@ -433,7 +435,7 @@ def ranges(task: FaultPlant, ahead: Fraction, push: Range, moved: Fraction) -> R
     return Ranges(slope=slope, damping=damping, chord=chord, rest_pressure=rest)
 
 
-def stop_bounds(task: FaultPlant, held: SampledStickSlip, found: Ranges) -> tuple[tuple[Fraction, Fraction], ...]:
+def stop_bounds(task: FaultPlant, held: SampledStickSlip, plant: Ranges) -> tuple[tuple[Fraction, Fraction], ...]:
     """Pairs (g, h) with D ≤ g·y + h for the slip D [m] until a last stop within a period.
 
     Upper bounds of the exponentials: (1 − e^{−wm})/w ≤ m − wm²/2 + w²m³/6, (e^{wx} − 1 − wx)/w² ≤ x²/2/(1 − wx/3) and
@@ -445,13 +447,13 @@ def stop_bounds(task: FaultPlant, held: SampledStickSlip, found: Ranges) -> tupl
         For a period that is long against the plant.
     """
     step, amplitude = held.longest, task.amplitude
-    low, high = found.damping
+    low, high = plant.damping
     least = Fraction(1, 2) + low * step / 24
     pairs = []
     for i in range(LINES + 1):
         share = least + (1 - least) * i / LINES
         m, x = share * step, (1 - share) * step
-        room = 1 + found.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
+        room = 1 + plant.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
         if least >= 1 or low * x >= 1 or room <= 0:
             raise ParameterError("T_s is too long against the damping and the slope of friction for a bound of stops")
         start = m - low * m**2 / 2 + low**2 * m**3 / 6
@@ -466,7 +468,7 @@ class Period:
     back: Numbers
     task: FaultPlant
     held: SampledStickSlip
-    found: Ranges
+    plant: Ranges
     interval: Fraction
     of_rate: tuple[Any, Any]  # ξ and y at the end, of y
     of_force: tuple[Any, Any]  # and of a constant force
@@ -476,15 +478,15 @@ class Period:
 
     @classmethod
     def deciding(
-        cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, found: Ranges, rate: Fraction, push: Range
+        cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, plant: Ranges, rate: Fraction, push: Range
     ) -> "list[Period]":
-        """Those that decide for all intervals, from exact ranges, the largest slip rate [m/s] and U [Pa]."""
+        """Periods that decide for all intervals, for a largest slip rate [m/s] and U [Pa]."""
         zero, one = _ZERO, Fraction(1)
-        slope, damping = (sum(pair, _ZERO) / 2 for pair in (found.slope, found.damping))
+        slope, damping = (sum(pair, _ZERO) / 2 for pair in (plant.slope, plant.damping))
         flow = (zero, one), (slope, -damping)
         tall = (*((*row, entry) for row, entry in zip(flow, (zero, one), strict=True)), (zero, zero, zero))
         sizes, periods = back.bent(flow, held.longest), []
-        margin = _margin(back, task, held, found, sizes, rate, push)
+        margin = _margin(back, task, held, plant, sizes, rate, push)
         for interval in held.intervals:
             whole = back.exponential(tuple(tuple(v * interval for v in row) for row in tall))
             ends = [tuple(tuple(v * interval / NODES * i for v in row) for row in flow) for i in range(NODES + 1)]
@@ -493,7 +495,7 @@ class Period:
                 back=back,
                 task=task,
                 held=held,
-                found=found,
+                plant=plant,
                 interval=interval,
                 of_rate=(whole[0][1], whole[1][1]),
                 of_force=(whole[0][2], whole[1][2]),
@@ -505,7 +507,7 @@ class Period:
         return periods
 
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
-        """∫h(t)·t^j dt for j = 0 to 3, h(t) ≥ |g(T − t)|, g = `of_slip`·ξ + `of_rate`·y of an impulse.
+        """∫h(t)·t^j dt, j = 0 to 3, with h(t) ≥ |g(T − t)| for an impulse g.
 
         On a piece h is the chord of its ends plus h²/8·max|g″|. All integrals are of this one function, as what they
         multiply may be negative alone.
@@ -520,11 +522,11 @@ class Period:
         ]
 
     def more(self, whole: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """What the ranges of slope and damping add to factors of y and of H − bβU."""
-        number, found = self.back.number, self.found
-        growth = 1 / (1 - found.slope[1] * self.held.longest**2 / 2)
-        per_slip = number((found.slope[1] - found.slope[0]) / 2 * growth)
-        per_rate, steepest = number((found.damping[1] - found.damping[0]) / 2), number(found.slope[1] * growth)
+        """Contribution of the ranges of slope and damping to the factors of y and H − bβU."""
+        number, plant = self.back.number, self.plant
+        growth = 1 / (1 - plant.slope[1] * self.held.longest**2 / 2)
+        per_slip = number((plant.slope[1] - plant.slope[0]) / 2 * growth)
+        per_rate, steepest = number((plant.damping[1] - plant.damping[0]) / 2), number(plant.slope[1] * growth)
         of_rate = per_slip * whole[1] + per_rate * (whole[0] + steepest * whole[2])
         return of_rate, (per_slip * whole[2] + per_rate * steepest * whole[3]) / 2 + per_rate * whole[1]
 
@@ -533,7 +535,7 @@ def _margin(
     back: Numbers,
     task: FaultPlant,
     held: SampledStickSlip,
-    found: Ranges,
+    plant: Ranges,
     sizes: tuple[tuple[Any, Any], ...],
     rate: Fraction,
     push: Range,
@@ -544,13 +546,13 @@ def _margin(
     """
     number, longest, most = back.number, held.longest, task.beta[1] * task.authority
     step = (longest - held.step) / PIECES if held.longest_step else _ZERO
-    still = task.reference_rates[1] * longest / 2 + held.told
+    still = task.reference_rates[1] * longest / 2 + held.target_noise
     pushed = most * (max(map(abs, push)) + held.law.target_gain * still + held.push_noise)
-    growth = 1 / (1 - found.slope[1] * longest**2 / 2)
-    per_slip, per_rate = (found.slope[1] - found.slope[0]) / 2 * growth, (found.damping[1] - found.damping[0]) / 2
+    growth = 1 / (1 - plant.slope[1] * longest**2 / 2)
+    per_slip, per_rate = (plant.slope[1] - plant.slope[0]) / 2 * growth, (plant.damping[1] - plant.damping[0]) / 2
     force = task.amplitude + pushed
     first, later = task.amplitude + per_rate * rate, per_rate * force
-    last = longest * force * (per_slip + 3 * per_rate * found.slope[1] * growth * longest)
+    last = longest * force * (per_slip + 3 * per_rate * plant.slope[1] * growth * longest)
     own, moved, bent = sizes
     return tuple(
         number(step**2 / 8) * (c * number(rate) + b * number(pushed + first) + a * number(later + last))
@@ -560,12 +562,12 @@ def _margin(
 
 def _weights() -> list[list[Fraction]]:
     """Integrals of hat functions at 0 to NODES times t^j, j = 0 to 3."""
-    found = [[_ZERO] * (NODES + 1) for _ in range(4)]
-    for j, line in enumerate(found):
+    weights = [[_ZERO] * (NODES + 1) for _ in range(4)]
+    for j, line in enumerate(weights):
         for i, k in product(range(NODES), range(j + 1)):
             line[i] += Fraction(comb(j, k) * i ** (j - k), (k + 1) * (k + 2))
             line[i + 1] += Fraction(comb(j, k) * i ** (j - k), k + 2)
-    return found
+    return weights
 
 
 _WEIGHTS = _weights()
@@ -582,7 +584,7 @@ def gap(beta: Range) -> Fraction:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Functions c·z + k of some facets on the polytope of a slice (three entries) or a combination (four).
+    """Functions c·z + k of facets on the polytope of a slice (3 entries) or combination (4).
 
     Attributes
     ----------
@@ -613,7 +615,7 @@ def push_row(
 
 @dataclass(frozen=True, slots=True)
 class _Carried:
-    """What the law and the reference make of facets in a combination, before the plant."""
+    """Effect of law and reference on the facets in a combination, without the plant."""
 
     place: int
     push: tuple[Fraction, Fraction, Fraction]
@@ -621,12 +623,12 @@ class _Carried:
     of_error: np.ndarray
     constant: np.ndarray
     rising: np.ndarray  # of r′ itself
-    kept: np.ndarray  # up to which r′ the reference may stand still, where r′ counts as 0 and n1 > 0
+    standstill: np.ndarray  # up to which r′ the reference may stand still, where r′ counts as 0 and n1 > 0
 
     def moved(self, pushed: np.ndarray | int, which: np.ndarray) -> np.ndarray:
-        """What r′ adds while the reference stands still, with a factor of −r′ that the plant adds."""
+        """Contribution of r′ while the reference stands still; the plant adds a factor of −r′."""
         rising = self.rising[which] - pushed
-        return np.asarray(self.kept[which] * (rising + abs(rising)) / 2)
+        return np.asarray(self.standstill[which] * (rising + abs(rising)) / 2)
 
 
 _Combination = tuple[int, bool, int, int]
@@ -642,24 +644,24 @@ def _carried(
 ) -> Iterator[_Carried]:
     number, law = back.number, held.law
     n1, _, n3 = facets.T
-    (fastest, bend), told = task.reference_rates, held.told
+    (fastest, bend), noise = task.reference_rates, held.target_noise
     predicted = n3 * number(law.level_gain + law.slip_gain * held.step / 2)
     for place, combination in ends:
-        push, push0, (q1, q0) = push_row(held, fastest + told, combination)
+        push, push0, (q1, q0) = push_row(held, fastest + noise, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
         # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2.
-        # r' in the law contains noise, so that the reference may move `told` less.
+        # r' in the law contains noise, so that the reference may move `noise` less.
         moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
-        late = abs(n1) * number(bend * step**2 / 2) + (abs(n1) + n1) * number(told * step / 2)
+        late = abs(n1) * number(bend * step**2 / 2) + (abs(n1) + n1) * number(noise * step / 2)
         late = back.array(moves.tolist()) * late
         of_error = n1 - n1 * number(step * q1) - predicted * number(p1)
         constant = late - n1 * number(step * q0) - predicted * number(p0)
-        kept = back.array((1 - moves).tolist()) * number(bend * held.longest / 2 + told)
-        yield _Carried(place, push, push0, of_error, constant, -predicted * int(combination[1]), kept)
+        standstill = back.array((1 - moves).tolist()) * number(bend * held.longest / 2 + noise)
+        yield _Carried(place, push, push0, of_error, constant, -predicted * int(combination[1]), standstill)
 
 
 def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
-    """What facets become in a period of the sliding map.
+    """Images of the facets after a period of the sliding map.
 
     Parameters
     ----------
@@ -667,7 +669,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
     facets, multipliers : ndarray
         Of numbers of the back end; see `StickSlipPolytope`.
     """
-    back, held, task, found = period.back, period.held, period.task, period.found
+    back, held, task, plant = period.back, period.held, period.task, period.plant
     number, law, step = back.number, held.law, held.step
     n1, n2, n3 = facets.T
     everyone, raised = np.arange(len(facets)), np.flatnonzero(back.middle(n3) > 0)
@@ -690,7 +692,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
         flag = back.middle(shares[:, 3 if cut else 1]) == 1
         plain = a1 + a3 * (0 if cut else slip)
         of_rate = a2 + shares[:, 2] if cut else back.without(a2 + a3 * level, flag) + shares[:, 0]
-        for end in found.chord:
+        for end in plant.chord:
             chords = [number(end / (beta * task.authority)) for beta in task.beta]
             of_slips = [back.without(plain - a3 * chord, flag) for chord in chords]
             bent = (back.middle(of_slips[0]) != 0) | (back.middle(of_slips[1]) != 0)  # else no slip counts
@@ -717,11 +719,11 @@ def resting_rows(
     back: Numbers,
     task: FaultPlant,
     held: SampledStickSlip,
-    found: Ranges,
+    plant: Ranges,
     facets: np.ndarray,
     multipliers: np.ndarray,
 ) -> Iterator[Rows]:
-    """What facets become in a period that ends at rest: rational functions of rational numbers."""
+    """Images of the facets after a period that ends at rest, in rational numbers."""
     number, law = back.number, held.law
     n1, _, n3 = facets.T
     rises = back.middle(n3) > 0
@@ -729,7 +731,7 @@ def resting_rows(
     slip, half = number(law.slip_gain), number(held.step / 2)
     both = (held.step, held.longest) if held.longest_step else (held.step,)
     for part in chain(*(_carried(back, task, held, interval, facets, _AT_REST) for interval in both)):
-        for end in found.chord:
+        for end in plant.chord:
             chord = number(end / task.authority)
             for which, share in ((raised, 0), (raised, 1), (lowered, None)):
                 if not len(which):
@@ -751,15 +753,15 @@ Constraint = tuple[tuple[Fraction, ...], Fraction]
 
 def slices(task: FaultPlant, held: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
     """Ends of the three slices: e1 up to 0, from there to max r′/c, and above."""
-    threshold, one = (task.reference_rates[0] + held.told) / held.law.return_rate, Fraction(1)
+    threshold, one = (task.reference_rates[0] + held.target_noise) / held.law.return_rate, Fraction(1)
     up, down = (one, _ZERO, _ZERO), (-one, _ZERO, _ZERO)
     return ((up, _ZERO),), ((down, _ZERO), (up, threshold)), ((down, -threshold),)
 
 
 def polytopes(
-    task: FaultPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], found: Ranges | None
+    task: FaultPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], plant: Ranges | None
 ) -> list[list[Constraint]]:
-    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) where ranges are known.
+    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) if ranges exist.
 
     The condition of rest depends on r′. That of the least one holds wherever one of another does, so that on what it
     leaves ends of r′ decide.
@@ -769,13 +771,13 @@ def polytopes(
     own.append(((_ZERO, -one, _ZERO), _ZERO))
     ends = slices(task, held)
     flat = [[*own, *end] for end in ends]
-    if found is None:
+    if plant is None:
         return flat
-    stops = stop_bounds(task, held, found)
+    stops = stop_bounds(task, held, plant)
     most = task.beta[1] * task.authority
     for combination in (COMBINATIONS[place] for place in LEAST):
-        push, push0, _ = push_row(held, task.reference_rates[0] + held.told, combination)
-        larger = (*(-most * v for v in push), found.slope[0])
+        push, push0, _ = push_row(held, task.reference_rates[0] + held.target_noise, combination)
+        larger = (*(-most * v for v in push), plant.slope[0])
         room = most * (push0 + held.push_noise) - task.amplitude
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
         tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, room)]
@@ -785,7 +787,7 @@ def polytopes(
 
 
 class Verifier:
-    """Bounds of linear functions on one polytope; floats propose multipliers of constraints, rationals decide."""
+    """Bounds of linear functions on a polytope: multipliers from floats, decided exactly."""
 
     def __init__(
         self,
@@ -819,7 +821,7 @@ class Verifier:
         self.bases, self.vertices = self.bases[inside], self.vertices[inside]
 
     def proposed(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Constraints at the best vertex and their multipliers, in floats; a negative one shows a better vertex."""
+        """Constraints at the best vertex and multipliers, in floats; none is negative at an optimum."""
         values = scaled @ self.vertices.T
         bases = self.bases[values.argmax(axis=1)]
         shares = np.linalg.solve(self.floats[bases].swapaxes(-1, -2), scaled[..., None])[..., 0]
@@ -832,7 +834,7 @@ class Verifier:
         return bases, shares
 
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
-        """Upper bounds of c·z + k, of rationals or balls, and of 1 + (c − n)·z + k where `which` names facets.
+        """Upper bounds of c·z + k, or of 1 + (c − n)·z + k where `which` names facets.
 
         The second one decides where a period changes nothing, as at rest: there c − n has the sign that e1, y and D do
         not have, D being at most g·y by the last constraint, and e1 at most its end of the slice.
@@ -843,17 +845,17 @@ class Verifier:
         bases, shares = self.proposed(_ball_middle(factors * self.sizes))
         shares = _exact_array(np.maximum(np.round(shares / _GRAIN) * _GRAIN, 0).tolist())
         left = factors - (shares[..., None] * self.rows[bases]).sum(axis=1)
-        found = (shares * self.ends[bases]).sum(axis=1) + self._rest(left, off)
+        largest = (shares * self.ends[bases]).sum(axis=1) + self._rest(left, off)
         if which is not None:
             left = factors - self.rows[which]
             if left.shape[1] > 3:
                 left[:, 1] = left[:, 1] - np.maximum(left[:, 3], 0) * self.rows[-1, 1]
                 left[:, 3] = 0
-            same = 1 + 0 * found
+            same = 1 + 0 * largest
             if self.last is not None:
                 same, left[:, 0] = same + np.maximum(left[:, 0], 0) * self.ends[self.last], np.minimum(left[:, 0], 0)
-            found = np.minimum(found, same + self._rest(left, off))
-        return np.asarray(found + constants)
+            largest = np.minimum(largest, same + self._rest(left, off))
+        return np.asarray(largest + constants)
 
     def _rest(self, left: np.ndarray, off: np.ndarray) -> np.ndarray:
         """Bound of what multipliers leave, within `off`, by the signs of e1, y and D."""
@@ -900,69 +902,69 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
         if not holds(root, held.step, *held.errors(task, max(behind, before), rate)):
             raise ParameterError("the implicit step may not be deadbeat everywhere in the polytope")
     push = pushes(task, held, reach)
-    found = ranges(task, ahead + moved, push, rate * held.longest)
-    if found.slope[1] * held.longest**2 >= 1:
+    plant = ranges(task, ahead + moved, push, rate * held.longest)
+    if plant.slope[1] * held.longest**2 >= 1:
         raise ParameterError("T_s is too long against the weakening of friction")
-    deciding = verifiers(task, held, reach, found)
-    periods = Period.deciding(BALLS, task, held, found, rate, push)
+    deciding = verifiers(task, held, reach, plant)
+    periods = Period.deciding(BALLS, task, held, plant, rate, push)
     for rows in chain(*facet_rows(periods, reach)):
         tops = deciding[rows.place].largest(rows.factors, rows.constants, rows.which)
         for facet, top in zip(rows.which, tops, strict=True):
             if not top <= 1:
                 kind = "slides" if rows.place < SLICES else "ends at rest"
                 raise ParameterError(f"the state may leave the polytope through facet {facet} in a period that {kind}")
-    if _bracket(task, held, found, push[1]) > task.amplitude:
+    if _bracket(task, held, plant, push[1]) > task.amplitude:
         raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
     return StickSlipClaims(
         slip_behind=UpperBound(behind),
         slip_ahead=UpperBound(before),
         peak_slip_rate=UpperBound(rate),
-        least_pressure=LowerBound(found.rest_pressure[0] - push[1]),
-        largest_pressure=UpperBound(found.rest_pressure[1] - push[0]),
+        least_pressure=LowerBound(plant.rest_pressure[0] - push[1]),
+        largest_pressure=UpperBound(plant.rest_pressure[1] - push[0]),
     )
 
 
-def _bracket(task: FaultPlant, held: SampledStickSlip, found: Ranges, push: Fraction) -> Fraction:
-    """What |a| ≤ H + δS·ξ + δw·y loses at most where ξ and y of one β stand beside the U of another [m/s²].
+def _bracket(task: FaultPlant, held: SampledStickSlip, plant: Ranges, push: Fraction) -> Fraction:
+    """Largest loss [m/s²] in |a| ≤ H + δS·ξ + δw·y if ξ, y and U belong to different β.
 
     As long as it is below H, |a| has a bound of 0 or more at both ends of β, also where the response of a facet changes
     its sign between them. For aperiodic sampling all that U takes counts: |a| has one over the longest interval.
     """
-    step, growth = held.longest, 1 / (1 - found.slope[1] * held.longest**2 / 2)
-    width, damping = (found.slope[1] - found.slope[0]) / 2, (found.damping[1] - found.damping[0]) / 2
-    share = width * growth * step**2 / 2 + damping * step * (1 + found.slope[1] * growth * step**2)
+    step, growth = held.longest, 1 / (1 - plant.slope[1] * held.longest**2 / 2)
+    width, damping = (plant.slope[1] - plant.slope[0]) / 2, (plant.damping[1] - plant.damping[0]) / 2
+    share = width * growth * step**2 / 2 + damping * step * (1 + plant.slope[1] * growth * step**2)
     least = _ZERO if held.longest_step else task.beta[0]
     return share * task.authority * (task.beta[1] - least) * max(push, _ZERO)
 
 
 def verifiers(
-    task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, found: Ranges | None
+    task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, plant: Ranges | None
 ) -> list[Verifier]:
-    """Of the 3 slices, and of the 7 combinations where ranges are known; raises as `stick_slip_bounds`."""
+    """Verifiers of the 3 slices, and of the 7 combinations if ranges exist."""
     ahead, rate, up, lag, down = reach.box
     sizes, longest = [max(ahead, lag), rate, max(up, down)], _ZERO
-    if found:
-        longest = max(min(g * rate + h for g, h in stop_bounds(task, held, found)), Fraction(1, 10**30))
-        if task.amplitude + found.slope[0] * longest < 0:
+    if plant:
+        longest = max(min(g * rate + h for g, h in stop_bounds(task, held, plant)), Fraction(1, 10**30))
+        if task.amplitude + plant.slope[0] * longest < 0:
             raise ParameterError("the disturbance is too small for the condition of rest")
-    bases = (*reach.sliding, *(reach.resting if found else ()))
+    bases = (*reach.sliding, *(reach.resting if plant else ()))
     return [
         Verifier(lines, basis, [*sizes, longest][: len(basis[0])], place=place, facets=len(reach.facets))
-        for place, (lines, basis) in enumerate(zip(polytopes(task, held, reach.facets, found), bases, strict=True))
+        for place, (lines, basis) in enumerate(zip(polytopes(task, held, reach.facets, plant), bases, strict=True))
     ]
 
 
 def facet_rows(periods: Sequence[Period], reach: StickSlipPolytope) -> Iterator[Iterator[Rows]]:
-    """What the facets become in each period of the sliding map, by balls, and then in the rest map, by rationals."""
-    given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
+    """Images of the facets: per period of the sliding map in balls, then of the rest map."""
+    stored = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
     for period in periods:
-        yield sliding_rows(period, *map(_ball_array, given))
-    yield resting_rows(EXACT, periods[0].task, periods[0].held, periods[0].found, *map(_exact_array, given))
+        yield sliding_rows(period, *map(_ball_array, stored))
+    yield resting_rows(EXACT, periods[0].task, periods[0].held, periods[0].plant, *map(_exact_array, stored))
 
 
 def pushes(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> Range:
     """Least and largest U = p* − p at a sample [Pa]."""
-    law, fastest = held.law, task.reference_rates[0] + held.told
+    law, fastest = held.law, task.reference_rates[0] + held.target_noise
     row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
     factors = _exact_array([list(row), [-v for v in row]])
     constants = _exact_array([_ZERO, law.target_gain * fastest])

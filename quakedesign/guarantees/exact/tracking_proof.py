@@ -15,7 +15,7 @@ from quakedesign.exact import Bound, LowerBound, UpperBound, six_digits
 from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, reached_bounds
 from quakedesign.guarantees.exact.proof import NoProof, Proof
-from quakedesign.guarantees.exact.sampled_loop import Gains, Held
+from quakedesign.guarantees.exact.sampled_loop import Gains, SampledLoop
 from quakedesign.guarantees.exact.small_gain import (
     Bounds,
     SlowGain,
@@ -77,15 +77,15 @@ class Claims:
         """Tightest claims that bounds support."""
         low, high = task.rest_pressure
         push = bounds.push / task.authority
-        asked = None if bounds.asked is None else bounds.asked / task.authority
+        commanded = None if bounds.valve_push is None else bounds.valve_push / task.authority
         return cls(
             slip_error=UpperBound(bounds.slip_error),
             slip_rate_error=UpperBound(bounds.slip_rate_error),
             peak_slip_rate=UpperBound(bounds.slip_rate_error + task.reference_rates[0]),
             least_pressure=LowerBound(low - push),
             largest_pressure=UpperBound(high + push),
-            least_asked=None if asked is None else LowerBound(low - asked),
-            largest_asked=None if asked is None else UpperBound(high + asked),
+            least_asked=None if commanded is None else LowerBound(low - commanded),
+            largest_asked=None if commanded is None else UpperBound(high + commanded),
             largest_step=None if bounds.stepped is None else UpperBound(bounds.stepped / task.authority),
         )
 
@@ -129,12 +129,12 @@ class Claims:
         )
 
     def verdict(self, task: FaultPlant, bounds: Bounds) -> Verdict:
-        """PROVED if the claims follow from bounds under which the fault stays closed, else UNDECIDED."""
+        """PROVED if the claims follow from the bounds and the fault stays closed, else UNDECIDED."""
         tightest = Claims.of(task, bounds)
         return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
 
     def opens(self, task: FaultPlant) -> str:
-        """Reason why the fault may open, after which the plant does not apply; empty if the pressure is below σ′."""
+        """Reason why the fault may open; empty if the pressure stays below σ′."""
         if self.largest_pressure < task.normal_stress:
             return ""
         return (
@@ -196,7 +196,7 @@ class TrackingProof(Proof):
     Attributes
     ----------
     task : FaultPlant
-    held : Held
+    held : SampledLoop
     claims : Claims
     slow_gain : SlowGain, optional
         Slowly varying input gain of the proof; None for an arbitrary input gain.
@@ -208,7 +208,7 @@ class TrackingProof(Proof):
     plant: ClassVar[str] = "printed"
     scope: ClassVar[str] = "on the plant without stick"
     task: FaultPlant
-    held: Held
+    held: SampledLoop
     claims: Claims
     slow_gain: SlowGain | None = None
     reach: InvariantPolytope | None = None
@@ -236,7 +236,7 @@ class TrackingProof(Proof):
 
     @property
     def bounds(self) -> Mapping[str, Bound]:
-        """Claims by name, SI; pressures are those in the fault, and `least_asked` to `largest_asked` at the valve."""
+        """Claims by name, SI; `least_asked` and `largest_asked` are at the valve."""
         return self.claims.by_name
 
     @property
@@ -251,7 +251,9 @@ class TrackingProof(Proof):
 
     @property
     def rest_limit(self) -> RestLimit | None:
-        """Limit at rest that the valve pressure never reaches; None without a valve claim or `applied`.
+        """Limit at rest that the valve pressure never reaches, or None.
+
+        None without a claim at the valve, or without `applied` in the law.
 
         The commanded pressure acts after the delay, during which the reference moves. A fault counts as at rest if it
         moves by less than the measurement error, or slower than 1/100 of the largest reference rate. The limit also
@@ -286,7 +288,7 @@ class TrackingProof(Proof):
 
     @property
     def controller(self) -> "SampledController":
-        """The law for `simulate`, as that of `Held`, with its limit against windup."""
+        """Law for `simulate` with its limit against windup."""
         return replace(self.held.controller, rest_limit=self.rest_limit)
 
     def recomputed(self) -> Bounds | NoProof:
@@ -355,9 +357,11 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
 
 
 def guarantee(
-    task: FaultPlant, held: Held, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
+    task: FaultPlant, held: SampledLoop, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
 ) -> TrackingProof | NoProof:
-    """Tightest rounded claims about a loop, or why there are none; for a rate limit, with a sufficient ramp time.
+    """Tightest rounded claims about a loop, or the reason why there are none.
+
+    For a pump with a rate limit the ramp time is increased until it suffices.
 
     Aperiodic sampling needs `reach`, and excludes `slow_gain`.
 
@@ -372,25 +376,25 @@ def guarantee(
     if held.pump is None or held.pump.rate is None or held.ramp:
         return _proved(task, held, slow_gain)
     ramp, longest = _FIRST * held.step, held.longest_ramp
-    found = _proved(task, replace(held, ramp=ramp), slow_gain)
+    proof = _proved(task, replace(held, ramp=ramp), slow_gain)
     for _ in range(_RAMPS):
-        if found.proved or found.needs is None or ramp == longest:
+        if proof.proved or proof.needs is None or ramp == longest:
             break
-        if slow := held.pump.too_slow(UpperBound(found.needs), longest):
-            return replace(found, reason=slow)
-        ramp = min(above(found.needs / held.pump.rate * _RAMP_ROOM), longest)
-        found = _proved(task, replace(held, ramp=ramp), slow_gain)
-    return found
+        if slow := held.pump.too_slow(UpperBound(proof.needs), longest):
+            return replace(proof, reason=slow)
+        ramp = min(above(proof.needs / held.pump.rate * _RAMP_ROOM), longest)
+        proof = _proved(task, replace(held, ramp=ramp), slow_gain)
+    return proof
 
 
-def _proved(task: FaultPlant, held: Held, slow_gain: SlowGain | None) -> TrackingProof | NoProof:
+def _proved(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain | None) -> TrackingProof | NoProof:
     claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
     return claims if isinstance(claims, NoProof) else _of_claims(task, held, claims, slow_gain)
 
 
 def _of_claims(
     task: FaultPlant,
-    held: Held,
+    held: SampledLoop,
     claims: Claims,
     slow_gain: SlowGain | None = None,
     reach: InvariantPolytope | None = None,
@@ -405,7 +409,7 @@ def _of_claims(
     return TrackingProof(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
 
 
-def _claims(task: FaultPlant, held: Held) -> Claims | NoProof:
+def _claims(task: FaultPlant, held: SampledLoop) -> Claims | NoProof:
     bounds = _bounds(task, held, held.loop(task))
     return bounds if not bounds.proved else _rounded(task, bounds)
 
@@ -414,8 +418,8 @@ def _rounded(task: FaultPlant, bounds: Bounds) -> Claims:
     return Claims.of(task, bounds).rounded()
 
 
-def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | NoProof:
-    """Claims that follow from the deviation of the input gain under the claimed slip error (fixed point)."""
+def _slow_claims(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Claims | NoProof:
+    """Claims from a fixed point: the slip error bounds the deviation of the input gain."""
     gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
     if isinstance(gains, NoProof):
         return gains
@@ -431,7 +435,7 @@ def _slow_claims(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Claims | 
     return NoProof(reason=reason)
 
 
-def _slow_gains(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Gains | NoProof:
+def _slow_gains(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Gains | NoProof:
     if held.longest_step:
         return NoProof(reason="aperiodic sampling has no guarantee with a slowly varying input gain")
     loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
@@ -442,20 +446,20 @@ def _slow_gains(task: FaultPlant, held: Held, slow_gain: SlowGain) -> Gains | No
 
 
 def _slow_bounds(
-    task: FaultPlant, held: Held, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
+    task: FaultPlant, held: SampledLoop, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
 ) -> Bounds | NoProof:
     spread = slow_gain.spread(task, slip_error)
     return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.off)
 
 
-def _root_within(task: FaultPlant, held: Held, claims: Claims) -> bool:
+def _root_within(task: FaultPlant, held: SampledLoop, claims: Claims) -> bool:
     """Whether the sector of an implicit step, if there is one, is valid within the claims."""
     root = held.law.root
-    errors = held.told(task, (claims.slip_error, claims.slip_rate_error))
+    errors = held.measured_errors(task, (claims.slip_error, claims.slip_rate_error))
     return root is None or small_gain.holds(root, held.step, *errors)
 
 
-def _beyond_the_pump(held: Held, claims: Claims) -> str:
+def _beyond_the_pump(held: SampledLoop, claims: Claims) -> str:
     """Reason why the claims exceed a pump limit; empty if they do not."""
     if held.pump is None:
         return ""
@@ -463,7 +467,7 @@ def _beyond_the_pump(held: Held, claims: Claims) -> str:
 
 
 def _bounds(
-    task: FaultPlant, held: Held, loop: PeriodicLoop, reach: InvariantPolytope | None = None
+    task: FaultPlant, held: SampledLoop, loop: PeriodicLoop, reach: InvariantPolytope | None = None
 ) -> Bounds | NoProof:
     if reach is not None and not held.longest_step:
         return NoProof(reason="periodic sampling needs no invariant set")
@@ -477,7 +481,7 @@ def _bounds(
         return _unstable(held)
 
 
-def _unstable(held: Held) -> NoProof:
+def _unstable(held: SampledLoop) -> NoProof:
     over = f"with zero-order hold over {_seconds(held.step)}"
     return NoProof(reason=f"{over} even the nominal loop is not stable, or decays too slowly")
 

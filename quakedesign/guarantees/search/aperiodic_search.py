@@ -1,4 +1,4 @@
-"""Guarantees of loops whose samples follow no clock: the set that their state never leaves, found in floats."""
+"""Guarantees with aperiodic sampling: search for the invariant set in floats."""
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.invariant_set import SOONEST, BetweenSamples, InvariantPolytope, reduced
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import Held, channels_of
+from quakedesign.guarantees.exact.sampled_loop import SampledLoop, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds
 from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
 from quakedesign.guarantees.search.float_bounds import FLOATS, BoundsEstimate, floats, gains_of, short
@@ -31,21 +31,21 @@ _SEED = 5
 _DIGITS = 7
 
 
-def unclocked_guarantee(task: FaultPlant, held: Held) -> TrackingProof | NoProof:
+def unclocked_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoProof:
     """Guarantee with a set that is found for it, or what speaks against one."""
-    found: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves")
+    proof: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves")
     for raised in _RAISED:
         reach = _reach(task, held, raised)
         if not isinstance(reach, InvariantPolytope):
-            return reach or found
-        found = guarantee(task, held, reach=reach)
-        if found.proved:
+            return reach or proof
+        proof = guarantee(task, held, reach=reach)
+        if proof.proved:
             break
-    return found
+    return proof
 
 
-def unclocked_estimate(task: FaultPlant, held: Held) -> BoundsEstimate | None:
-    """Bounds of a set with few facets, its small gain that of the inputs without it; None where there is no set."""
+def unclocked_estimate(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+    """Estimated bounds from an invariant set with few facets; None without a set."""
     middle = replace(held, step=(held.step + held.longest_step) / 2, longest_step=Fraction(0))
     gains, loop = gains_of(middle.loop(task)), _Floats.of(task, held)
     sides = loop.sides(loop.own, _FEW) if gains is not None and loop.fits else None
@@ -56,21 +56,21 @@ def unclocked_estimate(task: FaultPlant, held: Held) -> BoundsEstimate | None:
     if bounds is None:
         return BoundsEstimate(NoProof(reason="", small_gain=UpperBound(Fraction(share))), 1.0)
     slip, rate, push = (Fraction(float(v)) for v in largest + (bounds - loop.own) @ columns)
-    found = Bounds(slip_error=slip, slip_rate_error=rate, push=push, small_gain=Fraction(share))
-    return BoundsEstimate(found, max(gains["slip_error", "drift"]))
+    estimate = Bounds(slip_error=slip, slip_rate_error=rate, push=push, small_gain=Fraction(share))
+    return BoundsEstimate(estimate, max(gains["slip_error", "drift"]))
 
 
 @dataclass(frozen=True)
 class _Floats:
     """A loop from sample to sample, as in `quakedesign.guarantees.exact.invariant_set`.
 
-    `inputs` flow and `sampled` enter with a sample, both in the order of the channels, zeros where they do not; `force`
-    is what an acceleration that is no input by itself may be about, of a disturbance of bounded rate, else 0.
+    `inputs` are continuous-time inputs and `sampled` inputs at samples, both in the order of the channels, else zeros.
+    `force` is the size of the acceleration for a rate-limited disturbance, which has no acceleration input, else 0.
     """
 
     flow: np.ndarray
     seen: np.ndarray
-    kept: np.ndarray
+    lift: np.ndarray
     rows: np.ndarray
     inputs: np.ndarray
     sampled: np.ndarray
@@ -80,10 +80,10 @@ class _Floats:
     force: float
 
     @classmethod
-    def of(cls, task: FaultPlant, held: Held) -> "_Floats":
-        """Of a law that follows no clock."""
+    def of(cls, task: FaultPlant, held: SampledLoop) -> "_Floats":
+        """Matrices of a loop with aperiodic sampling."""
         loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
-        seen, kept = (
+        seen, lift = (
             np.array([[int(v.p) / int(v.q) for v in row] for row in part.tolist()])
             for part in reduced(loop.segments[0].jump)
         )
@@ -91,7 +91,7 @@ class _Floats:
         return cls(
             flow=np.array(loop.flow, dtype=float),
             seen=seen,
-            kept=kept,
+            lift=lift,
             rows=np.array(list(loop.outputs.values()), dtype=float),
             inputs=np.array([loop.inputs.get(channel.name, none) for channel in channels], dtype=float),
             sampled=np.array([loop.sampled.get(channel.name, none) for channel in channels], dtype=float),
@@ -124,9 +124,9 @@ class _Floats:
         return [float(v) for v in np.linspace(0, self.interval[1], _BETWEEN_PIECES + 1)]
 
     def reached(self, bounds: np.ndarray, directions: int) -> np.ndarray | None:
-        """Points that inputs within bounds reach, the farthest in many directions; None where they grow.
+        """Points reached by bounded inputs, extreme in many directions; None if they grow.
 
-        From the shortest, the middle and the longest interval the best is taken.
+        The interval is the shortest, the middle or the longest one, whichever reaches farthest.
         """
         maps, pushes = zip(*(self._interval(time, bounds) for time in np.linspace(*self.interval, 3)), strict=True)
         scale = np.abs(np.vstack(pushes)).sum(axis=0)
@@ -151,9 +151,9 @@ class _Floats:
         step, quarter = expm(self.flow * time), time / SOONEST
         halves = [expm(self.flow * quarter * (i + 0.5)) for i in range(SOONEST)]
         added = [self.seen @ half @ (self.inputs * bounds[:, None]).T * quarter for half in halves]
-        told = self.seen @ step @ (self.sampled * bounds[:, None]).T
-        pushes = np.hstack([*added, told]).T
-        return self.seen @ step @ self.kept, pushes[np.abs(pushes).any(axis=1)]
+        at_sample = self.seen @ step @ (self.sampled * bounds[:, None]).T
+        pushes = np.hstack([*added, at_sample]).T
+        return self.seen @ step @ self.lift, pushes[np.abs(pushes).any(axis=1)]
 
     def sides(self, bounds: np.ndarray, facets: int, raised: float = 1) -> "_Sides | None":
         """The set of so many facets for inputs within bounds; None where none is found."""
@@ -164,20 +164,20 @@ class _Floats:
             return None
 
     def columns(self, sides: "_Sides", facets: int) -> np.ndarray:
-        """What an input of size 1 does to the outputs, at most, from the set of all of them; 0 where nothing feeds it.
+        """Largest outputs per unit of each input; 0 for inputs without feedback.
 
-        Of the acceleration, where little of it is not fed, from a set of its own.
+        The acceleration of a rate-limited disturbance has a set of its own.
         """
         fed, own = self.shares.any(axis=1), sides.largest(self, self.own)
-        found = np.where(fed, 1 / np.where(self.own > 0, self.own, np.inf), 0)[:, None] * own
+        columns = np.where(fed, 1 / np.where(self.own > 0, self.own, np.inf), 0)[:, None] * own
         if self.force:
             alone = np.where(np.arange(len(self.own)) == 0, self.force, _TRACE * self.own)
             of_force = self.sides(alone, facets)
-            found[0] = np.inf if of_force is None else of_force.largest(self, alone) / self.force
-        return np.asarray(found)
+            columns[0] = np.inf if of_force is None else of_force.largest(self, alone) / self.force
+        return np.asarray(columns)
 
     def solved(self, bounds: np.ndarray, largest: np.ndarray, columns: np.ndarray) -> tuple[float, np.ndarray | None]:
-        """Small gain, and inputs that make outputs that bring no more of them, near bounds that make these outputs."""
+        """Small gain, and input bounds at the fixed point of the linearised feedback."""
         if not np.isfinite(columns).all():
             return _NONE, None
         feeds = self.shares @ columns.T
@@ -189,37 +189,37 @@ class _Floats:
     def along(
         self, rows: np.ndarray, ends: list[float], first: int, frame: np.ndarray, bounds: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows at the ends from the first on, what the inputs add there, and by how much pieces may lie above both.
+        """Rows at the ends from `first` on, contributions of inputs, excess within pieces.
 
         `frame` bounds the entries of the state at a sample.
         """
-        largest = np.abs(self.kept) @ frame + bounds @ np.abs(self.sampled)
-        found = [
-            (now @ self.kept, area[:, 0] + np.abs(now @ self.sampled.T) @ bounds, more[:, 0])
+        largest = np.abs(self.lift) @ frame + bounds @ np.abs(self.sampled)
+        places = [
+            (now @ self.lift, area[:, 0] + np.abs(now @ self.sampled.T) @ bounds, more[:, 0])
             for now, area, more in self.between.along(floats(rows), ends, first, floats(largest[:, None]), bounds)
         ]
-        along, added, bends = (np.array(part).swapaxes(0, 1) for part in zip(*found, strict=True))
+        along, added, bends = (np.array(part).swapaxes(0, 1) for part in zip(*places, strict=True))
         return along, added, bends[:, :-1]
 
 
 def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pushes: list[np.ndarray]) -> np.ndarray:
-    """In every direction the farthest of what follows the points and their negatives."""
-    row, found = np.arange(len(ahead)), list[tuple[np.ndarray, np.ndarray]]()
+    """Farthest image of the points and their negatives in every direction."""
+    row, images = np.arange(len(ahead)), list[tuple[np.ndarray, np.ndarray]]()
     for step, push in zip(maps, pushes, strict=True):
         heights = ahead @ step @ points.T
         best = np.abs(heights).argmax(axis=1)
         after = np.sign(heights[row, best])[:, None] * (points[best] @ step.T) + np.sign(ahead @ push.T) @ push
-        found.append(((ahead * after).sum(axis=1), after))
-    choice = np.array([height for height, _ in found]).argmax(axis=0)
-    return np.asarray(np.array([after for _, after in found])[choice, row])
+        images.append(((ahead * after).sum(axis=1), after))
+    choice = np.array([height for height, _ in images]).argmax(axis=0)
+    return np.asarray(np.array([after for _, after in images])[choice, row])
 
 
-def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | NoProof | None:
+def _reach(task: FaultPlant, held: SampledLoop, raised: float) -> InvariantPolytope | NoProof | None:
     """A set in numbers of few digits, for inputs that it makes no larger than it is for."""
     loop = _Floats.of(task, held)
     if not loop.fits:
         return NoProof(reason="the law has too many states for a set that the loop never leaves")
-    bounds, sides, found = loop.own, loop.sides(loop.own, _MANY), None
+    bounds, sides, reach = loop.own, loop.sides(loop.own, _MANY), None
     if sides is None:
         return None
     columns = loop.columns(sides, _MANY)
@@ -227,7 +227,7 @@ def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | N
         largest = sides.largest(loop, bounds)
         wanted = loop.own + loop.shares @ largest
         if (wanted <= bounds).all():
-            found = sides.exact(loop, bounds)
+            reach = sides.exact(loop, bounds)
             if (wanted >= bounds / _LOOSE).all():
                 break
         share, more = loop.solved(bounds, largest, columns)
@@ -241,11 +241,11 @@ def _reach(task: FaultPlant, held: Held, raised: float) -> InvariantPolytope | N
         if following is None:
             break
         sides = following
-    return found
+    return reach
 
 
 def _facets(points: np.ndarray, count: int) -> np.ndarray:
-    """Normals of so many facets of a hull, as different as can be, so that the farthest point is at 1."""
+    """Normals of a hull, as different as possible, scaled so that the set is within 1."""
     both = np.vstack([points, -points])
     white = np.linalg.inv(np.linalg.cholesky(both.T @ both / len(both)))
     normals = ConvexHull(both @ white.T, qhull_options="QJ").equations[:, :-1]
@@ -254,8 +254,8 @@ def _facets(points: np.ndarray, count: int) -> np.ndarray:
     while len(chosen) < min(count, len(normals)):
         chosen.append(int(alike.argmin()))
         alike = np.maximum(alike, np.abs(normals @ normals[chosen[-1]]))
-    found = normals[chosen] @ white
-    return np.asarray(found / np.abs(found @ points.T).max(axis=1)[:, None])
+    facets = normals[chosen] @ white
+    return np.asarray(facets / np.abs(facets @ points.T).max(axis=1)[:, None])
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,7 @@ class _Sides:
 
     @classmethod
     def still(cls, loop: _Floats, normals: np.ndarray, bounds: np.ndarray, raised: float) -> "_Sides | None":
-        """The smallest with these normals that a loop does not leave, found by turns of policies; None if it grows."""
+        """Smallest set with these normals that the loop never leaves; None if it grows."""
         sides, before = cls(normals), np.inf
         for _ in range(_POLICIES):
             now = sides._grown(loop, bounds, raised)

@@ -1,4 +1,4 @@
-"""Laws for several blocks of a fault and their wells, designed by estimates of the provable bounds.
+"""Laws for several blocks and their wells, designed by estimates of provable bounds.
 
 Linear-quadratic feedback of what is measured, with an estimate of the disturbance from the innovation of the slip
 rates: of all blocks where each has a well, else of averages, one for each well. In a decentralised law each well has
@@ -32,7 +32,7 @@ _FORGET, _LEFT = 400, 1e-4  # periods that an estimate follows at most, share th
 
 @np.errstate(over="ignore", invalid="ignore")
 def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = False) -> MatrixLaw:
-    """A law for a plant of `UncertainPlant.from_blocks`, by a search with the estimate of its slip-rate errors.
+    """Law for `UncertainPlant.from_blocks` with the least estimated slip-rate errors.
 
     Parameters
     ----------
@@ -41,10 +41,6 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
         T_s [s].
     decentralised : bool
         Whether the pressure of each well depends on its own measurements alone.
-
-    Raises
-    ------
-    ParameterError
     """
     part, scale = linear_part(plant, {}), np.array(_START)
 
@@ -53,10 +49,10 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
         if values[2] >= 1:
             return 1e3
         try:
-            found = estimate(part, _law_of(part, step, values, decentralised))
+            bounds = estimate(part, _law_of(part, step, values, decentralised))
         except ValueError:  # a mode that grows beyond floating point, or no solution of the equation of Riccati
             return 1e3
-        return found[0] if found[1] is None else float(np.log(found[1][blocks : 2 * blocks].max())) - 100
+        return bounds[0] if bounds[1] is None else float(np.log(bounds[1][blocks : 2 * blocks].max())) - 100
 
     blocks = len(part.outputs) // 2
     simplex = np.vstack([np.zeros(len(_STEPS)), np.diag(_STEPS)])
@@ -82,7 +78,7 @@ def middle(part: LinearPart) -> tuple[np.ndarray, np.ndarray]:
     return A, B
 
 
-def _held(A: np.ndarray, E: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+def _with_hold(A: np.ndarray, E: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     n, m = E.shape
     whole = expm(np.block([[A, E], [np.zeros((m, n + m))]]) * step)
     return whole[:n, :n], whole[:n, n:]
@@ -100,9 +96,9 @@ def _feedback(A: np.ndarray, G: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> MatrixLaw:
-    """Feedback of what is measured, in exact numbers: π⁺ = P(e, q), d⁺ = d + M(e2 − π), p = −g⁻¹(K(e, q) + d⁺).
+    """Feedback of the measurements: π⁺ = P(e, q), d⁺ = d + M(e2 − π), p = −g⁻¹(K(e, q) + d⁺).
 
-    What is measured are all errors e, or averages of them for each well; q is a model of diffusing pressures.
+    Measurements are all errors e, or their means for each well; q is a model of diffusing pressures.
     """
     blocks, count = len(part.outputs) // 2, len(part.C) // 2
     A, B = middle(part)
@@ -120,11 +116,11 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
     whole = np.block([[own, np.vstack([np.zeros_like(read), read * largest])], [np.zeros((more, size)), flow]])
     wells = np.linalg.inv(gain) / largest
     at_once = np.eye(count) + read @ np.linalg.solve(flow, fed) @ wells * largest if more else np.eye(count)
-    phi, reach = _held(whole, np.vstack([still, at_once, fed @ wells]), float(step))
+    phi, reach = _with_hold(whole, np.vstack([still, at_once, fed @ wells]), float(step))
     K = _feedback(phi, reach, x * (1, 1, 1, 1, not alone))
     scale = np.r_[np.ones(size), np.full(more, 1 / largest)]  # of the states, for pressures in Pa
     feedback = rounded(K * scale)
-    pushed = _held(own, np.vstack([still, np.eye(count)]), float(step))[1]
+    pushed = _with_hold(own, np.vstack([still, np.eye(count)]), float(step))[1]
     learned = rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
     closed = (phi - reach @ (np.array(feedback, dtype=float) / scale)) * scale / scale[:, None]
     return _law(step, rounded(gain), feedback, learned, rounded(closed[count:]))
@@ -133,7 +129,7 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
 def _law(
     step: Fraction, gains: Matrix, feedback: tuple[Row, ...], learned: tuple[Row, ...], expected: tuple[Row, ...]
 ) -> MatrixLaw:
-    """States π [m/s], diffusing pressures [Pa] and d [m/s²]; a constant d is balanced by p = −g⁻¹d exactly."""
+    """Law with states π [m/s], diffusing pressures [Pa], d [m/s²]; p = −g⁻¹d balances d."""
     size, zero, inverse = len(feedback), Fraction(0), inverse_of(gains)
     still, more = (zero,) * size, len(expected) - size
     if inverse is None:
@@ -166,9 +162,9 @@ def rounded(values: np.ndarray, digits: int = _DIGITS) -> tuple[Row, ...]:
 def estimate(
     part: LinearPart, law: MatrixLaw, slowest: float = _SLOWEST, forget: int = _FORGET
 ) -> tuple[float, np.ndarray | None]:
-    """Small gain of a loop without delay in floats, and bounds of outputs and controls; None where it does not close.
+    """Small gain of a loop without delay in floats, and bounds; None where they do not close.
 
-    Not followed are loops with an eigenvalue of a period above `slowest`, or for more than `forget` periods.
+    None also for an eigenvalue over a period above `slowest`. Responses are summed over at most `forget` periods.
     """
     loop = part.loop(law)
     flow, rows = np.array(loop.flow, dtype=float), np.array(loop.rows, dtype=float)

@@ -1,4 +1,4 @@
-"""Design of sliding modes in the schemes ``compensated`` and ``stick-slip``, with guaranteed bounds.
+"""Design of sliding modes in the schemes ``compensated`` and ``stick-slip`` with bounds.
 
 The implicit step of a law is read from the scheme as a sum of signed powers; then scale, weight and
 authority are chosen by their certified bounds.
@@ -22,7 +22,7 @@ from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, Held
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, holds
 from quakedesign.guarantees.exact.stick_slip_proof import FaultProof, StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip
@@ -83,7 +83,7 @@ def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -
 
 @lru_cache(maxsize=256)
 def _derived(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
-    """For every T_s and B0; searches ask for the same few scales again and again."""
+    """Implicit step of given gains, cached for all T_s and B0."""
     return Compensated.derive(law)
 
 
@@ -106,7 +106,7 @@ def _term(expression: sp.Expr) -> Power:
 
 
 def _enclosed(value: sp.Expr) -> tuple[Fraction, Fraction]:
-    """Rational ends around a number, equal for a rational."""
+    """Rational ends of an interval around a number; equal for a rational."""
     if value.is_Rational:
         return fraction_of(value), fraction_of(value)
     near = fraction_of(sp.Rational(str(value.evalf(_DIGITS))))
@@ -135,7 +135,7 @@ _ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Compensation:
-    """A sliding mode that runs in a scheme with an estimate of the disturbance, and what is guaranteed of it.
+    """A sliding mode in a scheme with a disturbance estimate, with its guarantee.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class Compensation:
 
     @property
     def without_stick(self) -> TrackingProof | NoProof:
-        """What is guaranteed in the scheme ``compensated``."""
+        """Guarantee in the scheme ``compensated``."""
         assert isinstance(self.proof, TrackingProof | NoProof)
         return self.proof
 
@@ -170,12 +170,12 @@ class Compensation:
         limit, sampling = getattr(self.proof, "rest_limit", None), self.controller.sampling
         if limit is None or sampling is None:
             return self.controller
-        given = ((part.name, getattr(limit, part.name)) for part in fields(limit))
-        more = tuple((f"rest_{name}", value) for name, value in given if value is not None)
+        settings = ((part.name, getattr(limit, part.name)) for part in fields(limit))
+        more = tuple((f"rest_{name}", value) for name, value in settings if value is not None)
         return replace(self.controller, sampling=replace(sampling, settings=(*sampling.settings, *more)))
 
     def sentence(self) -> str:
-        """Settings for people, and how the step ends."""
+        """Settings and end of the step, as text."""
         law = self.controller
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in law.gains.items())
         numbers = _settings(law)
@@ -189,7 +189,7 @@ class Compensation:
 
     @property
     def deadbeat(self) -> bool:
-        """Whether its implicit step ends at e1 + T_s·w = 0 within the proved errors, as that of every such law."""
+        """Whether the implicit step ends at e1 + T_s·w = 0 within the proved errors."""
         root = self.proof.root if self.proof.proved else None
         return root is not None and set(root.slopes) == {1} and not root.remainder
 
@@ -230,7 +230,7 @@ def compensated(
     step: Fraction,
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | NoProof:
-    """Guarantee of given settings: the narrowest lines around the root, of a few, that close the circle.
+    """Guarantee of given settings with the narrowest sector of the root that closes.
 
     Raises
     ------
@@ -241,7 +241,7 @@ def compensated(
         pull = implicit_pull(controller, step, authority)
     except UnsupportedError as error:
         return NoProof(reason=str(error))
-    held = _held(ImplicitRoot(pull=pull), weight, authority, step, setup)
+    held = _sampled(ImplicitRoot(pull=pull), weight, authority, step, setup)
     first = guarantee(task, held)
     if first.proved:
         return first
@@ -257,9 +257,9 @@ def compensated(
             continue
         errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
         within = holds(root, step, *errors)
-        found = guarantee(task, wider) if within else None
-        if found is not None and found.proved:
-            return found
+        proof = guarantee(task, wider) if within else None
+        if proof is not None and proof.proved:
+            return proof
     return best_guarantee(task, held)
 
 
@@ -272,17 +272,13 @@ def design_compensated(
     weights: tuple[Fraction, ...] = WEIGHTS,
     setup: ExactSetup = PLAIN,
 ) -> Compensation:
-    """Weight, authority and scale of a sliding mode with given base gains, chosen over certified bounds.
+    """Weight, authority and scale of a sliding mode, chosen over certified bounds.
 
-    Where the sign of the slip error holds the root, the step is deadbeat, e1 + T_s·w = 0, whatever the gains. So weight
-    and authority are chosen for the deadbeat step, on a grid of `weights`: ``peak`` for the smallest certified
-    slip-rate error, ``tracking`` for the smallest slip error under a disturbance that drifts, among those whose
-    certified slip-rate error is at most a quarter above the smallest. λ = ρ⁶ is then the smallest for which the step is
-    deadbeat, or nearly so, for all errors that are claimed.
-
-    Raises
-    ------
-    ParameterError
+    Where the signed power of the slip error contains the root, the step is deadbeat, e1 + T_s·w = 0, for any gains. So
+    weight and authority are chosen for the deadbeat step, on a grid of `weights`. ``peak``: the smallest certified
+    slip-rate error. ``tracking``: the smallest slip error under a drifting disturbance, among laws whose certified
+    slip-rate error is at most 1.25 times the smallest. λ = ρ⁶ is then the smallest scale for which the step is nearly
+    deadbeat for all claimed errors.
     """
     require_ordinary(step=step)
     return _made(task, controller, step, _deadbeat(task, step, objective, weights, setup=setup), setup)
@@ -295,7 +291,7 @@ def _made(
     chosen: tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None],
     setup: ExactSetup,
 ) -> Compensation:
-    """A controller with a weight, B0 and the smallest λ for errors of a size, and what is guaranteed of it."""
+    """Controller with a weight, B0 and the smallest λ for given errors, and its guarantee."""
     weight, authority, errors = chosen
     settings = ("weight", weight), ("authority", authority)
     sampling = Sampling(step=step, scheme=GUARANTEED, settings=settings, **setup.path)
@@ -310,7 +306,7 @@ def _made(
 
 @dataclass(frozen=True, slots=True)
 class Deadbeat(Kind):
-    """Sliding modes with given base gains in the scheme ``compensated``; numbers are a weight and B0 by the middle."""
+    """Sliding modes in the scheme ``compensated``; numbers: weight, B0 over its middle."""
 
     controller: SlidingMode
 
@@ -327,25 +323,25 @@ class Deadbeat(Kind):
             if not (0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]):
                 return 2 * _WORST
             held = self.held(task, x, step, setup=setup)
-            found = closeness(task, held)[0]
-            return found if found < _WORST else _WORST + min(spectral_radius(held.loop(task)), 1.0)
+            value = closeness(task, held)[0]
+            return value if value < _WORST else _WORST + min(spectral_radius(held.loop(task)), 1.0)
 
         question = "nearly deadbeat", task, step, setup
         least, x = inf, np.array(_STARTS[0])
         for start in _STARTS if near is None else (near,):
-            found = search_near(question, cost, start, enough=_NEAR_ENOUGH, evaluations=_EVALUATIONS)
-            least, x = min((least, x), found, key=lambda reached: reached[0])
+            minimum = search_near(question, cost, start, enough=_NEAR_ENOUGH, evaluations=_EVALUATIONS)
+            least, x = min((least, x), minimum, key=lambda reached: reached[0])
             if least < _NEAR_ENOUGH:
                 break
         return Closest(least, x, self.held(task, x, step, setup=setup))
 
-    def held(self, task: FaultPlant, numbers: np.ndarray, step: Fraction, setup: ExactSetup = PLAIN) -> Held:
+    def held(self, task: FaultPlant, numbers: np.ndarray, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop:
         """The loop with a deadbeat step, of any gains."""
-        return _held(_DEADBEAT, *_settled(task, numbers), step, setup)
+        return _sampled(_DEADBEAT, *_settled(task, numbers), step, setup)
 
-    def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
+    def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
         """Of the smallest λ for which the step is deadbeat."""
-        return self.made(task, found.held.step, found.numbers, setup=found.held.setup).without_stick
+        return self.made(task, candidate.held.step, candidate.numbers, setup=candidate.held.setup).without_stick
 
     def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, setup: ExactSetup = PLAIN) -> Compensation:
         """The controller with these numbers, and what is guaranteed of it."""
@@ -355,12 +351,12 @@ class Deadbeat(Kind):
         errors = None if bounds is None else (bounds.slip_error + noise[0], bounds.slip_rate_error + noise[1])
         return _made(task, self.controller, step, (weight, authority, errors), setup)
 
-    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
         """That with the smallest peak."""
         weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, setup=setup)
         law = _made(task, self.controller, step, (weight, authority, errors), setup).controller
         root = ImplicitRoot(pull=implicit_pull(law, step, authority))
-        return None if errors is None else _held(root, weight, authority, step, setup)
+        return None if errors is None else _sampled(root, weight, authority, step, setup)
 
     def continued(
         self, task: FaultPlant, step: Fraction, longest: Longest | None, setup: ExactSetup = PLAIN
@@ -373,7 +369,7 @@ class Deadbeat(Kind):
         return made if made is not None and made.proof.proved else None
 
     def at(self, task: FaultPlant, longest: Longest, objective: str = "peak") -> Compensation:
-        """Design for the longest T_s and all else of a guarantee: as others are made, else that of the search."""
+        """Design for the longest T_s with a guarantee, else the law of the search."""
         held = longest.guarantee.held
         made = design_compensated(task, self.controller, held.step, objective=objective, setup=held.setup)
         if made.proof.proved:
@@ -386,8 +382,8 @@ def _settled(task: FaultPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]
     return Fraction(f"{numbers[0]:.3g}"), _short(Fraction(float(numbers[1])) * task.model.gain)
 
 
-def recovered(found: TrackingProof | StickSlipProof) -> Compensation:
-    """The sliding mode whose implicit step a guarantee is about, its gains read off the step; of 2-CTA and 2-DIA.
+def recovered(proof: TrackingProof | StickSlipProof) -> Compensation:
+    """Sliding mode (2-CTA or 2-DIA) whose implicit step a certificate states.
 
     The law with these gains must be exactly that of the guarantee.
 
@@ -396,12 +392,12 @@ def recovered(found: TrackingProof | StickSlipProof) -> Compensation:
     UnsupportedError
         For the step of another law, or of gains that with λ = 1 are not rational.
     """
-    if isinstance(found, StickSlipProof):
-        again = _sticking(found)
+    if isinstance(proof, StickSlipProof):
+        again = _sticking(proof)
         if again is not None:
             return again
         raise UnsupportedError(_NOT_RECOVERED)
-    held, law, root = found.held, found.held.law, found.held.law.root
+    held, law, root = proof.held, proof.held.law, proof.held.law.root
     if root is not None and len(law.measured) == 3 and law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1:
         gain, weight = 1 / law.feedback[2], law.measured[2][1]
         authority = gain / held.step
@@ -409,9 +405,9 @@ def recovered(found: TrackingProof | StickSlipProof) -> Compensation:
         sampling = Sampling(step=held.step, scheme=GUARANTEED, settings=settings, **held.path)
         for base in _with_gains(root.pull, held.step, authority):
             controller = replace(base, gains=dict(base.gains), sampling=sampling)
-            known = sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(root.pull)
-            if known and compensated_law(root, weight, gain) == law:
-                return Compensation(controller=controller, proof=found)
+            matches = sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(root.pull)
+            if matches and compensated_law(root, weight, gain) == law:
+                return Compensation(controller=controller, proof=proof)
     raise UnsupportedError(_NOT_RECOVERED)
 
 
@@ -421,19 +417,19 @@ _NOT_RECOVERED = (
 )
 
 
-def _sticking(found: StickSlipProof) -> Compensation | None:
+def _sticking(proof: StickSlipProof) -> Compensation | None:
     """The same on the stick–slip plant."""
-    held, law = found.held, found.held.law
+    held, law = proof.held, proof.held.law
     authority = 1 / (held.step * law.target_gain)
     for base in _with_gains(law.pull, held.step, authority) if law.pull else ():
         controller = sticking_controller(base, held)
         if sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(law.pull):
-            return Compensation(controller=controller, proof=found)
+            return Compensation(controller=controller, proof=proof)
     return None
 
 
 def sticking_controller(controller: SlidingMode, held: SampledStickSlip) -> SlidingMode:
-    """A sliding mode in the scheme ``stick-slip`` with the estimate of a law, whose target gain is 1/(T_s·B0)."""
+    """Sliding mode in the scheme ``stick-slip`` with the estimate of a law."""
     law, step = held.law, held.step
     settings = {
         "authority": 1 / (step * law.target_gain),
@@ -456,16 +452,16 @@ def sticking_loop(controller: SlidingMode, slip_noise: Fraction = Fraction(0)) -
         As `implicit_pull`.
     """
     assert controller.sampling is not None
-    step, told = controller.sampling.step, _settings(controller)
-    per_rate = 1 / (step * told["authority"])
+    step, settings = controller.sampling.step, _settings(controller)
+    per_rate = 1 / (step * settings["authority"])
     law = StickSlipLaw(
         rate_gain=per_rate,
         target_gain=per_rate,
         return_rate=1 / step,
-        level_gain=told["weight"] * per_rate,
-        slip_gain=told["slip_weight"] * per_rate / step,
-        rest_slip=told["rest_slip"],
-        pull=implicit_pull(controller, step, told["authority"]),
+        level_gain=settings["weight"] * per_rate,
+        slip_gain=settings["slip_weight"] * per_rate / step,
+        rest_slip=settings["rest_slip"],
+        pull=implicit_pull(controller, step, settings["authority"]),
     )
     return SampledStickSlip(law=law, step=step, slip_noise=slip_noise)
 
@@ -486,10 +482,10 @@ def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, *
     **wanted
         As in `design_stick_slip`.
     """
-    found = design_stick_slip(task, step, implicit=True, **wanted)
-    if not isinstance(found, StickSlipProof):
-        return found
-    held, claims = found.held, found.claims
+    proof = design_stick_slip(task, step, implicit=True, **wanted)
+    if not isinstance(proof, StickSlipProof):
+        return proof
+    held, claims = proof.held, proof.claims
     errors = held.errors(task, claims.slip_error, claims.peak_slip_rate)
     authority = 1 / (step * held.law.target_gain)
     try:
@@ -499,7 +495,7 @@ def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, *
     if scale is None:
         return NoProof(reason="the implicit step is deadbeat for no scale that is tried")
     law = sticking_controller(controller.scaled(scale), held)
-    return Compensation(controller=law, proof=replace(found, held=sticking_loop(law, held.slip_noise)))
+    return Compensation(controller=law, proof=replace(proof, held=sticking_loop(law, held.slip_noise)))
 
 
 def sorted_terms(terms: tuple[Power, ...]) -> tuple[Power, ...]:
@@ -508,7 +504,7 @@ def sorted_terms(terms: tuple[Power, ...]) -> tuple[Power, ...]:
 
 
 def _with_gains(pull: tuple[Power, ...], step: Fraction, authority: Fraction) -> Iterator[SlidingMode]:
-    """Laws that may have an implicit step, with λ = 1 and the divisor B0: of a 2-DIA, or of a 2-CTA."""
+    """Laws that may have an implicit step, with λ = 1 and the divisor B0."""
     terms: dict[Any, Power] = {term.exponent: term for term in pull}
     root, jump = terms.get(Fraction(1, 3)), terms.get(Fraction(0))
     if root is not None and jump is not None and len(terms) == len(pull) and not isinstance(root.argument, str):
@@ -542,7 +538,7 @@ def _settings(law: SlidingMode) -> dict[str, Fraction]:
 def _deadbeat(
     task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup = PLAIN
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
-    """Weight and authority for a deadbeat step, of any law, and the errors that it leaves, if it has a guarantee."""
+    """Weight, authority and remaining errors of a deadbeat step with a guarantee."""
     require_known(objective, OBJECTIVES, "objective")
     question = "deadbeat", task, step, objective, weights, setup
     search = partial(_deadbeat_search, task, step, objective, weights, setup)
@@ -557,12 +553,12 @@ def _deadbeat_search(
     seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
-        found = estimated(task, _held(_DEADBEAT, *choice, step, setup))
-        if found is not None and found.bounds.proved:
-            seen[choice] = found
+        estimate = estimated(task, _sampled(_DEADBEAT, *choice, step, setup))
+        if estimate is not None and estimate.bounds.proved:
+            seen[choice] = estimate
     if not seen:
         return [str(weights[0]), str(_short(task.model.gain))]
-    peaks = {choice: float(_bounds(found).slip_rate_error) for choice, found in seen.items()}
+    peaks = {choice: float(_bounds(estimate).slip_rate_error) for choice, estimate in seen.items()}
     least = min(peaks, key=lambda choice: peaks[choice])
     if objective == "tracking":
         allowed = [choice for choice in seen if peaks[choice] <= _ROOM * peaks[least]]
@@ -573,7 +569,7 @@ def _deadbeat_search(
 
 
 def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
-    """Smallest λ of a ladder for which the step is deadbeat, or nearly, for errors of a size and a little more."""
+    """Smallest λ of a ladder for which the step is nearly deadbeat for slightly larger errors."""
     scale = _smallest_scale(controller, authority, step, errors, _SLOPES[:_NEARLY])
     return controller.scale if scale is None else scale
 
@@ -585,7 +581,7 @@ def _smallest_scale(
     errors: tuple[Fraction, Fraction],
     slopes: tuple[Fraction, ...],
 ) -> Fraction | None:
-    """Smallest λ of the ladder for the first slope for which the root lies between its line and a deadbeat step."""
+    """Smallest λ of the ladder whose root lies in the sector up to a deadbeat step."""
     slip, rate = (_MARGIN * v for v in errors)
 
     def deadbeat(slope: Fraction, root: Fraction) -> bool:
@@ -599,7 +595,9 @@ def _smallest_scale(
     return None
 
 
-def _held(root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, setup: ExactSetup) -> Held:
+def _sampled(
+    root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, setup: ExactSetup
+) -> SampledLoop:
     return setup.held(compensated_law(root, weight, step * authority), step)
 
 

@@ -1,4 +1,4 @@
-"""Default designs for a fault: e-LQR and sliding mode at its own T_s, or at the longest T_s with a proof.
+"""Default designs for a fault, at its own T_s or at the longest T_s with a proof.
 
 The second chapter states which schemes of a sliding mode have a guarantee (``compensated`` and ``stick-slip``) and why.
 """
@@ -54,13 +54,13 @@ class SampledDesign:
     step : Fraction
         T_s of the fault [s].
     runs : TrackingProof or None
-        Of the loop that runs, at the fault's T_s or a shorter one; None where none was found.
+        Proof at the fault's T_s or a shorter one; None where none was found.
     reason : str
         Why there is no guarantee at the fault's T_s; empty if there is.
     longest_step : Fraction
         Longest T_s found for which a design has a guarantee [s].
     longest_delay : Fraction
-        Longest delay found at the T_s that runs [s].
+        Longest delay found at the T_s of the proof [s].
     """
 
     step: Fraction
@@ -70,7 +70,7 @@ class SampledDesign:
     longest_delay: Fraction = Fraction(0)
 
     def premises(self) -> tuple[Premise, ...]:
-        """What the guarantee asks for of the hardware, and how far other designs would go."""
+        """Hardware requirements of the guarantee, and the reach of other designs."""
         return (
             Premise(
                 name="sampling_time",
@@ -98,29 +98,29 @@ def sampled_design(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> SampledDesign:
-    """e-LQR for a T_s [s], or for the longest shorter one that has a guarantee; the rest as in `design_held`.
+    """e-LQR for a T_s [s], or for the longest shorter T_s that has a guarantee.
 
     Raises
     ------
     ParameterError
         For an unknown objective.
     """
-    told: Any = {"measured": measured, "setup": setup}
-    found = design_held(task, step, objective=objective, **told)
-    longest = longest_step(task, **told)
-    if not found.proved:
-        found = continued(task, step, longest, **told) or found
-    reason = found.reason if not found.proved else ""
-    if not found.proved and longest is not None:
-        found = design_at(task, longest)
-    if not found.proved:
+    wanted: Any = {"measured": measured, "setup": setup}
+    proof = design_held(task, step, objective=objective, **wanted)
+    longest = longest_step(task, **wanted)
+    if not proof.proved:
+        proof = continued(task, step, longest, **wanted) or proof
+    reason = proof.reason if not proof.proved else ""
+    if not proof.proved and longest is not None:
+        proof = design_at(task, longest)
+    if not proof.proved:
         return SampledDesign(step=step, runs=None, reason=reason)
-    delayed, own = longest_delay(task, found.held.step, **told), found.held.delay
+    delayed, own = longest_delay(task, proof.held.step, **wanted), proof.held.delay
     return SampledDesign(
         step=step,
-        runs=found,
+        runs=proof,
         reason=reason,
-        longest_step=max(found.held.step, longest.guarantee.held.step if longest else found.held.step),
+        longest_step=max(proof.held.step, longest.guarantee.held.step if longest else proof.held.step),
         longest_delay=max(own, delayed.held.delay) if delayed else own,
     )
 
@@ -128,9 +128,9 @@ def sampled_design(
 def sampled_sliding_mode(
     task: FaultPlant, law: SlidingMode, step: Fraction, objective: str = "tracking", setup: ExactSetup = PLAIN
 ) -> tuple[Compensation, SampledDesign]:
-    """Sliding mode with the base gains of a law for a T_s [s], or for the longest shorter one that has a guarantee.
+    """Sliding mode for a T_s [s], or for the longest shorter T_s that has a guarantee.
 
-    How far others would go is looked for as of linear laws; none of them knows of a delay.
+    The longest T_s and delay of such designs are searched as for linear laws; no such law has a model of the delay.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def sampled_sliding_mode(
 def guarantee_of(
     task: FaultPlant, law: SlidingMode, setup: ExactSetup = PLAIN
 ) -> TrackingProof | StickSlipProof | NoProof:
-    """What is guaranteed of a sliding mode as it runs: in the scheme ``compensated``, or in ``stick-slip``."""
+    """Guarantee of a sliding mode in its scheme, ``compensated`` or ``stick-slip``."""
     own = law.sampling
     if own is not None and own.scheme == STICK_SLIP:
         if missing := {"authority", "weight", "slip_weight", "rest_slip"} - dict(own.settings).keys():
@@ -200,7 +200,7 @@ def sliding_mode(
     objective: str = "tracking",
     setup: ExactSetup = PLAIN,
 ) -> Compensation | NoProof:
-    """Design a sliding mode with given base gains, or the first ones known for it, in a scheme.
+    """Sliding mode with given base gains, by default the first stored ones, in a scheme.
 
     Parameters
     ----------
@@ -222,15 +222,15 @@ def sliding_mode(
         For an unknown scheme or objective, or a wrong number of gains.
     """
     require_known(scheme, sorted(schemes()), "scheme")
-    known = deadbeat(task, law, gains)
+    compensation = deadbeat(task, law, gains)
     if scheme != GUARANTEED:
         return NoProof(reason=_why_none(task, law, scheme, step))
-    made = design_compensated(task, known.controller, step, objective=objective, setup=setup)
+    made = design_compensated(task, compensation.controller, step, objective=objective, setup=setup)
     return replace(made, proof=tightened(made.without_stick))
 
 
 def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:
-    """Sliding modes of a law with given base gains, or the first ones known for it."""
+    """Sliding modes of a law with given base gains, by default the first stored ones."""
     base = law.from_values(gains) if gains else law.base_gains()[0].law
     return Deadbeat(replace(base, gains=dict(base.gains), divisor=task.authority))
 

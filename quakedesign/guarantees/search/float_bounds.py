@@ -17,7 +17,7 @@ from scipy.linalg import expm
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.norms import START, Arithmetic, LoopResponses, SlowestMode, unstable
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import GainSpread, Held
+from quakedesign.guarantees.exact.sampled_loop import GainSpread, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
@@ -46,8 +46,8 @@ class BoundsEstimate:
     drift_gain: float
 
 
-def estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
-    """Bounds of the theorem with trapezoidal sums instead of upper bounds; None for an unstable or very slow loop."""
+def estimated(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+    """Bounds of the theorem by trapezoidal sums; None for an unstable or very slow loop."""
     gains = gains_of(held.loop(task))
     if gains is None:
         return None
@@ -55,39 +55,39 @@ def estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
     return BoundsEstimate(bounds, max(gains["slip_error", "drift"]))
 
 
-def slowly_estimated(task: FaultPlant, held: Held) -> BoundsEstimate | None:
-    """The same for a slow input gain, with nominal loops at the ends and in the middle of its range."""
+def slowly_estimated(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+    """Estimate with a slowly varying input gain, at the ends and the middle of its range."""
     low, high = task.beta
-    found = []
+    every = []
     for share in _ENDS:
         gains = gains_of(held.loop(task, replace(task.model, gain=(low + share * (high - low)) * task.authority)))
         if gains is None:
             return None
-        found.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
-    whole = {key: tuple(v for gains in found for v in gains[key]) for key in found[0]}
+        every.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
+    whole = {key: tuple(v for gains in every for v in gains[key]) for key in every[0]}
     spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
     bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
     return BoundsEstimate(bounds, max(whole["slip_error", "drift"]))
 
 
-def closeness(task: FaultPlant, held: Held) -> tuple[float, Bounds | None]:
-    """Small gain [-] with the bounds if a proof is expected, below 1; else 1 + the small gain for errors of 0.
+def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None]:
+    """Small gain [-] with bounds if a proof is expected; else 1 + the small gain at zero error.
 
-    For friction that depends on the slip alone the input gain is slow, and its deviation depends on the bound of the
-    slip error, which is found by fixed-point iteration for the nominal loops of the first and the last part of the
-    range. Infinite for an unstable or very slow nominal loop.
+    For friction that depends on the slip alone the input gain varies slowly. Its deviation depends on the bound of the
+    slip error, a fixed point for the nominal loops of the first and the last part of the range. The result is infinite
+    for an unstable or very slow nominal loop.
     """
     if task.friction.rate_slope:
-        found = estimated(task, held)
-        bounds = None if found is None else found.bounds
+        values = estimated(task, held)
+        bounds = None if values is None else values.bounds
         return _closeness(bounds, inf if bounds is None else _small(bounds))
     whole: dict[tuple[str, str], tuple[float, ...]] = {}
     for model in (_PARTS.models(task)[0], _PARTS.models(task)[-1]):
         gains = gains_of(held.loop(task, model))
         if gains is None:
             return inf, None
-        whole = {key: whole.get(key, ()) + found for key, found in gains.items()}
-    whole |= {(y, "aged"): found for (y, name), found in whole.items() if name == "acceleration"}
+        whole = {key: whole.get(key, ()) + values for key, values in gains.items()}
+    whole |= {(y, "aged"): values for (y, name), values in whole.items() if name == "acceleration"}
     slip_error, least = 0.0, inf
     for turn in range(_TURNS):
         spread = replace(_PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
@@ -122,9 +122,11 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
             gains[START] = of.free()
     except ParameterError:
         return None
-    lines = {name: np.concatenate(found, axis=1).tolist() for name, found in gains.items()}
-    found = {(y, name): tuple(line) for name, part in lines.items() for y, line in zip(loop.outputs, part, strict=True)}
-    return found | {key: tuple(v + float(size) for v in found[key]) for key, size in loop.at_once.items()}
+    lines = {name: np.concatenate(values, axis=1).tolist() for name, values in gains.items()}
+    values = {
+        (y, name): tuple(line) for name, part in lines.items() for y, line in zip(loop.outputs, part, strict=True)
+    }
+    return values | {key: tuple(v + float(size) for v in values[key]) for key, size in loop.at_once.items()}
 
 
 class _FloatMatrix(np.ndarray):
@@ -206,22 +208,22 @@ _FORGOTTEN_POLE = 100  # a trajectory ends when the initial state has decayed by
 
 
 def own_poles(law: LinearLaw) -> np.ndarray:
-    """Eigenvalues of F, the integral's first: of the law by itself, as it is while friction holds the fault."""
+    """Eigenvalues of F, the integral's first: poles of the law while the fault is at rest."""
     poles = np.linalg.eigvals(np.array(law.update, dtype=float).reshape((len(law.states),) * 2))
     return np.asarray(poles[np.argsort(np.abs(poles - 1), kind="stable")])
 
 
 def moved(flow: np.ndarray, inputs: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """e^{Ah}, and what inputs (columns) add that are held over a time h [s]."""
+    """e^{Ah}, and the response to inputs (columns) with zero-order hold over a time h [s]."""
     size, count = inputs.shape
     whole = np.zeros((size + count, size + count))
     whole[:size, :size], whole[:size, size:] = flow, inputs
-    found = np.asarray(expm(whole * length))
-    return found[:size, :size], found[:size, size:]
+    exponential = np.asarray(expm(whole * length))
+    return exponential[:size, :size], exponential[:size, size:]
 
 
 def periods_to_forget(radius: float) -> int:
-    """Periods until the state of a loop with a decay factor per period has decayed to 1/100, within limits."""
+    """Periods until a decay factor per period reaches 1/100, within limits."""
     pace = -np.log(np.clip(radius, 1e-9, 1 - 1e-9))
     return int(np.clip(np.ceil(np.log(_FORGOTTEN_POLE) / pace), PERIODS, _MOST_POLE_PERIODS))
 

@@ -22,7 +22,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, Held
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain
 from quakedesign.guarantees.exact.tracking_proof import (
     ContinuousProof,
@@ -63,35 +63,38 @@ _PARTS = 8
 _SHARE = 0.5  # growth α as a share of the slowest decay rate
 
 
-def best_guarantee(task: FaultPlant, held: Held) -> TrackingProof | NoProof:
-    """Guarantee with a slowly varying input gain if friction has one and it helps, else with an arbitrary gain.
+def best_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoProof:
+    """Guarantee with a slowly varying input gain if that helps, else with an arbitrary one.
 
-    With aperiodic sampling, a guarantee by an invariant set.
+    With aperiodic sampling the guarantee uses an invariant set.
     """
     if held.longest_step:
         return unclocked_guarantee(task, held)
     slow = slow_gain(task, held)
-    found = guarantee(task, held) if slow is None else guarantee(task, held, slow)
-    if slow is None or found.proved:
-        return found
+    proof = guarantee(task, held) if slow is None else guarantee(task, held, slow)
+    if slow is None or proof.proved:
+        return proof
     anyhow = guarantee(task, held)
-    return anyhow if anyhow.proved else found
+    return anyhow if anyhow.proved else proof
 
 
 @overload
-def tightened(found: TrackingProof) -> TrackingProof: ...
+def tightened(proof: TrackingProof) -> TrackingProof: ...
 @overload
-def tightened(found: TrackingProof | NoProof) -> TrackingProof | NoProof: ...
-def tightened(found: TrackingProof | NoProof) -> TrackingProof | NoProof:
+def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof: ...
+def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof:
     """Guarantee with a slowly varying input gain in place of one with an arbitrary gain, if one is found."""
-    if not found.proved or found.slow_gain is not None or found.reach is not None:
-        return found
-    better = best_guarantee(found.task, found.held)
-    return better if better.proved else found
+    if not proof.proved or proof.slow_gain is not None or proof.reach is not None:
+        return proof
+    better = best_guarantee(proof.task, proof.held)
+    return better if better.proved else proof
 
 
-def slow_gain(task: FaultPlant, held: Held) -> SlowGain | None:
-    """Parts and growth for a proof; None where friction depends on the slip rate or a nominal loop is not stable."""
+def slow_gain(task: FaultPlant, held: SampledLoop) -> SlowGain | None:
+    """Parts and growth of a slowly varying input gain; None where the theorem excludes one.
+
+    Friction must not depend on the slip rate, and all nominal loops must be stable.
+    """
     if task.friction.rate_slope:
         return None
     parts = SlowGain(parts=_PARTS, growth=Fraction(1))
@@ -133,12 +136,12 @@ class Closest:
         As `closeness` in floats: below 1 where a proof is to be expected, else 1 more than the small gain.
     numbers : numpy.ndarray
         Of the law in its family.
-    held : Held
+    held : SampledLoop
     """
 
     closeness: float
     numbers: np.ndarray
-    held: Held
+    held: SampledLoop
 
     @property
     def small_gain(self) -> float:
@@ -175,15 +178,15 @@ def closest(
 def nearby(
     task: FaultPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | NoProof:
-    """Design for the smallest certified slip-rate error, sought near the numbers of a law for another T_s or delay.
+    """Design for the least certified slip-rate error near the numbers of another law.
 
-    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it at its end only.
+    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it at its end.
     """
     laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
         return laws
-    found = best_guarantee(task, laws.held(laws.least_peak_near(near)))
-    return found if found.proved else best_guarantee(task, laws.held(near))
+    proof = best_guarantee(task, laws.held(laws.least_peak_near(near)))
+    return proof if proof.proved else best_guarantee(task, laws.held(near))
 
 
 def design_held(
@@ -195,14 +198,14 @@ def design_held(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | NoProof:
-    """Feedback with a disturbance estimate, its two gains and its weight chosen over certified bounds.
+    """Feedback with a disturbance estimate; gains and weight minimise certified bounds.
 
-    Where the slip alone is measured, a steady-state Kalman observer of slip, slip rate and disturbance, its two gains
-    and the sizes of its process noise chosen in the same way.
+    If the slip alone is measured, the law has a steady-state Kalman observer of slip, slip rate and disturbance; its
+    gains and process noise are chosen in the same way.
 
-    ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a disturbance that
-    drifts, among laws whose certified slip-rate error is at most `room` times the smallest. With a lag, or a layer
-    between well and fault, the law carries a model of the path.
+    ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a drifting
+    disturbance, among laws whose certified slip-rate error is at most `room` times the smallest. With a lag or a
+    diffusion path the law contains a model of the path.
 
     Parameters
     ----------
@@ -216,7 +219,7 @@ def design_held(
     measured : str
         One of `MEASURED`; the differentiator is the implicit one of order 2, from rest.
     setup : ExactSetup
-        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s], as in `Held`; 0 unless given.
+        Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s]; 0 unless given.
 
     Raises
     ------
@@ -245,29 +248,29 @@ def design_held(
     if objective == "tracking" and seen is not None and seen.bounds.proved:
         limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
         _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
-    found = best_guarantee(task, laws.held(x))
-    if not found.proved and seen is not None and seen.bounds.proved and found.pressed:
+    proof = best_guarantee(task, laws.held(x))
+    if not proof.proved and seen is not None and seen.bounds.proved and proof.pressed:
         leaner = best_guarantee(task, laws.held(laws.least_pressure(x)[1]))
-        found = leaner if leaner.proved else found
+        proof = leaner if leaner.proved else proof
     noise = {name: v for name, v in laws.template.noise.items() if v}
-    if found.proved or not noise:
-        return found
+    if proof.proved or not noise:
+        return proof
     quiet = replace(setup, slip_noise=Fraction(0), rate_noise=Fraction(0))
     without = design_held(task, step, objective=objective, room=room, measured=measured, **quiet)  # type: ignore[arg-type]
-    return found if not without.proved else _with_noise(without, noise)
+    return proof if not without.proved else _with_noise(without, noise)
 
 
 def _with_noise(without: TrackingProof, noise: Mapping[str, Fraction]) -> TrackingProof | NoProof:
-    """Guarantee with noise of a law that is proved without noise: the small gain does not depend on noise."""
+    """Guarantee with noise of a law that is proved without noise."""
     held = replace(without.held, **noise)  # type: ignore[arg-type]
-    found = best_guarantee(without.task, held)
-    if found.proved:
-        return found
+    proof = best_guarantee(without.task, held)
+    if proof.proved:
+        return proof
     anyhow = guarantee(without.task, held)  # with an input gain that may jump, which noise does not move
     why = anyhow.reason if not anyhow.proved and anyhow.small_gain is None else "nothing is proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
-    said = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
-    return replace(found, reason=f"with {said} {why}; without it a law is proved")
+    noises = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
+    return replace(proof, reason=f"with {noises} {why}; without it a law is proved")
 
 
 @dataclass(frozen=True)
@@ -276,7 +279,7 @@ class _Laws:
 
     task: FaultPlant
     family: LawFamily
-    template: Held
+    template: SampledLoop
     question: tuple[Any, ...]
 
     @classmethod
@@ -289,12 +292,12 @@ class _Laws:
         if reason := why_no_law(step, measured, setup):
             return NoProof(reason=reason)
         require_known(measured, MEASURED, "measured")
-        middle = (step + (setup.longest_step or step)) / 2  # for which a law predicts that is told no time
+        middle = (step + (setup.longest_step or step)) / 2  # prediction horizon of a law without a time input
         family = family_of(task, middle, measured, setup)
         template = setup.held(family.law(np.array(family.starts[0])), step)
         return cls(task, family, template, (task, step, measured, setup))
 
-    def held(self, x: np.ndarray) -> Held:
+    def held(self, x: np.ndarray) -> SampledLoop:
         """The loop of a law."""
         return replace(self.template, law=self.family.law(x))
 
@@ -318,11 +321,11 @@ class _Laws:
         )
 
     def least_peak_near(self, start: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Numbers with the smallest peak cost near a law that only a slowly varying input gain may prove."""
+        """Numbers of the smallest peak near a law that needs a slowly varying input gain."""
 
         def cost(x: np.ndarray) -> float:
-            found, bounds = self.close(x)
-            peak = _FAILED * min(found, 9.0) if bounds is None else _decibels(bounds, self.family.period)
+            distance, bounds = self.close(x)
+            peak = _FAILED * min(distance, 9.0) if bounds is None else _decibels(bounds, self.family.period)
             return self.quiet(x, peak)
 
         return search_near(("near peak", *self.question), cost, start, evaluations=_FEW, wide=True)[1]
@@ -343,9 +346,9 @@ class _Laws:
         return seen.bounds if seen is not None and not seen.bounds.proved else None
 
     def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
-        """Smallest cost of a peak near a start, and where; given up where it stays far from a guarantee.
+        """Smallest peak cost near a start, with its numbers; ends early far from a guarantee.
 
-        Through a layer every evaluation takes a tenth of a second.
+        With a diffusion path every evaluation takes 0.1 s.
         """
         far = _FAR * _FAILED if self.template.diffusion else inf
         settings = self._effort | settings
@@ -362,13 +365,13 @@ class _Laws:
             seen = self.seen(x)
             if seen is None or not seen.bounds.proved:
                 return 10 * _FAILED
-            most = seen.bounds.push if seen.bounds.asked is None else seen.bounds.asked
+            most = seen.bounds.push if seen.bounds.valve_push is None else seen.bounds.valve_push
             return self.quiet(x, 10 * log10(float(most)))
 
         return search_near(("pressure", *self.question), cost, start, **self._effort)
 
     def least_drift(self, start: Sequence[float] | np.ndarray, limit: float) -> tuple[float, np.ndarray]:
-        """Smallest drift cost near a start, with its numbers, under a limit of the slip-rate error [m/s]."""
+        """Smallest drift cost near a start, for a bounded slip-rate error [m/s]."""
 
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _drift_cost(self.seen(x), limit))
@@ -386,7 +389,7 @@ class _Laws:
         return {"evaluations": _FEWER} if self.template.longest_step else {}
 
     def quiet(self, x: np.ndarray, cost: float) -> float:
-        """The cost of a law; that of none where the law, left to itself while the fault sticks, settles too slowly."""
+        """Cost of a law; a penalty if the law settles too slowly while the fault is at rest."""
         if cost >= 10 * _FAILED:
             return cost
         slowest = _SETTLES ** float(self.template.step / self.family.period)
@@ -395,12 +398,12 @@ class _Laws:
 
 
 def _hopeless(cost: float) -> bool:
-    """Whether the small gain at the end of a search is so large that experience shows no way to a guarantee."""
+    """Whether the small gain at the end of a search is too large for a guarantee."""
     return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
 def unpredictable(task: FaultPlant, step: Fraction) -> NoProof | None:
-    """No law of samples, where the errors of the model outgrow within a period what a prediction can hold."""
+    """`NoProof` if model errors grow too fast within a period for any sampled law; else None."""
     require_ordinary(step=step)
     rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
     growth = float(step) * (hypot(rate, 2 * sqrt(slip)) - rate) / 2
@@ -412,7 +415,7 @@ def unpredictable(task: FaultPlant, step: Fraction) -> NoProof | None:
 def search_near(
     question: tuple[Any, ...], cost: Callable[[np.ndarray], float], start: Sequence[float] | np.ndarray, **settings: Any
 ) -> tuple[float, np.ndarray]:
-    """What `_search` finds, or has found for a question that says all about the cost, see `quakedesign.cache`."""
+    """Result of `_search`, cached by a key that determines the cost; see `quakedesign.cache`."""
 
     def search() -> list[Any]:
         least, x = _search(cost, start, **settings)
@@ -431,17 +434,17 @@ def _search(
     far: float = inf,
     wide: bool = False,
 ) -> tuple[float, np.ndarray]:
-    """Smallest cost found and where; the search ends below `enough`, or after a while still above `far`.
+    """Smallest cost and its numbers; ends below `enough`, or early while above `far`.
 
-    It begins a twentieth of each number around the start; if `wide`, as far around those that are small.
+    The initial simplex has sides of 1/20 of each number, with `wide` of at least `_WIDE`.
     """
     least, count = inf, 0
 
     def counted(x: np.ndarray) -> float:
         nonlocal least, count
-        count, found = count + 1, cost(x)
-        least = min(least, found)
-        return found
+        count, value = count + 1, cost(x)
+        least = min(least, value)
+        return value
 
     def stop(intermediate_result: OptimizeResult) -> None:
         if intermediate_result.fun < enough or (count >= _ENOUGH and far < least < 9 * _FAILED):
@@ -451,28 +454,28 @@ def _search(
     if wide:
         first = np.array(start, dtype=float)
         options["initial_simplex"] = np.vstack([first, first + np.diag(np.maximum(np.abs(first) / 20, _WIDE))])
-    found = minimize(counted, np.array(start), method="Nelder-Mead", options=options, callback=stop)
-    return float(found.fun), found.x
+    minimum = minimize(counted, np.array(start), method="Nelder-Mead", options=options, callback=stop)
+    return float(minimum.fun), minimum.x
 
 
-def _peak_cost(found: BoundsEstimate | None, period: Fraction) -> float:
+def _peak_cost(estimate: BoundsEstimate | None, period: Fraction) -> float:
     """Decibels of the slip-rate error; where there is no bound, how far from one."""
-    if found is None:
+    if estimate is None:
         return 10 * _FAILED
-    if not found.bounds.proved:
-        return _FAILED * min(float(found.bounds.small_gain or 9), 9.0)
-    return _decibels(found.bounds, period)
+    if not estimate.bounds.proved:
+        return _FAILED * min(float(estimate.bounds.small_gain or 9), 9.0)
+    return _decibels(estimate.bounds, period)
 
 
 def _decibels(bounds: Bounds, period: Fraction) -> float:
     return 10 * log10(float(bounds.slip_rate_error) + _CREEPING * float(bounds.slip_error / period))
 
 
-def _drift_cost(found: BoundsEstimate | None, limit: float) -> float:
-    if found is None or not found.bounds.proved:
+def _drift_cost(estimate: BoundsEstimate | None, limit: float) -> float:
+    if estimate is None or not estimate.bounds.proved:
         return 10 * _FAILED
-    over = max(0.0, float(found.bounds.slip_rate_error) / limit - 1)
-    return 10 * log10(found.drift_gain) + 1000 * over
+    over = max(0.0, float(estimate.bounds.slip_rate_error) / limit - 1)
+    return 10 * log10(estimate.drift_gain) + 1000 * over
 
 
 # ----------------------------------------------------------------------
@@ -493,7 +496,7 @@ _LONGEST_TIMES_FAR = 2.0  # small gain from which a time is halved
 RATE, SATURATION, LONGEST, BOX, AMPLITUDE = "rate_limit", "saturation", "longest_step", "box", "amplitude"
 LIMITING = (RATE, LONGEST, "delay_jitter", "jitter", "averaging", "delay", "lag", "diffusion", BOX)
 """What may be too much for any design, what is easiest to change first; pressures go before."""
-_LONGEST_TIMES_FEWER = 8  # attempts, each of which begins anew where its first law fails
+_LONGEST_TIMES_FEWER = 8  # attempts, each with a second start where the first fails
 _ANY_RATE = Fraction(10**30)  # [Pa/s]
 
 
@@ -505,29 +508,29 @@ class Longest:
     numbers: np.ndarray
 
 
-Asked = tuple[FaultPlant, Fraction, ExactSetup]
+DesignProblem = tuple[FaultPlant, Fraction, ExactSetup]
 """Task, T_s [s] and loop setup of a design."""
 
 
 class Kind(ABC):
-    """A kind of laws, as far as a search for the most that one of them stands knows it."""
+    """A family of laws, as a search for the largest feasible value of a quantity uses it."""
 
     @abstractmethod
     def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, setup: ExactSetup = PLAIN) -> Any:
-        """`Closest` to a guarantee, or `NoProof`; near the numbers of another law if they are given."""
+        """`Closest` to a guarantee, or `NoProof`; `near` has the numbers of another law."""
 
     @abstractmethod
-    def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
+    def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
         """Proof about a law that is near enough."""
 
     @abstractmethod
-    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> Held | None:
-        """The loop of a law whose pressure changes little; None where no law is known."""
+    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
+        """The loop of a law with small pressure changes; None without a law."""
 
 
 @dataclass(frozen=True, slots=True)
 class Linear(Kind):
-    """Laws with an estimate of the disturbance, told what is measured."""
+    """Linear laws with a disturbance estimate from the measurements."""
 
     measured: str = MEASURED[0]
 
@@ -535,11 +538,11 @@ class Linear(Kind):
         """By a search over the numbers of the family."""
         return closest(task, step, near=near, measured=self.measured, setup=setup)
 
-    def proved(self, task: FaultPlant, found: Closest) -> TrackingProof | NoProof:
+    def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
         """With a slow input gain where that helps."""
-        return best_guarantee(task, found.held)
+        return best_guarantee(task, candidate.held)
 
-    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> Held | None:
+    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
         """That with the smallest change of pressure near the smallest peak."""
         laws = _Laws.of(task, step, self.measured, setup)
         if isinstance(laws, NoProof):
@@ -551,9 +554,9 @@ class Linear(Kind):
 def longest_step(
     task: FaultPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, setup: ExactSetup = PLAIN
 ) -> Longest | None:
-    """A guarantee at nearly the longest T_s that has one, whatever the T_s of the fault; None where none is found.
+    """Guarantee at nearly the longest T_s that has one; None where none is found.
 
-    Laws are those that come nearest to a guarantee, each sought near that of the T_s before.
+    The law at each T_s is that nearest to a guarantee, searched near the law of the T_s before.
 
     Parameters
     ----------
@@ -568,7 +571,7 @@ def longest_step(
 
 
 def _first_step(task: FaultPlant, late: float = 0.0) -> Fraction:
-    """T_s to begin with [s], where a pressure acts late [s]: of the fastest pole, of a stable fault of its spring."""
+    """First T_s [s] of a search, from the fastest pole or the spring, for a late pressure [s]."""
     slip, rate = float(task.slip_chord[1]), float(task.rate_chord[0])
     pole = (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
     pace = pole if pole > 0 else sqrt(abs(slip)) or 1 / float(task.operation_time)
@@ -583,18 +586,18 @@ def continued(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
-    """Design for a T_s [s] near one for a longer T_s, where a search at T_s alone found none; None without one."""
+    """Design near a law for a longer T_s, where a search at T_s alone failed; or None."""
     if longest is None or longest.guarantee.held.step < step:
         return None
-    found = nearby(task, step, longest.numbers, measured=measured, setup=setup)
-    return found if found.proved else None
+    proof = nearby(task, step, longest.numbers, measured=measured, setup=setup)
+    return proof if proof.proved else None
 
 
 def design_at(task: FaultPlant, longest: Longest) -> TrackingProof:
-    """Design for a small slip-rate error at T_s and all else of a guarantee, which stays where there is none."""
+    """Design for a small slip-rate error at the T_s and setup of a guarantee."""
     held = longest.guarantee.held
-    found = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), setup=held.setup)
-    return min((longest.guarantee, *([found] if found.proved else [])), key=lambda g: g.claims.slip_rate_error)
+    proof = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), setup=held.setup)
+    return min((longest.guarantee, *([proof] if proof.proved else [])), key=lambda g: g.claims.slip_rate_error)
 
 
 def longest_delay(
@@ -605,25 +608,25 @@ def longest_delay(
     kind: Kind | None = None,
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
-    """A guarantee with nearly the longest delay that has one, at most 7 periods; None where none is found."""
+    """Guarantee with nearly the longest delay, at most 7 periods; None where none is found."""
 
-    def ask(delay: Fraction) -> Asked:
+    def problem_with(delay: Fraction) -> DesignProblem:
         return task, step, replace(setup, delay=delay)
 
-    found = _farthest(kind or Linear(measured), ask, Fraction(0), MOST_DELAY * step, unit=step / 2)
-    return None if found is None else found.guarantee
+    longest = _farthest(kind or Linear(measured), problem_with, Fraction(0), MOST_DELAY * step, unit=step / 2)
+    return None if longest is None else longest.guarantee
 
 
 def farthest_rock(
     task: FaultPlant, step: Fraction, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | None:
-    """A guarantee through nearly the largest L²/D of rock that has one; None where none is found."""
+    """Guarantee with nearly the largest L²/D of a diffusion path; None where none is found."""
 
-    def ask(time: Fraction) -> Asked:
+    def problem_with(time: Fraction) -> DesignProblem:
         return task, step, replace(setup, diffusion=time)
 
-    found = _farthest(Linear(measured), ask, max(_first_step(task), step), None)
-    return None if found is None else found.guarantee
+    farthest = _farthest(Linear(measured), problem_with, max(_first_step(task), step), None)
+    return None if farthest is None else farthest.guarantee
 
 
 def nearest_setup(
@@ -635,25 +638,25 @@ def nearest_setup(
     pressed: bool = False,
     setup: ExactSetup = PLAIN,
 ) -> tuple[str, TrackingProof] | None:
-    """Of a loop without a guarantee: a quantity that fails, and a guarantee with nearly the most of it that has one.
+    """A quantity of the setup that fails, and a guarantee with nearly its largest value.
 
-    With `pressed` the pressure fails: it exceeds the pump, or opens the fault. Then the quantity is the smallest
-    sufficient pump, from a design without pump limits, or else the largest disturbance. Otherwise it is the first of
-    `LIMITING` without which a design has a guarantee at T_s; None without one. For a pump rate it is nearly the lowest
-    sufficient one, for the box a fraction of all half-widths.
+    With `pressed` the pressure fails: it exceeds a pump limit or opens the fault. Then the quantity is the smallest
+    sufficient pump of a design without pump limits, or else the largest disturbance. Otherwise it is the first quantity
+    of `LIMITING` without which a design has a guarantee at T_s; None if there is none. A pump rate is nearly the lowest
+    sufficient one, a box is a fraction of all half-widths.
     """
     laws = kind or Linear(measured)
     if pressed and (less := _less_pressed(laws, task, step, setup)) is not None:
         return less
     pump = setup.pump
     for name in LIMITING:
-        asked: Any = getattr(setup, name, None)
+        limit: Any = getattr(setup, name, None)
         if name in (RATE, BOX, LONGEST):
-            asked = {RATE: pump and pump.rate, BOX: Fraction(any(task.spreads)), LONGEST: _slack(step, setup)}[name]
-        if not asked:
+            limit = {RATE: pump and pump.rate, BOX: Fraction(any(task.spreads)), LONGEST: _slack(step, setup)}[name]
+        if not limit:
             continue
 
-        def ask(value: Fraction, name: str = name) -> Asked:
+        def problem_with(value: Fraction, name: str = name) -> DesignProblem:
             other: Any = {name: value}
             if name == BOX:
                 return replace(task, spreads=_narrowed(task, value)), step, setup
@@ -663,19 +666,19 @@ def nearest_setup(
                 other = {LONGEST: step + value}
             return task, step, replace(setup, **other)
 
-        most = step / 2 if name == RATE else asked
-        first, unit = Fraction(0), min(asked, step) / 2
+        most = step / 2 if name == RATE else limit
+        first, unit = Fraction(0), min(limit, step) / 2
         if name == RATE or "jitter" in name:
             unit = min(most, step) / 16
         elif name == "diffusion":
-            first, unit = min(max(_first_step(task), step), asked), Fraction(0)
+            first, unit = min(max(_first_step(task), step), limit), Fraction(0)
         elif name == LONGEST:
-            first, unit = asked / 2, Fraction(0)
+            first, unit = limit / 2, Fraction(0)
         elif name == BOX:
             unit = Fraction(1, 2)
-        found = _farthest(laws, ask, first, most, unit=unit, attempts=_LONGEST_TIMES_FEWER)
-        if found is not None:
-            return name, with_lowest_rate(found.guarantee) if name == RATE else found.guarantee
+        nearest = _farthest(laws, problem_with, first, most, unit=unit, attempts=_LONGEST_TIMES_FEWER)
+        if nearest is not None:
+            return name, with_lowest_rate(nearest.guarantee) if name == RATE else nearest.guarantee
     return None
 
 
@@ -691,16 +694,16 @@ def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fr
 
 
 def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, setup: ExactSetup) -> tuple[str, TrackingProof] | None:
-    """The smallest pump, or the largest disturbance, for which a law of little pressure is proved."""
+    """Smallest pump, or largest disturbance, for which a low-pressure law is proved."""
     pump, held = setup.pump, laws.leanest(task, step, setup=setup)
     if held is None:
         return None
     if pump is not None and pump.limits is not None:
-        found = best_guarantee(task, replace(held, pump=_unlimited(pump)))
-        if found.proved:
-            low, high = map(Fraction, found.claims.pressures[-1])
+        proof = best_guarantee(task, replace(held, pump=_unlimited(pump)))
+        if proof.proved:
+            low, high = map(Fraction, proof.claims.pressures[-1])
             wider = replace(pump, least=min(pump.limits[0], low), largest=max(pump.limits[1], high))
-            return SATURATION, replace(found, held=replace(found.held, pump=wider))
+            return SATURATION, replace(proof, held=replace(proof.held, pump=wider))
 
     def attempt(amplitude: Fraction) -> TrackingProof | NoProof:
         return best_guarantee(replace(task, amplitude=amplitude), held)
@@ -722,29 +725,29 @@ def _ramped(pump: Pump | None, ramp: Fraction) -> Pump | None:
     return None if limited == Pump() else limited
 
 
-def with_lowest_rate(found: TrackingProof) -> TrackingProof:
+def with_lowest_rate(proof: TrackingProof) -> TrackingProof:
     """The same guarantee of the slowest pump that makes the largest change within the ramp."""
-    held, step = found.held, found.claims.largest_step
+    held, step = proof.held, proof.claims.largest_step
     if held.pump is None or step is None or not held.ramp:
-        return found
-    slower = replace(found, held=replace(held, pump=replace(held.pump, rate=above(step / held.ramp))))
-    return slower if slower.check() is Verdict.PROVED else found
+        return proof
+    slower = replace(proof, held=replace(held, pump=replace(held.pump, rate=above(step / held.ramp))))
+    return slower if slower.check() is Verdict.PROVED else proof
 
 
 def _farthest(
     laws: Kind,
-    ask: Callable[[Fraction], Asked],
+    problem_with: Callable[[Fraction], DesignProblem],
     first: Fraction,
     most: Fraction | None,
     unit: Fraction = Fraction(0),
     attempts: int = _ATTEMPTS,
 ) -> Longest | None:
-    """A proof at nearly the longest time, or the most of another quantity, for which laws come near to a guarantee.
+    """Proof at nearly the largest value of a quantity for which laws come near to one.
 
     Parameters
     ----------
     laws : Kind
-    ask : callable
+    problem_with : callable
         Plant, T_s and setup of the design for a time [s].
     first : Fraction
         Time to try first [s].
@@ -757,19 +760,19 @@ def _farthest(
     """
 
     def search(time: Fraction, near: np.ndarray | None) -> Closest | NoProof:
-        task, step, setup = ask(time)
-        found: Closest | NoProof = laws.closest(task, step, near, setup=setup)
-        return found
+        task, step, setup = problem_with(time)
+        candidate: Closest | NoProof = laws.closest(task, step, near, setup=setup)
+        return candidate
 
     good: Closest | None = None
     time, at, bad, before = first, first, None, None
     for _ in range(attempts):
-        found = search(time, None if good is None else good.numbers)
-        if attempts < _ATTEMPTS and good is not None and bad is None and not _within(found):
-            found = search(time, None)
-        small = None if isinstance(found, NoProof) else found.small_gain
-        if isinstance(found, Closest) and _within(found):
-            good, at = found, time
+        candidate = search(time, None if good is None else good.numbers)
+        if attempts < _ATTEMPTS and good is not None and bad is None and not _within(candidate):
+            candidate = search(time, None)
+        small = None if isinstance(candidate, NoProof) else candidate.small_gain
+        if isinstance(candidate, Closest) and _within(candidate):
+            good, at = candidate, time
         else:
             if good is None and (not time or not _nearer(small, before)):
                 return None
@@ -781,7 +784,7 @@ def _farthest(
         time = _time_between(good, at, bad, most, unit)
     for _ in range(_ATTEMPTS if good is not None else 0):
         assert good is not None
-        proof = laws.proved(ask(at)[0], good)
+        proof = laws.proved(problem_with(at)[0], good)
         if proof.proved:
             return Longest(proof, good.numbers)
         at = Fraction(f"{float(at * _BACK):.3g}")
@@ -791,16 +794,16 @@ def _farthest(
     return None
 
 
-def _within(found: Closest | NoProof) -> bool:
-    return isinstance(found, Closest) and found.closeness < 1
+def _within(candidate: Closest | NoProof) -> bool:
+    return isinstance(candidate, Closest) and candidate.closeness < 1
 
 
 def _time_between(
     good: Closest | None, at: Fraction, bad: tuple[Fraction, float | None] | None, most: Fraction | None, unit: Fraction
 ) -> Fraction:
-    """Time to try next [s], in three digits: where the small gain, drawn straight, is that of the end of the reach.
+    """Next value to try, in three digits, by linear interpolation of the small gain.
 
-    Half way where it is far from that, or where a nominal loop is unstable.
+    Bisection applies far from the target, or if a nominal loop is unstable.
     """
     if good is None:
         assert bad is not None
@@ -824,9 +827,9 @@ def _time_between(
 def reached(
     attempt: Attempt, first: Fraction, *, most: Fraction | None = None, attempts: int = _ATTEMPTS
 ) -> tuple[TrackingProof, ...]:
-    """Guarantees at growing times: twice the first and so on or half of it, then by bisection.
+    """Guarantees at growing times: doubled or halved from the first, then by bisection.
 
-    It ends without any where half the time brings the small gain too little nearer to 1.
+    The search ends without a guarantee if halving the time reduces the small gain too little.
 
     Parameters
     ----------
@@ -838,25 +841,25 @@ def reached(
     attempts : int
         Number of times at most.
     """
-    found: list[TrackingProof] = []
+    proofs: list[TrackingProof] = []
     time, good, bad, small_gain = first, None, None, None
     for _ in range(attempts):
-        answer = attempt(time)
-        if answer.proved:
-            found.append(answer)
+        proof = attempt(time)
+        if proof.proved:
+            proofs.append(proof)
             good = time
         else:
-            if good is None and not _nearer(answer.small_gain, small_gain):
+            if good is None and not _nearer(proof.small_gain, small_gain):
                 break
-            bad, small_gain = time, answer.small_gain
+            bad, small_gain = time, proof.small_gain
         if good is not None and (good == most or (bad is not None and bad - good <= _NEAR * bad)):
             break
         time = _next(good, bad, most)
-    return tuple(found)
+    return tuple(proofs)
 
 
 def _nearer(now: Fraction | float | None, before: Fraction | float | None) -> bool:
-    """Whether twice what half the time has brought would bring the small gain below 1, or may: nothing is known."""
+    """Whether twice the last decrease brings the small gain below 1; True if unknown."""
     return now is None or before is None or now - 2 * (before - now) < 1
 
 
@@ -879,7 +882,7 @@ CLASSES = ("amplitude", "rate")
 def certified_peaks(
     fault: Fault, controller: ExtendedLQR, *, disturbance_class: str = "amplitude"
 ) -> ContinuousProof | NoProof:
-    """Bounds of slip, slip rate and pressure in continuous time, of everything that reference and disturbance cause.
+    """Bounds of slip, slip rate and pressure of an e-LQR in continuous time.
 
     Parameters
     ----------
@@ -908,14 +911,14 @@ def certified_peaks(
     if len(law.states) < needed:
         few = f"too few integrals for feedback of the {controller.feedback}: {needed} needed, {len(law.states)} in use"
         return NoProof(reason=few)
-    found, limits = (
+    peaks, limits = (
         continuous_peaks(uncertain_plant(fault, rate_limited=disturbance_class == "rate"), law),
         controller.limits,
     )
-    if limits is None or not found.proved:
-        return found
-    low, high = found.claims.least_pressure, found.claims.largest_pressure
+    if limits is None or not peaks.proved:
+        return peaks
+    low, high = peaks.claims.least_pressure, peaks.claims.largest_pressure
     if limits.lowest < low and high < limits.highest:
-        return found
+        return peaks
     reason = f"the pressure may reach a limit of the law, from {low.quantity('Pa')} to {high.quantity('Pa')}"
     return NoProof(reason=reason)

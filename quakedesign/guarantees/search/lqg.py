@@ -31,7 +31,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_rate
 
 # ----------------------------------------------------------------------
-# Laws for a fault behind a lag or a layer of rock: gains of a discrete Riccati equation on fault and path.
+# Laws for a fault with a lag or a diffusion path: gains of a discrete Riccati equation on fault and path.
 
 THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
 BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
@@ -40,9 +40,9 @@ _WITHOUT_PATH = 6  # e1, e2, π2, d, the valve, its last step or the well, of a 
 
 
 def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> int:
-    """How many modes of a layer a law may know so that the loop keeps within the states of a file; 0 without one.
+    """Number of diffusion modes in a law that keeps the loop within a file's state limit.
 
-    Below 0 there are too many states even so. A law of the slip alone has one state more.
+    Negative if even no mode fits. A law of the slip alone has one state more.
     """
     ages = -int(-setup.delay // step)
     layer, behind = MODES if setup.diffusion else 0, bool(setup.lag)
@@ -52,7 +52,7 @@ def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> 
 
 @dataclass(frozen=True, slots=True)
 class PathFeedback:
-    """A model of fault and path, and the feedback of both by a linear quadratic regulator on the sampled pair."""
+    """Model of fault and path with LQR feedback on the sampled pair."""
 
     model: ErrorModel
     flow: np.ndarray
@@ -67,7 +67,7 @@ class PathFeedback:
         flow, first = _sampled(model, step, setup, path_modes(step, setup, observed=observed))
         path, count = rounded(flow[2:, 2:]), len(flow) - 2  # states b·q of the pressures q of the path
         errors = np.hstack([flow[:2, :2], flow[:2, 2:] / gain])
-        known = ErrorModel(
+        errors_model = ErrorModel(
             update=(*rounded(errors), *((Fraction(0), Fraction(0), *row) for row in path)),
             command=tuple(short_gain * v for v in (*rounded([first[:2] / gain])[0], *(1 - sum(row) for row in path))),
             gain=short_gain,
@@ -75,12 +75,12 @@ class PathFeedback:
             unit=short_gain,
         )
         unit = float(setup.diffusion or step + setup.delay + setup.lag)
-        return cls(known, flow, first, unit, unit * gain)
+        return cls(errors_model, flow, first, unit, unit * gain)
 
     def gains(self, slip: float, pressure: float) -> Row:
-        """For logarithms of the weights of slip error and pressure, that of the slip-rate error being 1.
+        """Gains for logarithms of the weights of slip error and pressure; slip-rate error has 1.
 
-        Time is in L²/D or, without a layer, in what passes before a pressure acts.
+        The unit of time is L²/D or, without a diffusion path, T_s plus delay and lag.
 
         Raises
         ------
@@ -101,13 +101,13 @@ def _regulator(update: np.ndarray, command: np.ndarray, weights: np.ndarray, of_
 
 
 def _filter(update: np.ndarray, process: np.ndarray) -> np.ndarray:
-    """Corrections per innovation of the first state, whose measurement noise has the variance 1."""
+    """Corrections per innovation of the first state; its measurement noise has variance 1."""
     covariance = solve_discrete_are(update.T, np.eye(len(update))[:, :1], process, np.eye(1))
     return np.array(covariance[:, 0] / (covariance[0, 0] + 1))
 
 
 def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int) -> tuple[np.ndarray, np.ndarray]:
-    """A and B over one period, of e1, e2, the pressures of the path and the commands that wait [Pa]."""
+    """A and B over one period, for e1, e2, path pressures and delayed commands [Pa]."""
     delay, lag = setup.delay, setup.lag
     whole, late = int(delay // step), float(delay % step)
     ages = whole + (late > 0)
@@ -155,9 +155,9 @@ _FAINT = 1e-12  # process noise of everything, so that the filter forgets its st
 
 @dataclass(frozen=True, slots=True)
 class LawFamily:
-    """Laws of numbers x, where to begin, which x make one, and what ``tracking`` may spend of the smallest peak.
+    """Laws of numbers x: initial values, admissible x, allowance of ``tracking``.
 
-    The slip error counts over `period` [s] beside the slip-rate error, so that a loop does not creep.
+    The cost is the slip-rate error plus the slip error over `period` [s], against slow convergence.
     """
 
     law: Callable[[np.ndarray], LinearLaw]
@@ -196,14 +196,14 @@ def why_no_law(step: Fraction, measured: str, setup: ExactSetup) -> str:
         return ""
     if SHORTEST * setup.diffusion < step:
         return f"L^2/D = {float(setup.diffusion):.4g} s is below T_s/{SHORTEST}; omit the diffusion path"
-    known = path_modes(step, setup, observed=measured == "slip") >= _FEWEST_MODES
-    return "" if known else "a law with models of the delay and of the diffusion path has too many states"
+    observable = path_modes(step, setup, observed=measured == "slip") >= _FEWEST_MODES
+    return "" if observable else "a law with models of the delay and of the diffusion path has too many states"
 
 
 def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup) -> LawFamily:
-    """Feedback with an estimate of the disturbance, from slip and slip rate, from the slip alone or a differentiator.
+    """Feedback with a disturbance estimate, for slip and rate, slip alone or differentiator.
 
-    Behind a lag or a diffusion path the law also feeds back the pressures on their way, which it computes by its model.
+    With a lag or a diffusion path the law also feeds back the pressures of its model of the path.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
 
 @dataclass(frozen=True, slots=True)
 class _Kalman:
-    """Filters of slip error, slip-rate error and a level of all accelerations, from the slip: of one T_s [s]."""
+    """Kalman filters of slip error, slip-rate error and acceleration level, from the slip."""
 
     follows: np.ndarray
     units: np.ndarray
@@ -261,12 +261,12 @@ class _Kalman:
         return cls(np.linalg.inv(units) @ expm(_flow(model) * period) @ units, units, period)
 
     def decades(self, amplitude: float, noise: Fraction) -> float:
-        """Where a search begins: of what the disturbance [m/s²] moves within T_s, over the noise [m]."""
+        """Initial noise ratio: displacement by the disturbance [m/s²] over the noise [m]."""
         moved = amplitude * self.step**2
         return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
 
     def corrections(self, acceleration: float, level: float) -> tuple[Fraction, Fraction, Fraction]:
-        """Per innovation of the slip, whose noise has the variance 1, by the Riccati equation of the filter."""
+        """Corrections per innovation of the slip, by the Riccati equation of the filter."""
         pushed = self.follows[:, 2] * [1, 1, 0]
         process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
         first, second, third = map(short, self.units @ _filter(self.follows, process))
@@ -280,7 +280,7 @@ def _flow(model: NominalModel) -> np.ndarray:
 
 @dataclass(frozen=True, slots=True)
 class DelayFeedback:
-    """A model of the fault and of the commands on their way, and feedback of the errors when a pressure arrives.
+    """Model of fault and delayed commands, with feedback of the errors at arrival.
 
     Attributes
     ----------
@@ -310,10 +310,10 @@ class DelayFeedback:
         arriving = [pushed(min(j * period, late)) - pushed((j - 1) * period) for j in ages]
         gain = float(model.gain)
         of_commands = rounded(v / gain for v in (first[:2], *moved[:2, 2:].T))
-        known = ErrorModel.delayed(rounded(moved[:2, :2]), of_commands, short(gain))
+        errors_model = ErrorModel.delayed(rounded(moved[:2, :2]), of_commands, short(gain))
         free, forced = rounded(expm(flow * late)[:2, :2]), rounded(arriving)
-        arrival = tuple((*row, *(known.gain * v[i] for v in forced)) for i, row in enumerate(free))
-        return cls(known, arrival, gain, period)
+        arrival = tuple((*row, *(errors_model.gain * v[i] for v in forced)) for i, row in enumerate(free))
+        return cls(errors_model, arrival, gain, period)
 
     def gains(self, slip: float, rate: float) -> Row:
         """For k1·β·b·T_s² and k2·β·b·T_s of the errors at the arrival."""
@@ -361,10 +361,10 @@ FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, 
 def sliding_law(
     model: SlidingModel, step: Fraction, *, diffusion: Fraction = _ZERO, weights: Weights = FAVOURED
 ) -> LinearLaw:
-    """LQG compensator of the sampled slip error, with a zero-order hold of `step` [s] and a diffusion path of L²/D [s].
+    """LQG compensator of the slip error with zero-order hold and a diffusion path.
 
-    The pressure is relative to that which the reference needs. States: predicted x, z, the modes of the path and the
-    level, all scaled.
+    The pressure is relative to the equilibrium pressure of the reference. States: predicted x, z, the modes of the path
+    and the level, all scaled.
 
     Raises
     ------
@@ -425,7 +425,7 @@ _SLIDING_MODEL_ONE, _NEAR = Fraction(1), Fraction(1, 10)
 
 
 def sliding_model(fault: Fault) -> SlidingModel:
-    """A fault about sliding along its task at the mean rate V, linearised; η and k with it, at the pressure 0.
+    """Fault linearised about sliding at the mean rate V of its task, at the pressure 0.
 
     Raises
     ------
@@ -458,7 +458,7 @@ def mean_rate(fault: Fault) -> Fraction:
 
 
 def near_path(model: SlidingModel) -> Fraction:
-    """L²/D [s] of rock that hardly delays the pressure: a tenth of the time in which the state ages, D_c/V."""
+    """L²/D [s] of a diffusion path with little delay: a tenth of D_c/V."""
     return _NEAR / model.state_rate
 
 

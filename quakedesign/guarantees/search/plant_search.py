@@ -31,7 +31,7 @@ _ROOM = 1.002  # so that another way to bound the same integrals closes with the
 
 
 def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPart:
-    """An uncertain plant in exact numbers, sectors with callable slopes up to bounds by their names."""
+    """Uncertain plant in exact numbers; bounds belong to sectors with callable slopes."""
     sectors = plant.exact_sectors(lambda name: bounds.get(name, Fraction(1)))
     return LinearPart(
         A=plant.A,
@@ -47,7 +47,7 @@ def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPar
 
 
 def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = None) -> PlantProof | NoProof:
-    """Peaks of a plant under a law, or why none are proved; `pieces` of a flow by its size unless given.
+    """Peaks of a plant under a law, or the reason why none are proved.
 
     Raises
     ------
@@ -68,17 +68,17 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
             return NoProof(reason=reason)
         cut = pieces or pieces_of(loop)
         try:
-            found = response_bounds(loop, cut)
+            responses = response_bounds(loop, cut)
         except ParameterError as error:
             return NoProof(reason=str(error))
-        inputs = _numbers(plant, part, found)
+        inputs = _numbers(plant, part, responses)
         if isinstance(inputs, NoProof):
             return inputs
-        rows = row_bounds(part, found, inputs)[len(part.outputs) :]
+        rows = row_bounds(part, responses, inputs)[len(part.outputs) :]
         reached = {name: rows[list(plant.sectors).index(name)] for name in free}
         left = [name for name in free if reached[name] >= bounds[name]]
         if not left:
-            return _claimed(plant, part, law, cut, found, inputs)
+            return _claimed(plant, part, law, cut, responses, inputs)
         for name in left:
             bounds[name] = _rounded(reached[name] * _WIDER)
     name = free[0]
@@ -97,11 +97,11 @@ def _first_bounds(plant: UncertainPlant) -> dict[str, Fraction]:
 
 
 def _claimed(
-    plant: UncertainPlant, part: LinearPart, law: MatrixLaw, pieces: int, found: ResponseBounds, inputs: Row
+    plant: UncertainPlant, part: LinearPart, law: MatrixLaw, pieces: int, responses: ResponseBounds, inputs: Row
 ) -> PlantProof | NoProof:
-    bounds = peaks(part, found, inputs)
+    bounds = peaks(part, responses, inputs)
     if bounds is None:
-        rows = row_bounds(part, found, inputs)[len(part.outputs) :]
+        rows = row_bounds(part, responses, inputs)[len(part.outputs) :]
         names = [*plant.sectors, *plant.gains]
         beyond = [
             f"{name} holds for arguments up to {UpperBound(s.within):.4g}, which may reach {UpperBound(row):.4g}"
@@ -115,7 +115,7 @@ def _claimed(
     return named(PlantProof(part=part, law=law, pieces=pieces, inputs=inputs, claims=claims), plant)
 
 
-def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> Row | NoProof:
+def _numbers(plant: UncertainPlant, part: LinearPart, responses: ResponseBounds) -> Row | NoProof:
     """W of the theorem, from floats; or the small gain and the sector that makes most of it."""
     count, names = len(part.outputs), [*plant.sectors, *plant.gains]
     halves = np.array([float(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors])
@@ -123,7 +123,7 @@ def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> 
         return (Fraction(0),) * len(halves)
     first = len(part.disturbances) + len(part.loads)
     span = slice(count, count + len(halves))
-    gains = np.array([[float(v) for v in row[span]] for row in found.inputs[first:]]).T
+    gains = np.array([[float(v) for v in row[span]] for row in responses.inputs[first:]]).T
     matrix = halves[:, None] * gains
     radius = max(abs(np.linalg.eigvals(matrix)))
     if radius * _ROOM >= 1:
@@ -134,7 +134,7 @@ def _numbers(plant: UncertainPlant, part: LinearPart, found: ResponseBounds) -> 
             small_gain=UpperBound(rational(f"{radius:.6g}")),
         )
     none = tuple(Fraction(0) for _ in halves)
-    own = halves * np.array([float(v) for v in row_bounds(part, found, none)[span]])
+    own = halves * np.array([float(v) for v in row_bounds(part, responses, none)[span]])
     own += 1e-12 * max(own.max(), 1e-300)
     solved = np.linalg.solve(np.eye(len(own)) - _ROOM * matrix, _ROOM * own)
     return tuple(_rounded(rational(float(v)), 8) for v in solved)
@@ -182,7 +182,7 @@ def _unstable(part: LinearPart, loop: PlantLoop) -> str:
 
 
 def escaping(plant: UncertainPlant, law: MatrixLaw) -> tuple[float, np.ndarray]:
-    """Growth per sample and states of the fastest mode where every sector is at its high slope at first."""
+    """Growth per sample and shape of the fastest mode, every sector at its high slope."""
     part = linear_part(plant, _first_bounds(plant))
     steep = tuple(replace(s, slopes=(s.slopes[1], s.slopes[1])) for s in part.sectors)
     radius, mode = spectral_radius(replace(part, sectors=steep).loop(law))

@@ -1,4 +1,4 @@
-"""Laws for blocks in slow sliding that measure the slip of each block, or an average for each well.
+"""Laws for blocks in slow sliding from the slip of each block, or its mean per well.
 
 Linear-quadratic feedback of a Kalman filter of slips, states of friction, pressures and a constant pressure error of
 each well, with weights from a search with the estimate of what is proved.
@@ -71,19 +71,17 @@ def sliding_block_guarantee(
         plant, rate = blocks.plant(claims), blocks.log_rate(claims)
         if plant is None or rate is None:
             break
-        found = plant_guarantee(plant, law, _PIECES)
-        if found.proved and max(found.claims.controls) * MPA < claims.push:
-            return replace(found, notes=(_slip_rates(blocks, rate),))
+        proof = plant_guarantee(plant, law, _PIECES)
+        if proof.proved and max(proof.claims.controls) * MPA < claims.push:
+            return replace(proof, notes=(_slip_rates(blocks, rate),))
     return NoProof(reason="the bounds that an estimate finds are not proved")
 
 
 def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Fraction, UpperBound, PlantProof]:
-    """Lag [s] and largest shear stress [Pa] for which a guarantee is one of these blocks, and its bound of |ln(v/V)|.
+    """Lag [s], largest shear stress [Pa] and bound of |ln(v/V)| of a guarantee for blocks.
 
-    Last the guarantee with the names of these blocks.
-
-    The claims of the plant are read off its sectors, and Q off the bounds of its pressures: with a smaller one its
-    sectors and disturbances still cover the blocks.
+    The last result is the guarantee with the names of these blocks. The claims Z and W follow from the sectors of its
+    plant, and Q from the bounds of its pressures; for a smaller Q its sectors and disturbances still cover the blocks.
 
     Raises
     ------
@@ -116,20 +114,20 @@ def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Frac
     return lag, low, rate, replace(named(claim, plant), notes=(_slip_rates(blocks, rate),))
 
 
-def _within(asked: LinearPart, proved: LinearPart) -> bool:
+def _within(required: LinearPart, proved: LinearPart) -> bool:
     """Whether a plant is another one, or has narrower sectors and smaller disturbances."""
-    same = all(getattr(asked, name) == getattr(proved, name) for name in ("A", "B", "C", "loads", "noise", "start"))
-    if not same or asked.outputs != proved.outputs or len(asked.sectors) != len(proved.sectors):
+    same = all(getattr(required, name) == getattr(proved, name) for name in ("A", "B", "C", "loads", "noise", "start"))
+    if not same or required.outputs != proved.outputs or len(required.sectors) != len(proved.sectors):
         return False
     narrower = all(
         (a.entry, a.row, a.within) == (b.entry, b.row, b.within)
         and b.slopes[0] <= a.slopes[0] <= a.slopes[1] <= b.slopes[1]
-        for a, b in zip(asked.sectors, proved.sectors, strict=True)
+        for a, b in zip(required.sectors, proved.sectors, strict=True)
     )
-    pushed = zip(asked.disturbances, proved.disturbances, strict=False)
+    pushed = zip(required.disturbances, proved.disturbances, strict=False)
     return (
         narrower
-        and len(asked.disturbances) == len(proved.disturbances)
+        and len(required.disturbances) == len(proved.disturbances)
         and all(a[0] == b[0] and a[1] <= b[1] for a, b in pushed)
     )
 
@@ -201,10 +199,10 @@ class _WeightSearch:
             }
             if all(v <= getattr(claims, name) for name, v in reached.items()):
                 return law, claims, small
-            told = {
+            responses = {
                 name: rational(f"{max(v * _ROOM, float(getattr(claims, name))):.6g}") for name, v in reached.items()
             }
-            claims = BlockClaims(**told)
+            claims = BlockClaims(**responses)
         return law, None, small
 
     def _part(self, claims: BlockClaims) -> Any:
@@ -220,31 +218,31 @@ class _WeightSearch:
         ]
         return np.array(rows)
 
-    def _kept(self, matrix: np.ndarray) -> np.ndarray:
-        """What joins signals of one well, where each has its own measurements alone."""
+    def _decentralised(self, matrix: np.ndarray) -> np.ndarray:
+        """Entries between signals of the same well, if each well has its own measurements."""
         height, width = (size // self.count for size in matrix.shape)
         return np.asarray(matrix * np.kron(np.ones((height, width)), self.own))
 
     def _law(self, part: Any, x: np.ndarray) -> MatrixLaw | None:
-        """Feedback of the estimate, in exact numbers; None where an equation of Riccati has no solution."""
+        """Feedback of the estimate in exact numbers; None if a Riccati equation fails."""
         pressure, slip, drift, noise = np.exp(x)
         (A, B), m = middle(part), self.count
-        A, B = self._kept(self.mean @ A @ self.back), self._kept(self.mean @ B)
+        A, B = self._decentralised(self.mean @ A @ self.back), self._decentralised(self.mean @ B)
         stressed = self.mean @ np.array([entry for entry, _ in part.disturbances], dtype=float).T
         stressed = stressed * [float(size) for _, size in part.disturbances]
         k, T = len(A), float(self.step)
         whole = np.block([[A, B, B], [np.zeros((2 * m, k + 2 * m))]])
-        held = expm(whole * T)
-        As, Bs = held[: k + m, : k + m], held[: k + m, k + m :]
+        step_map = expm(whole * T)
+        As, Bs = step_map[: k + m, : k + m], step_map[: k + m, k + m :]
         C = np.hstack([np.eye(m), np.zeros((m, k))])
         entered = np.vstack([stressed, np.zeros((m, stressed.shape[1]))])
         covariance = (
-            self._kept(entered @ entered.T) * T**2
+            self._decentralised(entered @ entered.T) * T**2
             + np.diag(np.r_[np.zeros(k), np.full(m, drift)])
             + 1e-14 * np.eye(k + m)
         )
         rates = self.mean[:m, : len(self.blocks.tasks)] @ self._log_rates(part) @ self.back
-        aims = self._kept(rates.T @ rates) + np.diag(np.r_[np.full(m, slip), np.zeros(2 * m)])
+        aims = self._decentralised(rates.T @ rates) + np.diag(np.r_[np.full(m, slip), np.zeros(2 * m)])
         try:
             P = solve_discrete_are(As[:k, :k], Bs[:k], aims, pressure * np.eye(m))
             K = np.linalg.solve(pressure * np.eye(m) + Bs[:k].T @ P @ Bs[:k], Bs[:k].T @ P @ As[:k, :k])
@@ -252,7 +250,7 @@ class _WeightSearch:
             L = S @ C.T @ np.linalg.inv(C @ S @ C.T + noise * np.eye(m))
         except (ValueError, np.linalg.LinAlgError):
             return None
-        K, L = self._kept(np.hstack([K, np.eye(m)])), self._kept(L)
+        K, L = self._decentralised(np.hstack([K, np.eye(m)])), self._decentralised(L)
         rest, moved = np.eye(k + m) - L @ C, As - Bs @ K
         return MatrixLaw(
             step=self.step,

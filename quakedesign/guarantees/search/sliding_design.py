@@ -18,7 +18,7 @@ from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, Held
+from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.sliding_small_gain import (
     SlidingClaims,
@@ -67,7 +67,9 @@ _AXES = tuple(_ENDS)
 _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 
 
-def proved_sliding(task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_RATES[0]) -> SlidingProof | NoProof:
+def proved_sliding(
+    task: SlidingPlant, held: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]
+) -> SlidingProof | NoProof:
     """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or why there are none."""
     corner = worst_corner(task)
     claims = _claims(corner, held, log_rate)
@@ -85,27 +87,27 @@ def proved_sliding(task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_R
         return NoProof(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box")
 
 
-def _smallest_claims(found: SlidingProof) -> SlidingClaims:
-    """What claims that follow from themselves on every cell come to if followed from again and again.
+def _smallest_claims(proof: SlidingProof) -> SlidingClaims:
+    """Fixed point of the map from claims to the bounds that follow from them.
 
-    By the estimate times what the bounds are more than it, measured on the worst cell. All that is bounded grows with
-    the claims, so that what follows from claims follows from itself as well.
+    The map is the estimate times the ratio of bound and estimate on the worst cell. It is monotone in the claims, so
+    that claims which follow from larger ones also follow from themselves.
     """
-    claims = found.claims
+    claims = proof.claims
     for _ in range(_MEASURED):
-        worst = max(found.cells, key=lambda cell: _excess(cell, found.held, claims))
-        bounds, estimate = cell_bounds(worst, found.held, claims), _estimate(worst, found.held, claims)
+        worst = max(proof.cells, key=lambda cell: _excess(cell, proof.held, claims))
+        bounds, estimate = cell_bounds(worst, proof.held, claims), _estimate(worst, proof.held, claims)
         if isinstance(bounds, NoProof) or estimate is None:
             break
         room = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in _NAMES}
-        claims = _followed(found, claims, room)
+        claims = _followed(proof, claims, room)
     return claims
 
 
-def _followed(found: SlidingProof, claims: SlidingClaims, room: Mapping[str, float]) -> SlidingClaims:
+def _followed(proof: SlidingProof, claims: SlidingClaims, room: Mapping[str, float]) -> SlidingClaims:
     """Claims that follow by the estimate, with room, until they hardly change."""
     for _ in range(_SHRINKING):
-        every = [_estimate(cell, found.held, claims) for cell in found.cells]
+        every = [_estimate(cell, proof.held, claims) for cell in proof.cells]
         if any(one is None for one in every):
             break
         most = {name: max(float(one[name]) for one in every if one) for name in room}
@@ -117,14 +119,14 @@ def _followed(found: SlidingProof, claims: SlidingClaims, room: Mapping[str, flo
     return claims
 
 
-def largest_stress(task: SlidingPlant, held: Held, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
-    """About the largest stress [Pa] for which `proved_sliding` may succeed, with two digits; 0 for none."""
+def largest_stress(task: SlidingPlant, held: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
+    """Estimate of the largest stress [Pa] that `proved_sliding` proves; 0 for none."""
     corner = worst_corner(task)
     claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
-    found = [_estimate(replace(corner, stress=stress), held, claims) for stress in (Fraction(0), some)]
-    rest, more = (0.0 if one is None else float(one["log_rate"]) for one in found)
+    estimates = [_estimate(replace(corner, stress=stress), held, claims) for stress in (Fraction(0), some)]
+    rest, more = (0.0 if one is None else float(one["log_rate"]) for one in estimates)
     room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
-    if None in found or room <= 0:
+    if None in estimates or room <= 0:
         return Fraction(0)
     return two_digits(Fraction(float(some) * room / (more - rest)))
 
@@ -142,10 +144,10 @@ def designed_sliding(
     log_rate: Fraction = LOG_RATES[0],
     near: np.ndarray | None = None,
     setup: ExactSetup = PLAIN,
-) -> Held | NoProof:
-    """The law with the smallest estimated bounds at the least stable corner of the box, |ln(v/V)| up to `log_rate`.
+) -> SampledLoop | NoProof:
+    """Law with the least estimated bounds at the least stable corner of the box.
 
-    The search begins `near` the numbers of a law as well, if they are told.
+    `near` gives the numbers of a law as a further start.
     """
     chosen, _ = searched_sliding(task, step, log_rate, setup, near=near)
     if chosen is not None:
@@ -172,8 +174,8 @@ def searched_sliding(
     near: np.ndarray | None = None,
     enough: float = 0.0,
     most: int = _EVALUATIONS,
-) -> tuple[Held | None, np.ndarray]:
-    """A law with small estimated bounds, None for none, and its numbers, near which another search may begin.
+) -> tuple[SampledLoop | None, np.ndarray]:
+    """Law with small estimated bounds, or None, and its numbers.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ def searched_sliding(
     step, log_rate, setup
         As of `designed_sliding`.
     near : array, optional
-        Numbers to begin with beside the usual ones.
+        Further start of the search.
     enough : float
         Estimated bound of |ln(v/V)| over `log_rate` with which the search ends.
     most : int
@@ -190,7 +192,7 @@ def searched_sliding(
     corner = worst_corner(task)
     claims = _guess(corner, log_rate)
 
-    def held(x: np.ndarray) -> Held | None:
+    def held(x: np.ndarray) -> SampledLoop | None:
         law = _law(corner, task, step, setup, x)
         return None if law is None else setup.held(law, step)
 
@@ -211,8 +213,8 @@ def searched_sliding(
         radius = spectral_radius(loop)
         if radius > _FORGETTING:
             return _FAILED + radius
-        found = _estimate_of(loop, corner, tried, claims)
-        return _FAILED / 2 if found is None else float(found["log_rate"] / log_rate)
+        estimate = _estimate_of(loop, corner, tried, claims)
+        return _FAILED / 2 if estimate is None else float(estimate["log_rate"] / log_rate)
 
     def ends(intermediate_result: OptimizeResult) -> None:
         cost = intermediate_result.fun
@@ -282,14 +284,14 @@ def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
     return SlidingClaims(**{name: UpperBound(short(float(v), _SHORT)) for name, v in values.items()})
 
 
-def _claims(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingClaims | None:
-    """Claims that follow from themselves, by the estimate, with the bound of y as told; None for none."""
+def _claims(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingClaims | None:
+    """Self-consistent claims by the estimate, with the given bound of y; None for none."""
     claims = _guess(task, log_rate)
     for _ in range(_TURNS):
-        found = _estimate(task, held, claims)
-        if found is None:
+        estimate = _estimate(task, held, claims)
+        if estimate is None:
             return None
-        wider = {k: float(found[k]) * _ROOM / _NEAR for k in _NAMES}
+        wider = {k: float(estimate[k]) * _ROOM / _NEAR for k in _NAMES}
         if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
             break
         try:
@@ -298,15 +300,17 @@ def _claims(task: SlidingPlant, held: Held, log_rate: Fraction) -> SlidingClaims
             return None
     else:
         return None
-    return claims if float(found["log_rate"]) < float(log_rate) else None
+    return claims if float(estimate["log_rate"]) < float(log_rate) else None
 
 
-def _estimate(task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
+def _estimate(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> dict[str, Any] | None:
     model = model_of(task, claims)
     return None if model is None else _estimate_of(loop_of(held, model, task), task, held, claims)
 
 
-def _estimate_of(loop: PeriodicLoop, task: SlidingPlant, held: Held, claims: SlidingClaims) -> dict[str, Any] | None:
+def _estimate_of(
+    loop: PeriodicLoop, task: SlidingPlant, held: SampledLoop, claims: SlidingClaims
+) -> dict[str, Any] | None:
     gains = gains_of(loop)
     if gains is None:
         return None
@@ -315,14 +319,16 @@ def _estimate_of(loop: PeriodicLoop, task: SlidingPlant, held: Held, claims: Sli
     phases = after_a_step(loop)
     if len(phases) != count:
         phases = tuple(ends) if ends and loop.fading else (max(phases),) * count
-    found = bounds_from(task, held, claims, loop, gains, phases)
-    return None if isinstance(found, NoProof) else found
+    bounds = bounds_from(task, held, claims, loop, gains, phases)
+    return None if isinstance(bounds, NoProof) else bounds
 
 
-def _cut(task: SlidingPlant, held: Held, claims: SlidingClaims, left: list[int], *, exactly: bool = False) -> Cuts:
-    """Cuts of a box until the claims follow on every cell; `left` counts the cuts that there may still be.
+def _cut(
+    task: SlidingPlant, held: SampledLoop, claims: SlidingClaims, left: list[int], *, exactly: bool = False
+) -> Cuts:
+    """Cuts of a box until the claims follow on every cell; `left` limits their number.
 
-    By the estimate, or `exactly`.
+    Decided by the estimate, or `exactly`.
 
     Raises
     ------
@@ -331,8 +337,8 @@ def _cut(task: SlidingPlant, held: Held, claims: SlidingClaims, left: list[int],
     """
     wide = [axis for axis in _AXES if task.ranges[axis][0] < task.ranges[axis][1]]
     if _excess(task, held, claims) < (_NEAR if wide else 1):
-        found = cell_bounds(task, held, claims) if exactly else None
-        if not exactly or (isinstance(found, dict) and follows(found, claims)):
+        bounds = cell_bounds(task, held, claims) if exactly else None
+        if not exactly or (isinstance(bounds, dict) and follows(bounds, claims)):
             return (None,)
     if not wide or left[0] < 1:
         raise ParameterError(
@@ -347,12 +353,12 @@ def _cut(task: SlidingPlant, held: Held, claims: SlidingClaims, left: list[int],
     return ((axis, middles[axis]), *below, *above)
 
 
-def _excess(task: SlidingPlant, held: Held, claims: SlidingClaims) -> float:
+def _excess(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> float:
     """How much larger than the claims the bounds may be, by the estimate."""
-    found = _estimate(task, held, claims)
-    if found is None:
+    estimate = _estimate(task, held, claims)
+    if estimate is None:
         return _FAILED
-    return max(float(found[k]) / float(getattr(claims, k)) for k in _NAMES)
+    return max(float(estimate[k]) / float(getattr(claims, k)) for k in _NAMES)
 
 
 def _too_much(task: SlidingPlant, log_rate: Fraction) -> str:
@@ -363,13 +369,12 @@ def _too_much(task: SlidingPlant, log_rate: Fraction) -> str:
 
 
 # ----------------------------------------------------------------------
-# How far a well may be, or how fast a fault may slide, for a law to hold it: from near and slow on, law after law.
+# Longest diffusion path, or largest V, for which a law is found: continuation from a short path, law after law.
 #
-# Times in D_c/V, the loop hardly depends on V: a proof for a share of the rock's L²/D is nearly one for that share of
-# V.
+# With times in D_c/V the loop hardly depends on V: a proof for a share of L²/D is nearly one for that share of V.
 
-Prove = Callable[[SlidingPlant, Held, Fraction], SlidingProof | NoProof]
-"""Of a task, a law as it runs and a bound of |ln(v/V)|."""
+Prove = Callable[[SlidingPlant, SampledLoop, Fraction], SlidingProof | NoProof]
+"""Proof for a task, a sampled law in its setup and a bound of |ln(v/V)|."""
 
 PATH = {"diffusion": "L^2/D", "lag": "the lag"}
 _EASY = Fraction(1)  # D_c/V through which laws are found at once
@@ -392,7 +397,7 @@ class WellReach:
     ----------
     share : Fraction
         Of the path [-]; 0 where no law was found.
-    held : Held or None
+    held : SampledLoop or None
         The law there.
     numbers : array or None
         Its numbers, near which a search may begin.
@@ -401,7 +406,7 @@ class WellReach:
     """
 
     share: Fraction = Fraction(0)
-    held: Held | None = None
+    held: SampledLoop | None = None
     numbers: np.ndarray | None = None
     log_rate: Fraction = LOG_RATES[-1]
 
@@ -415,7 +420,7 @@ def suitable(task: SlidingPlant, step: Fraction) -> Fraction:
 def farthest(
     task: SlidingPlant, step: Fraction, setup: ExactSetup, *, stressed: bool, most: Fraction = Fraction(1)
 ) -> WellReach:
-    """How much of a path, lag and rock, a law can be followed along, from where one is easily found.
+    """Largest share of a path for which a law is found, by continuation from a short path.
 
     Parameters
     ----------
@@ -423,7 +428,7 @@ def farthest(
     step : Fraction
         T_s [s].
     setup : ExactSetup
-        As of `designed_sliding`; with a lag or rock.
+        As of `designed_sliding`; with a lag or a diffusion path.
     stressed : bool
         Whether the stress of the task is given, so that larger bounds of |ln(v/V)| may be needed.
     most : Fraction
@@ -468,14 +473,14 @@ def _followed_well(
 
 
 def shortened(setup: ExactSetup, share: Fraction) -> ExactSetup:
-    """Share of lag and rock."""
+    """Setup with a share of the lag and of the diffusion time."""
     return replace(setup, lag=share * setup.lag, diffusion=share * setup.diffusion)
 
 
 def what_would_do(
     fault: Fault, task: SlidingPlant, reach: WellReach, setup: ExactSetup, prove: Prove, *, spread: Fraction
 ) -> str:
-    """For which part of a path, and for which V through all of it, a proof was found; in words, for a `reach` below 1.
+    """Remedies with a proof, as text: a share of the path, or a smaller V.
 
     Parameters
     ----------
@@ -495,17 +500,17 @@ def what_would_do(
         loop = setup if noise == setup.slip_noise else replace(setup, slip_noise=noise)
         held = replace(reach.held, slip_noise=noise)
         proof = prove(task, held, reach.log_rate)
-        said = [_slower(fault, task, reach, loop, prove, spread)]
+        sentences = [_slower(fault, task, reach, loop, prove, spread)]
         if proof.proved:
             path = (f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
-            said.append(f"at this V for {' and '.join(path)} with T_s = {float(held.step):.3g} s{_under(proof)}")
-        if found := ", and ".join(filter(None, said)):
-            return f"a proof was found {with_noise(noise, setup)}{found}"
+            sentences.append(f"at this V for {' and '.join(path)} with T_s = {float(held.step):.3g} s{_under(proof)}")
+        if remedies := ", and ".join(filter(None, sentences)):
+            return f"a proof was found {with_noise(noise, setup)}{remedies}"
     return "a smaller spread, stress or noise may do"
 
 
 def quieter(setup: ExactSetup) -> tuple[Fraction, ...]:
-    """Smaller bounds of the slip noise [m], down to none, to try where no proof is found; empty without noise."""
+    """Smaller bounds of the slip noise [m] to try, down to 0; empty without noise."""
     noise = setup.slip_noise
     return tuple(two_digits(share * noise) if share else Fraction(0) for share in _QUIETER) if noise else ()
 
@@ -524,19 +529,19 @@ def with_noise(noise: Fraction, setup: ExactSetup) -> str:
 def _slower(
     fault: Fault, task: SlidingPlant, reach: WellReach, setup: ExactSetup, prove: Prove, spread: Fraction
 ) -> str:
-    """A task with the same target slip that takes longer, through the whole path; empty where none is proved."""
+    """Task with the same slip and a smaller V that is proved through the path; else empty."""
     time = float(short(_SLOWER * fault.reference.operation_time / float(reach.share), _WELL_DIGITS))
     reference = replace(fault.reference, operation_time=time)
     slow = replace(fault, reference=reference, sampling_time=sliding_step(fault.friction, reference))
-    asked, step = slow_sliding_plant(slow, task.stress, spread), rational(slow.sampling_time)
-    held, _ = searched_sliding(asked, step, reach.log_rate, setup, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
-    proof = None if held is None else prove(asked, held, reach.log_rate)
+    slower, step = slow_sliding_plant(slow, task.stress, spread), rational(slow.sampling_time)
+    held, _ = searched_sliding(slower, step, reach.log_rate, setup, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
+    proof = None if held is None else prove(slower, held, reach.log_rate)
     if proof is None or not proof.proved:
         return ""
     return (
-        f"with this path for V = {float(asked.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "
+        f"with this path for V = {float(slower.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "
         f"'{fault.reference.target_slip:g} m', operation_time = '{time:g} s', sampling_time = '{float(step):g} s'"
-        f"{f' (but {beyond})' if (beyond := beyond_rates(fault.friction, float(asked.rate))) else ''}"
+        f"{f' (but {beyond})' if (beyond := beyond_rates(fault.friction, float(slower.rate))) else ''}"
     )
 
 

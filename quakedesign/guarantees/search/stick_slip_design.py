@@ -77,8 +77,8 @@ _ROOM = Fraction(3, 2)  # of extents, where ranges of the plant are taken before
 
 
 def _float_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]:
-    found: list[list[Any]] = expm(np.array(rows, dtype=float)).tolist()
-    return found
+    exponential: list[list[Any]] = expm(np.array(rows, dtype=float)).tolist()
+    return exponential
 
 
 def _float_curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[tuple[Any, Any], ...]:
@@ -116,8 +116,8 @@ def tuned(
     level, slip, back, gain = tuning
     damping, period = 0.0 if implicit else float(sum(task.rate_chord)) / 2, float(step)
     decay = np.exp(-damping * period)
-    held = -np.expm1(-damping * period) / damping if damping else period
-    per_rate = 1 / (gain * held * float(task.authority))
+    duration = -np.expm1(-damping * period) / damping if damping else period
+    per_rate = 1 / (gain * duration * float(task.authority))
     law = StickSlipLaw(
         rate_gain=short(decay * per_rate, _DIGITS),
         target_gain=short(per_rate, _DIGITS),
@@ -141,7 +141,7 @@ def _noises(held: SampledStickSlip) -> list[float]:
 
 @dataclass(frozen=True)
 class _Start:
-    """States at a sample, one a row, and choices of reference, input gain and slope of friction, one a column.
+    """States at a sample (rows), for choices of reference, input gain and slope (columns).
 
     The state's slip error is that of `stick_slip_set`, larger by the bound of the slip noise.
     """
@@ -160,11 +160,11 @@ class _Start:
     force: np.ndarray
 
     @classmethod
-    def of(cls, task: FaultPlant, held: SampledStickSlip, found: Ranges, states: np.ndarray, noise: float) -> "_Start":
+    def of(cls, task: FaultPlant, held: SampledStickSlip, plant: Ranges, states: np.ndarray, noise: float) -> "_Start":
         """With the ends of all ranges; the input gain changes slowest."""
         law = held.law
         slip, rate, level = (column[:, None] for column in states.T)
-        kinds = product(task.beta, (Fraction(0), task.reference_rates[0]), found.slope)
+        kinds = product(task.beta, (Fraction(0), task.reference_rates[0]), plant.slope)
         beta, reference, slope = np.array(list(kinds), dtype=float).T
         target = reference - float(law.return_rate) * (slip + noise - float(held.slip_noise))
         push = float(law.rate_gain) * rate - float(law.target_gain) * target + level + float(law.slip_gain) * noise
@@ -175,9 +175,9 @@ class _Start:
     def ended(
         self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray, interval: float, later: float | None = None
     ) -> np.ndarray:
-        """States after an interval, of the slip in it, the slip rate at its end, and whether the fault rests then.
+        """States after an interval, from its slip, final slip rate and state of rest.
 
-        Noise of the next sample is the opposite one unless given.
+        By default the noise of the next sample is the opposite one.
         """
         law, half, later = self.held.law, float(self.held.step) / 2, -self.noise if later is None else later
         innovation = moved + later - self.noise - half * (self.rate + self.predicted)
@@ -194,28 +194,28 @@ class _Reach:
 
     task: FaultPlant
     held: SampledStickSlip
-    found: Ranges
+    plant: Ranges
     periods: list[Period]
     excess: float = 0.0  # of friction at rest above that in slip [m/s²], in runs
 
     @classmethod
     def of(cls, task: FaultPlant, held: SampledStickSlip) -> "_Reach":
         none = Fraction(0), Fraction(0)
-        found = ranges(task, task.target_slip / 100, none, task.amplitude * held.longest**2)
-        return cls(task, held, found, Period.deciding(FLOATS, task, held, found, Fraction(0), none))
+        plant = ranges(task, task.target_slip / 100, none, task.amplitude * held.longest**2)
+        return cls(task, held, plant, Period.deciding(FLOATS, task, held, plant, Fraction(0), none))
 
     def after(self, states: np.ndarray) -> np.ndarray:
-        """States a period later: those of runs, and extremes of both maps."""
-        found = list[np.ndarray]()
+        """States one period later: simulated ones, and extremes of both maps."""
+        images = list[np.ndarray]()
         for noise in _noises(self.held):
-            start = _Start.of(self.task, self.held, self.found, states, noise)
-            found += [self.simulated(states, noise).reshape(-1, 3), *self._resting(start)]
-            found += [ends for period in self.periods for ends in self._sliding(start, period)]
-        return np.vstack(found)
+            start = _Start.of(self.task, self.held, self.plant, states, noise)
+            images += [self.simulated(states, noise).reshape(-1, 3), *self._resting(start)]
+            images += [ends for period in self.periods for ends in self._sliding(start, period)]
+        return np.vstack(images)
 
     def simulated(self, states: np.ndarray, noise: float, later: float | None = None) -> np.ndarray:
-        """States after a period of the plant that sticks, (states, choices, 3); the input gain changes slowest."""
-        start = _Start.of(self.task, self.held, self.found, states, noise)
+        """Simulated states after a period of the stick–slip plant, (states, choices, 3)."""
+        start = _Start.of(self.task, self.held, self.plant, states, noise)
         ends = sorted({float(self.held.step), float(self.held.longest)})
         runs = [
             start.ended(*self._run(start, sign, turn, end), end, later)
@@ -228,22 +228,22 @@ class _Reach:
     def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
         """Ends of the rest map."""
         stop = np.min(
-            [float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.found)], axis=0
+            [float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.plant)], axis=0
         )
         stop = stop + 0 * start.force
         most, amplitude = float(self.task.beta[1] / self.task.beta[0]), float(self.task.amplitude)
         for share in (0.0, 0.5, 1.0):
-            possible = most * start.push >= amplitude + float(self.found.slope[0]) * share * stop
+            possible = most * start.push >= amplitude + float(self.plant.slope[0]) * share * stop
             for interval in {float(self.held.step), float(self.held.longest)}:
                 yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True), interval)[possible]
 
     def _sliding(self, start: "_Start", period: Period) -> Iterator[np.ndarray]:
-        """Ends of the sliding map, whose end alone is known to be forward."""
+        """Ends of the sliding map; only the final slip rate is known to be at least 0."""
         step, amplitude = float(period.interval), float(self.task.amplitude)
         of_slip, of_rate = period.impulses
         times = step - np.linspace(0, step, len(of_slip))
         largest = times * start.rate[..., None] + times**2 / 2 * (amplitude - start.force[..., None])
-        width = float(self.found.slope[1] - self.found.slope[0]) / 2 / (1 - float(self.found.slope[1]) * step**2 / 2)
+        width = float(self.plant.slope[1] - self.plant.slope[0]) / 2 / (1 - float(self.plant.slope[1]) * step**2 / 2)
         sizes, size = amplitude + width * np.maximum(largest, 0), step / (len(of_slip) - 1)
         of_state = zip(period.of_rate, period.of_force, strict=True)
         plain = [r * start.rate - f * start.force for r, f in of_state]
@@ -261,7 +261,7 @@ class _Reach:
     def _run(self, start: "_Start", sign: int, turn: int, interval: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Slip and slip rate after an interval of the plant that sticks, and whether it rests."""
         size, amplitude = interval / _SUBSTEPS, float(self.task.amplitude)
-        damping = float(sum(self.found.damping)) / 2
+        damping = float(sum(self.plant.damping)) / 2
         moved, now = np.zeros_like(start.force), start.rate + np.zeros_like(start.force)
         for i in range(_SUBSTEPS):
             push = (sign if i < turn else -sign) * amplitude
@@ -276,7 +276,7 @@ class _Reach:
         return moved, now, now <= 0
 
     def hull(self, tell: Tell) -> np.ndarray | None:
-        """Vertices of the hull of all states that are reached from rest; None where it grows without bound."""
+        """Vertices of the hull of all states reached from rest; None if unbounded."""
         points = _at_first(self.held)
         directions = np.random.default_rng(0).standard_normal((1500, 3))
         first, before = None, np.zeros(6)
@@ -326,7 +326,7 @@ def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarra
 def _rows(periods: list[Period], facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
     for period in periods:
         yield from sliding_rows(period, facets, multipliers)
-    yield from resting_rows(FLOATS, period.task, period.held, period.found, facets, multipliers)
+    yield from resting_rows(FLOATS, period.task, period.held, period.plant, facets, multipliers)
 
 
 def _normals(points: np.ndarray, count: int) -> np.ndarray:
@@ -341,17 +341,17 @@ def _normals(points: np.ndarray, count: int) -> np.ndarray:
         chosen.append(int(alike.argmin()))
         alike = np.maximum(alike, white @ white[chosen[-1]])
     axes = np.array([(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, 0, -1)])
-    kept = normals[chosen]
-    kept = kept[~((kept[:, 1] < -0.999) | (np.abs(kept).max(axis=1) > 1 - 1e-9))]
-    return np.asarray(np.vstack([axes, kept]) / size)
+    selected = normals[chosen]
+    selected = selected[~((selected[:, 1] < -0.999) | (np.abs(selected).max(axis=1) > 1 - 1e-9))]
+    return np.asarray(np.vstack([axes, selected]) / size)
 
 
 def _corners(
     constraints: list[Constraint], size: np.ndarray, inside: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Vertices of a polytope, the constraints that meet there, and the rows of all; None for an empty polytope.
+    """Vertices of a polytope, their constraints, and all rows; None for an empty one.
 
-    A point that is probably inside saves a linear program.
+    A probable interior point saves a linear program.
     """
     rows = np.array([row for row, _ in constraints], dtype=float) * size
     ends = np.array([end for _, end in constraints], dtype=float)
@@ -360,15 +360,15 @@ def _corners(
     dimension = rows.shape[1]
     centre = None if inside is None else inside / size
     if centre is None or (ends - rows @ centre).min() < _INSIDE:
-        found = linprog(
+        optimum = linprog(
             [*np.zeros(dimension), -1.0],
             A_ub=np.column_stack([rows, np.ones(len(rows))]),
             b_ub=ends,
             bounds=[*[(None, None)] * dimension, (0, None)],
         )
-        if found.status or found.x[-1] < 1e-9:
+        if optimum.status or optimum.x[-1] < 1e-9:
             return None
-        centre = found.x[:dimension]
+        centre = optimum.x[:dimension]
     try:
         meet = HalfspaceIntersection(np.column_stack([rows, -ends]), centre, qhull_options="QJ")
     except QhullError:
@@ -379,13 +379,13 @@ def _corners(
 
 
 def _basis(rows: np.ndarray, ends: np.ndarray, factors: np.ndarray) -> tuple[int, ...] | None:
-    """Constraints that meet where a function is largest on a polytope, those with multipliers first."""
+    """Constraints at the maximum of a function on a polytope, largest multipliers first."""
     lengths = np.linalg.norm(rows, axis=1)
     rows, ends = rows / lengths[:, None], ends / lengths
-    found = linprog(-factors, A_ub=rows, b_ub=ends, bounds=[(None, None)] * len(factors))
-    if found.status:
+    optimum = linprog(-factors, A_ub=rows, b_ub=ends, bounds=[(None, None)] * len(factors))
+    if optimum.status:
         return None
-    order = np.lexsort((found.slack, found.ineqlin.marginals))
+    order = np.lexsort((optimum.slack, optimum.ineqlin.marginals))
     chosen = list[int]()
     for place in order[:_TIGHT]:
         if np.linalg.matrix_rank(rows[[*chosen, place]], tol=1e-9) > len(chosen):
@@ -405,15 +405,15 @@ def _dyadic(value: float) -> Fraction:
 def _wide_periods(task: FaultPlant, held: SampledStickSlip, size: tuple[float, ...]) -> list[Period]:
     """For states of a size."""
     law, (slip, rate, level) = held.law, (_ROOM * short(v, 4) for v in size)
-    most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + held.told))
+    most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + held.target_noise))
     most = most + law.rate_gain * rate + level + held.push_noise
-    found = ranges(task, slip, (-most, most), rate * held.longest)
-    return Period.deciding(FLOATS, task, held, found, rate / _ROOM, (-most / _ROOM, most / _ROOM))
+    plant = ranges(task, slip, (-most, most), rate * held.longest)
+    return Period.deciding(FLOATS, task, held, plant, rate / _ROOM, (-most / _ROOM, most / _ROOM))
 
 
 @dataclass
 class _Images:
-    """Largest values of normals after a period, as `moves` times heights and a constant, and their linear functions."""
+    """Largest values of normals after a period: linear in the heights, with a constant."""
 
     tops: np.ndarray
     moves: np.ndarray
@@ -450,17 +450,17 @@ class _Growing:
         return np.array([max(box[0], box[3]), box[1], max(box[2], box[4])])
 
     def periods(self) -> list[Period]:
-        """With ranges of the plant that are a little wide; sizes of two digits, as these ranges take a while."""
+        """Periods with slightly widened ranges; sizes in two digits, as ranges are slow."""
         return _wide_periods(self.task, self.held, tuple(float(f"{float(v):.1e}") for v in self.size))
 
     def images(self) -> "_Images | None":
-        """Largest value of every normal after a period, with the best multipliers; None where a set is empty."""
+        """Largest value of every normal after a period, with the best multipliers; or None."""
         periods = self.periods()
-        found = periods[0].found
+        plant = periods[0].plant
         facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
         sizes = np.append(self.size, self.size[1] * float(self.held.longest))
         corners = []
-        for place, constraints in enumerate(polytopes(self.task, self.held, facets, found)):
+        for place, constraints in enumerate(polytopes(self.task, self.held, facets, plant)):
             tall = len(constraints[0][0])
             at = _corners(constraints, sizes[:tall], self.centres.get(place))
             if at is None and tall == 3:
@@ -479,7 +479,7 @@ class _Growing:
         return self._images(periods, corners)
 
     def _tried(self, many: bool) -> np.ndarray:
-        """Multipliers of every facet that are tried: the present ones, some near them, and if `many` a grid."""
+        """Multipliers of every facet to try: present ones and neighbours; with `many` a grid."""
         law = self.held.law
         n2, n3 = self.normals[:, 1:].T
         plain = n2 + n3 * float(law.level_gain)
@@ -492,22 +492,22 @@ class _Growing:
         return np.array(tried)
 
     def _tops(self, periods: list[Period], corners: list[Any], tried: np.ndarray) -> np.ndarray:
-        """Largest values for each choice of multipliers: while sliding, where the innovation is cut off, at rest."""
+        """Largest values by multipliers: sliding, with the innovation cut off, at rest."""
         choices, count = tried.shape[:2]
-        found = np.full((3, choices * count), -np.inf)
+        largest = np.full((3, choices * count), -np.inf)
         for rows in _rows(periods, np.tile(self.normals, (choices, 1)), tried.reshape(-1, 5)):
             kind = 2 if rows.place >= SLICES else int(rows.cut)
             at = corners[rows.place]
             if at is not None:
                 tops = (rows.factors @ at[0].T).max(axis=1) + rows.constants
-                found[kind, rows.which] = np.maximum(found[kind, rows.which], tops)
-        return np.asarray(found.reshape(3, choices, count).swapaxes(0, 1))
+                largest[kind, rows.which] = np.maximum(largest[kind, rows.which], tops)
+        return np.asarray(largest.reshape(3, choices, count).swapaxes(0, 1))
 
     def _images(self, periods: list[Period], corners: list[Any]) -> "_Images":
         """The largest values, as functions of the heights, and what of the state a facet becomes."""
         sizes = np.append(self.size, self.size[1] * float(self.held.longest))
-        count, steps = len(self.normals), np.array(stop_bounds(self.task, self.held, periods[0].found), dtype=float)
-        found = _Images(np.full(count, -np.inf), np.zeros((count, count)), np.zeros((count, 3)), np.zeros(count))
+        count, steps = len(self.normals), np.array(stop_bounds(self.task, self.held, periods[0].plant), dtype=float)
+        images = _Images(np.full(count, -np.inf), np.zeros((count, count)), np.zeros((count, 3)), np.zeros(count))
         for rows in _rows(periods, self.normals, self.multipliers):
             at = corners[rows.place]
             if at is None:
@@ -515,33 +515,33 @@ class _Growing:
             values = rows.factors @ at[0].T
             vertex = values.argmax(axis=1)
             tops = values[np.arange(len(vertex)), vertex] + rows.constants
-            larger = tops > found.tops[rows.which]
+            larger = tops > images.tops[rows.which]
             if not larger.any():
                 continue
             which, factors, bases, tops = rows.which[larger], rows.factors[larger], at[1][vertex[larger]], tops[larger]
             scale = sizes[: factors.shape[1]]
             shares = (np.linalg.pinv((at[2] * scale)[bases].swapaxes(-1, -2)) @ (factors * scale)[..., None])[..., 0]
-            kept = ~self._unchanged(rows, larger, steps, sizes)
-            which, factors, bases, tops, shares = which[kept], factors[kept], bases[kept], tops[kept], shares[kept]
-            found.factors[which] = factors[:, :3]
+            new = ~self._unchanged(rows, larger, steps, sizes)
+            which, factors, bases, tops, shares = which[new], factors[new], bases[new], tops[new], shares[new]
+            images.factors[which] = factors[:, :3]
             if factors.shape[1] > 3:  # D is at most g·y + h
-                found.factors[which, 1] += (
+                images.factors[which, 1] += (
                     np.maximum(factors[:, 3], 0)
-                    * steps[(steps[:, 0] * at[0][vertex[larger][kept], 1][:, None] + steps[:, 1]).argmin(axis=1), 0]
+                    * steps[(steps[:, 0] * at[0][vertex[larger][new], 1][:, None] + steps[:, 1]).argmin(axis=1), 0]
                 )
-            found.tops[which], found.moves[which] = tops, 0
+            images.tops[which], images.moves[which] = tops, 0
             for share, place in zip(shares.T, bases.T, strict=True):
                 own = place < count
-                found.moves[which[own], place[own]] += share[own] / self.heights[place[own]]
-        return found
+                images.moves[which[own], place[own]] += share[own] / self.heights[place[own]]
+        return images
 
     def _unchanged(self, rows: Rows, chosen: np.ndarray, steps: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Where a function is below that of its facet by the signs of e1, y and D; see `Verifier.largest`."""
+        """Where a function is below that of its facet by the signs of e1, y and D."""
         left = rows.factors[chosen, :3] - self.normals[rows.which[chosen]]
         if rows.factors.shape[1] > 3:
             left[:, 1] += np.maximum(rows.factors[chosen, 3], 0) * steps[-1, 0]
         slice_number = rows.place if rows.place < SLICES else COMBINATIONS[rows.place - SLICES][0]
-        fastest = self.task.reference_rates[0] + self.held.told
+        fastest = self.task.reference_rates[0] + self.held.target_noise
         end = float(fastest / self.held.law.return_rate) if slice_number == 1 else np.inf
         constants = rows.constants[chosen] + (np.maximum(left[:, 0], 0) * end if slice_number == 1 else 0)
         small = _TINY * self.heights[rows.which[chosen]]
@@ -550,13 +550,13 @@ class _Growing:
         return np.asarray(of_error & rest)
 
     def grown(self, tell: Tell) -> bool:
-        """Whether it was changed until it holds its images: by turns of policies, else step by step."""
+        """Whether the polytope was enlarged until it contains its images."""
         first = self.size
         for turn in range(self.turn, _TURNS):
             self.turn = turn + 1
             if turn in _REFINED and self.last is not None:
                 self.refine(self.last)
-            self.normals = self._neutral(self.normals, self.periods()[0].found.chord[1])
+            self.normals = self._neutral(self.normals, self.periods()[0].plant.chord[1])
             after = self.images()
             if after is None or (self.size > _FAR * first).any():
                 return False
@@ -578,37 +578,37 @@ class _Growing:
         return False
 
     def _shrink(self, after: _Images, margin: np.ndarray) -> None:
-        """Replace a set by its image, which it holds and which therefore holds its own, while that is much smaller."""
+        """Replace the set by its image while the image is much smaller."""
         for _ in range(_SHRUNK):
             self.turn += 1  # of multipliers
             before, self.heights = self.heights, np.minimum(self.heights, np.maximum(self.least, after.tops + margin))
-            found = self.images()
-            if found is None or not np.all(found.tops <= self.heights - margin / 4):  # rounding
+            images = self.images()
+            if images is None or not np.all(images.tops <= self.heights - margin / 4):  # rounding
                 self.heights = before
                 return
             if np.all(self.heights[:5] > (1 - _LITTLE_LESS) * before[:5]):
                 return
-            after = found
+            after = images
 
     def _settled(self, moves: np.ndarray, own: np.ndarray, changed: np.ndarray) -> np.ndarray | None:
-        """Heights that this policy keeps, where only `changed` ones move and none by much; None if there are none."""
+        """Heights at the fixed point of this policy; None without one."""
         places = np.flatnonzero(changed)
         inner = moves[np.ix_(places, places)]
         if not len(places) or np.abs(np.linalg.eigvals(inner)).max() >= 1:
             return None
         fixed = own[places] + moves[places][:, ~changed] @ self.heights[~changed]
-        found = np.linalg.solve(np.eye(len(places)) - inner, fixed)
-        if (found < self.heights[places]).any() or (found > _LITTLE * self.heights[places]).any():
+        solution = np.linalg.solve(np.eye(len(places)) - inner, fixed)
+        if (solution < self.heights[places]).any() or (solution > _LITTLE * self.heights[places]).any():
             return None
         heights = self.heights.copy()
-        heights[places] = found
+        heights[places] = solution
         return heights
 
     def _neutral(self, normals: np.ndarray, chord: Fraction) -> np.ndarray:
-        """With as much of y and d as the image of a slow slide has, so that a fault that rests does not raise them.
+        """Normals for which a resting fault does not raise the height.
 
-        Images tend to a normal with 0 as largest factor of ξ, which rounding or another range of slopes makes positive.
-        Then the bound of what 1/β lacks of its chord counts, and their heights would grow without end.
+        Images tend to a normal whose largest factor of ξ is 0. Rounding or another range of slopes makes it positive.
+        Then the bound of the chord of 1/β less 1/β enters, and the heights would grow without bound.
         """
         law, half = self.held.law, float(self.held.step) / 2
         slip, level = float(law.slip_gain), float(law.level_gain)
@@ -624,19 +624,19 @@ class _Growing:
         return np.column_stack([n1, np.where(slow, np.maximum(n2, needed), n2), n3])
 
     def refine(self, last: _Images) -> None:
-        """Add normals: what the facets that grow most are images of. Heights start again from what is reached."""
+        """Add pull-backs of the fastest-growing facets as normals; heights restart at the hull."""
         growth, factors = last.growth[self.touching], last.factors[self.touching]
         for name in ("normals", "heights", "least", "multipliers"):
             setattr(self, name, getattr(self, name)[self.touching])
-        size, chord = self.size, self.periods()[0].found.chord[1]
-        known = self.normals * size
-        widths = np.linalg.norm(known, axis=1)
-        known, more = known / widths[:, None], list[np.ndarray]()
+        size, chord = self.size, self.periods()[0].plant.chord[1]
+        directions = self.normals * size
+        widths = np.linalg.norm(directions, axis=1)
+        directions, more = directions / widths[:, None], list[np.ndarray]()
         for place in (growth / widths).argsort()[::-1]:
             normal = factors[place] * size * (1, 1 + _WIDER * np.sign(factors[place][1]), 1)
             length = np.linalg.norm(normal)
-            if length and (known @ normal).max() < _ALIKE * length and len(self.normals) + len(more) < _MOST:
-                known = np.vstack([known, normal / length])
+            if length and (directions @ normal).max() < _ALIKE * length and len(self.normals) + len(more) < _MOST:
+                directions = np.vstack([directions, normal / length])
                 more.append(normal / length / size)
             if len(more) == _ADDED:
                 break
@@ -660,7 +660,7 @@ class _Growing:
         facets = tuple(tuple(_dyadic(float(v)) for v in row) for row in self.facets)
         periods, bases = self.periods(), list[list[tuple[int, ...]]]()
         sizes = np.append(self.size, self.size[1] * float(self.held.longest))
-        groups = polytopes(self.task, self.held, facets, periods[0].found)
+        groups = polytopes(self.task, self.held, facets, periods[0].plant)
         for constraints in groups:
             at = _corners(constraints, sizes[: len(constraints[0][0])])
             if at is None:
@@ -681,11 +681,11 @@ class _Growing:
         groups: list[list[Constraint]],
         bases: list[list[tuple[int, ...]]],
     ) -> None:
-        """Add vertices that rounding hid, by linear programs, where a function would have a negative multiplier."""
+        """Add vertices lost by rounding, by linear programs."""
         sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.longest))]
         verifiers = [
-            Verifier(constraints, known, sizes[: len(known[0])], place=place, facets=len(facets))
-            for place, (constraints, known) in enumerate(zip(groups, bases, strict=True))
+            Verifier(constraints, vertices, sizes[: len(vertices[0])], place=place, facets=len(facets))
+            for place, (constraints, vertices) in enumerate(zip(groups, bases, strict=True))
         ]
         for rows in _rows(periods, facets, self._scaled()):
             verifier = verifiers[rows.place]
@@ -701,7 +701,7 @@ class _Growing:
 # From a fault to gains with a proof.
 
 
-def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda said, done: None) -> StickSlipProof | NoProof:
+def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda what, done: None) -> StickSlipProof | NoProof:
     """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
     fresh = list[StickSlipProof | NoProof]()
 
@@ -710,17 +710,17 @@ def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda said, d
             fresh.append(_searched(task, held, tell))
         return {"set": written(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
 
-    kept = search_once(search, "polytope of a stick-slip law", task, held)
+    stored = search_once(search, "polytope of a stick-slip law", task, held)
     if fresh:
         return fresh[0]
-    if "reason" in kept:
-        return NoProof(reason=kept["reason"])
-    return stick_slip_guarantee(task, held, read_as(StickSlipPolytope, kept["set"]))
+    if "reason" in stored:
+        return NoProof(reason=stored["reason"])
+    return stick_slip_guarantee(task, held, read_as(StickSlipPolytope, stored["set"]))
 
 
 def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlipProof | NoProof:
-    found: StickSlipProof | NoProof
-    found = NoProof(reason="no polytope was found that the loop never leaves")
+    proof: StickSlipProof | NoProof
+    proof = NoProof(reason="no polytope was found that the loop never leaves")
     try:
         points = _Reach.of(task, held).hull(tell)
         if points is None:
@@ -730,15 +730,15 @@ def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlip
         growing = _Growing(task, held, normals, heights, np.zeros((len(normals), 5)), heights, points)
         for growing.margin in _MARGINS:
             if not growing.grown(tell) or (reach := growing.exact()) is None:
-                return found
-            found = stick_slip_guarantee(task, held, reach)
-            if found.proved:
+                return proof
+            proof = stick_slip_guarantee(task, held, reach)
+            if proof.proved:
                 break
     except ParameterError as error:
         return NoProof(reason=str(error))
     except (ArithmeticError, ValueError, LinAlgError, QhullError):
         return NoProof(reason="numbers of the loop are too far apart for a search in floats")
-    return found
+    return proof
 
 
 def design_stick_slip(
@@ -750,9 +750,9 @@ def design_stick_slip(
     longest_step: Fraction = Fraction(0),
     healing: Fraction = Fraction(0),
     implicit: bool = False,
-    tell: Tell = lambda said, done: None,
+    tell: Tell = lambda what, done: None,
 ) -> StickSlipProof | NoProof:
-    """Gains with a guarantee on the stick–slip plant: the first tuning of an objective that has one.
+    """Gains with a guarantee on the stick–slip plant: the first tuning that has one.
 
     Parameters
     ----------
@@ -785,22 +785,22 @@ def design_stick_slip(
             held = replace(held, longest_step=longest_step)
         except (ParameterError, ArithmeticError, ValueError):
             return NoProof(reason="no gains of this size are floats")
-        found = _healed(task, held, healing, tell)
-        if found.proved:
-            return found
-        none.append(found)
+        proof = _healed(task, held, healing, tell)
+        if proof.proved:
+            return proof
+        none.append(proof)
     return none[0]
 
 
 def _healed(task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: Tell) -> StickSlipProof | NoProof:
-    """With as much more disturbance as healing stands for under the least pressure, which is known afterwards."""
+    """Proof with the disturbance enlarged by the healing under the least pressure."""
     least = task.rest_pressure[0] - _LOWER * task.normal_stress
     for _ in range(_GUESSES):
         more = task.area_per_mass[1] * healing * (task.normal_stress - least)
-        found = proved(replace(task, amplitude=task.amplitude + more), held, tell)
-        if not found.proved or found.covered_healing(task.amplitude) >= healing:
-            return replace(found, healing=healing) if found.proved else found
-        least = Fraction(found.claims.least_pressure) - _LOWER * task.normal_stress
+        proof = proved(replace(task, amplitude=task.amplitude + more), held, tell)
+        if not proof.proved or proof.covered_healing(task.amplitude) >= healing:
+            return replace(proof, healing=healing) if proof.proved else proof
+        least = Fraction(proof.claims.least_pressure) - _LOWER * task.normal_stress
     return NoProof(reason="the pressure falls too far for this healing")
 
 
@@ -808,34 +808,34 @@ def _healed(task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: T
 # Falsification: the worst case that a search finds.
 
 
-def worst_stick_slip(found: StickSlipProof, *, periods: int = 60) -> WorstCase:
-    """Worst case of courses from rest that are continued, period by period, from the states that lie farthest out.
+def worst_stick_slip(proof: StickSlipProof, *, periods: int = 60) -> WorstCase:
+    """Worst case found from rest, continued from the outermost states of each period.
 
-    For each facet of the invariant polytope the state that is farthest in its direction is kept. β is constant in a
-    course, as it is nearly in a fault; the slope of friction is either end of its range in each period, and the
-    disturbance changes its sign at most once in each. Friction at rest is that in slip, or higher by `healing` under
-    the largest pressure of the claims, where it weighs least.
+    For each facet of the invariant polytope the search continues from the farthest state in its direction. β is
+    constant in a course. In each period the slope of friction is at either end of its range, and the disturbance
+    changes its sign at most once. Friction at rest is that in slip, or higher by `healing` under the largest claimed
+    pressure, where healing has the least effect.
     """
-    task, claims = found.task, found.claims
-    excess = found.healing * task.area_per_mass[0] * (task.normal_stress - Fraction(claims.largest_pressure))
-    plain = _Reach.of(replace(task, amplitude=found.disturbance), found.held)
-    reaches, noises = [replace(plain, excess=e) for e in sorted({0.0, float(excess)})], _noises(found.held)
-    facets, extremes = np.array(found.reach.facets, dtype=float), np.zeros(3)
+    task, claims = proof.task, proof.claims
+    excess = proof.healing * task.area_per_mass[0] * (task.normal_stress - Fraction(claims.largest_pressure))
+    plain = _Reach.of(replace(task, amplitude=proof.disturbance), proof.held)
+    reaches, noises = [replace(plain, excess=e) for e in sorted({0.0, float(excess)})], _noises(proof.held)
+    facets, extremes = np.array(proof.reach.facets, dtype=float), np.zeros(3)
     for high in (False, True):  # which end of β
-        first = _at_first(found.held)
+        first = _at_first(proof.held)
         states = {noise: first[[int(noise < 0)]] for noise in noises}  # by the errors of their sample
         for _ in range(periods):
-            known = dict(states)
+            before = dict(states)
             for later in noises:
                 ends = [states[later]]
-                for reach, (noise, starts) in product(reaches, known.items()):
+                for reach, (noise, starts) in product(reaches, before.items()):
                     after = reach.simulated(starts, noise, later)
                     half = after.shape[1] // 2  # β is the slower half of the choices
                     ends.append((after[:, half:] if high else after[:, :half]).reshape(-1, 3))
                 points = np.vstack(ends)
                 states[later] = points[np.unique((facets @ points.T).argmax(axis=1))]
         points = np.vstack(list(states.values()))
-        points[:, 0] -= float(found.held.slip_noise)
+        points[:, 0] -= float(proof.held.slip_noise)
         extremes = np.maximum(extremes, [-points[:, 0].min(), points[:, 0].max(), points[:, 1].max()])
     behind, ahead, rate = (float(v) for v in extremes)
     return WorstCase(slip_error=max(behind, ahead), slip_behind=behind, slip_ahead=ahead, peak_slip_rate=rate)

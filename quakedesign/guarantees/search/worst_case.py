@@ -16,7 +16,7 @@ from scipy.linalg import expm
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.cache import search_once
-from quakedesign.guarantees.exact.sampled_loop import Held
+from quakedesign.guarantees.exact.sampled_loop import SampledLoop
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.sliding_small_gain import loop_of, model_of
 from quakedesign.guarantees.exact.tracking_proof import ContinuousProof, TrackingProof
@@ -88,20 +88,18 @@ class WorstCase:
         return None if least is None or largest is None else (least, largest)
 
 
-def worst_found(claim: TrackingProof | ContinuousProof, *, sticks: bool = False) -> WorstCase:
-    """Adversarial trajectories: disturbance, friction slope, damping and input gain at the ends of their ranges.
+def worst_tracking(claim: TrackingProof | ContinuousProof, *, sticks: bool = False) -> WorstCase:
+    """Worst case found with disturbance, slopes, damping and input gain at their extremes.
 
-    Forward and backward sweeps of the maximum principle in steps of a sixth of a flow, from random costates, 64 to 512
-    periods long, as the loop forgets. The error to be maximised is that at the end of the last period, and in other
-    courses that at a time between its samples, where it is larger with a delay. In continuous time a period is that of
-    the fastest pole, 1/|λ|. A disturbance of bounded rate is the best of all for a costate (`_steepest`). With
-    `sticks` the fault does not slide backward: friction holds it wherever the loop would, along the reference at its
-    largest rate and at a twentieth of that, and courses that switch after random times are tried as well, and courses
-    that rest before a push (`rest_and_push`) for as long as the reference takes to catch up with the slip error that
-    is proved. Noise is at its ends too. An implicit step ends where its equation says, inside its lines or not. A box
-    of starts is left from its corners. With jitter each event is as early or as late as it may be, with aperiodic
-    sampling each interval as short or as long; pressures rise at once, as a pump of any rate may do, and means are of
-    their middle alone.
+    The search makes forward and backward sweeps of the maximum principle, six steps per flow, from random costates. A
+    course lasts 64 to 512 periods, depending on the decay of the loop. It maximises the error at the end of the last
+    period, or at a time between its samples, where the error is larger with a delay. In continuous time a period is
+    1/|λ| of the fastest pole. A rate-limited disturbance is optimal for a costate (`_steepest`). With `sticks` friction
+    prevents backward slip, and the reference has its largest rate or 1/20 of it. Further courses then switch after
+    random times, or rest until the reference has made up the proved slip error, and push (`rest_and_push`). Noise and
+    initial states are at their extremes. An implicit step has its exact solution, also outside its sector. With jitter
+    each event is as early or as late as possible; with aperiodic sampling each interval is as short or as long as
+    possible. Pressures step at once, and an averaged measurement is that at the middle of its interval.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)
@@ -109,7 +107,7 @@ def worst_found(claim: TrackingProof | ContinuousProof, *, sticks: bool = False)
 
 
 def _searched(claim: TrackingProof | ContinuousProof, sticks: bool) -> list[float]:
-    """Largest slip error [m] and slip-rate error [m/s]; least and largest pressure [Pa] if computed."""
+    """Largest slip error [m] and slip-rate error [m/s]; the range of pressure [Pa] if computed."""
     searches = [_CourseSearch(claim, sticks, 2 * _COURSES)]
     searches[0].follow(searches[0].random(), _SWEEPS)
     if sticks:
@@ -135,7 +133,7 @@ def _searched(claim: TrackingProof | ContinuousProof, sticks: bool) -> list[floa
 
 
 def _resting(claim: TrackingProof, like: "_CourseSearch") -> "_CourseSearch":
-    """Trajectories of the slip-rate error along the fastest reference, longer by a rest ahead of the reference."""
+    """Search for the slip-rate error after a rest ahead of the fastest reference."""
     way = claim.task.reference_rates[0] * claim.held.step
     periods = like.periods + int(np.ceil(min(float(claim.claims.slip_error / way), _MOST_RESTED)))
     courses = max(_RESTING * 2 * PERIODS // (periods * len(like.parts)), _LEAST_COURSES)
@@ -145,9 +143,10 @@ def _resting(claim: TrackingProof, like: "_CourseSearch") -> "_CourseSearch":
 
 @dataclass(frozen=True, slots=True)
 class _Event:
-    """A jump and the time after it, `soon` where it may be left to the next one, `late` where that is the same again.
+    """A jump and the time after it.
 
-    `samples` where the law is told something. Of a time that may pass as if it were none there may be any part, `free`.
+    `soon`: the jump may move to the next event; `late`: the jump is a repetition from the event before. `samples`: the
+    law measures at the jump. `free`: the duration is anything from 0 to `duration`.
     """
 
     jump: Matrix
@@ -176,11 +175,11 @@ class _EventPieces:
 _ON_TIME: dict[str, Any] = dict.fromkeys(("jitter", "delay_jitter", "averaging", "ramp"), Fraction(0))
 
 
-def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
-    """Loop without jitter whose events are shifted, largest shift of its samples, and largest lead of its pressures.
+def _on_time(held: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction]:
+    """Loop without jitter, largest shift of its samples, largest lead of its pressures.
 
-    Pressures that arrive with a sample are shifted with it. Events keep their order. A first sample that must be
-    at its instant is as early as the earliest.
+    Pressures that arrive with a sample shift with it. Events keep their order. A first sample that must be at its
+    nominal instant counts as the earliest one.
     """
     off, late, delay = held.jitter, held.jitter + held.delay_jitter, held.delay
     if any(held.start) or held.law.first:
@@ -198,30 +197,30 @@ def _on_time(held: Held) -> tuple[Held, Fraction, Fraction]:
 
 
 def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction = Fraction(0)) -> list[_Event]:
-    """Those of one period from the earliest sample on: samples off by some time, pressures up to some time early.
+    """Events of one period from the earliest sample on, shifted by timing errors.
 
-    By no clock each period may have up to some time more.
+    Samples shift by up to `off`, pressures lead by `early`; aperiodic sampling lengthens a period by up to `more`.
     """
     sample, *others = loop.segments
     waits = sample.duration - early - off if others else sample.duration - 2 * off
-    found = [_Event(sample.jump, 2 * off, samples=True, soon=True)] if off else []
-    found.append(_Event(sample.jump, waits, samples=True, late=bool(off)))
+    events = [_Event(sample.jump, 2 * off, samples=True, soon=True)] if off else []
+    events.append(_Event(sample.jump, waits, samples=True, late=bool(off)))
     for arrival in others:
-        found += [_Event(arrival.jump, early, samples=False, soon=True)] if early else []
-        found.append(_Event(arrival.jump, arrival.duration - off, samples=False, late=bool(early)))
+        events += [_Event(arrival.jump, early, samples=False, soon=True)] if early else []
+        events.append(_Event(arrival.jump, arrival.duration - off, samples=False, late=bool(early)))
     still = tuple(tuple(Fraction(i == j) for j in range(len(loop.flow))) for i in range(len(loop.flow)))
-    return [*found, *([_Event(still, more, samples=False, free=True)] if more else [])]
+    return [*events, *([_Event(still, more, samples=False, free=True)] if more else [])]
 
 
 @dataclass(slots=True)
 class _Limit:
-    """Limit at rest of the pressure that is asked for, as b·(p − p*) [m/s²], of every course; b·p* is `rest`.
+    """Limit at rest of the commanded pressure, as b·(p − p*) [m/s²]; b·p* is `rest`.
 
-    A course may be a part of the task, so that p* is at first that at its start or at either end of its range.
+    A course may start anywhere in the task: p* begins at its initial value or at either end of its range.
     """
 
     place: int
-    told: np.ndarray
+    correction: np.ndarray
     width: float
     moved: float
     rests: np.ndarray
@@ -236,17 +235,17 @@ class _Limit:
 
     @classmethod
     def of(
-        cls, claim: TrackingProof, held: Held, size: int, back: np.ndarray, numbers: np.ndarray | None = None
+        cls, claim: TrackingProof, held: SampledLoop, size: int, back: np.ndarray, numbers: np.ndarray | None = None
     ) -> "_Limit | None":
         """Limit at rest of a guarantee along references of given rates [m/s]; None if it has none."""
         limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
         if limit is None:
             return None
         place, step = 2 + len(law.states), float(claim.held.step)
-        told = np.zeros(size)
-        asked = _of_asked(claim.task, held)
-        told[: len(asked)] = asked
-        told[2:place] = [float(v) / authority for v in law.applied]
+        fed = np.zeros(size)
+        commanded = _command_response(claim.task, held)
+        fed[: len(commanded)] = commanded
+        fed[2:place] = [float(v) / authority for v in law.applied]
         rests = float(limit.resolution) - back * step  # of the slip error from sample to sample
         moved, none = float(claim.task.drift) * step, np.zeros(len(back))
         ends: Any = tuple(float(p) * authority for p in claim.task.rest_pressure)
@@ -255,7 +254,7 @@ class _Limit:
         faster = float(fastest) - back * step
         rest = np.array((0.0, *ends))[(np.arange(len(back)) if numbers is None else numbers) // 2 % 3]
         return cls(
-            *(place, told, float(limit.width) * authority, moved, rests, none, none),
+            *(place, fed, float(limit.width) * authority, moved, rests, none, none),
             *(ends, within, faster, rest, authority, [0.0, 0.0]),
         )
 
@@ -264,10 +263,10 @@ class _Limit:
         return replace(self, highest=np.zeros_like(self.highest), last=np.zeros_like(self.last))
 
     def cut(self, state: np.ndarray, sampled: np.ndarray) -> np.ndarray:
-        """States after a sample of some courses, the law told what is applied."""
-        asked, highest = state[:, self.place], self.highest - self.moved
+        """States after a sample of some courses; the law receives the applied pressure."""
+        commanded, highest = state[:, self.place], self.highest - self.moved
         stuck = state[:, 0] - self.last <= self.rests
-        applied = np.where(stuck, np.maximum(asked, highest - self.width), asked)
+        applied = np.where(stuck, np.maximum(commanded, highest - self.width), commanded)
         inside = np.clip(applied, self.within[0] - self.rest, self.within[1] - self.rest)
         applied = np.where(state[:, 0] - self.last <= self.faster, inside, applied)
         if sampled.any():
@@ -275,7 +274,7 @@ class _Limit:
             self.seen[:] = [min(self.seen[0], float(pressures.min())), max(self.seen[1], float(pressures.max()))]
         self.highest = np.where(sampled, np.maximum(highest, applied), self.highest)
         self.last = np.where(sampled, state[:, 0], self.last)
-        return np.asarray(state + np.outer((applied - asked) * sampled, self.told))
+        return np.asarray(state + np.outer((applied - commanded) * sampled, self.correction))
 
     def follow(self, before: np.ndarray, after: np.ndarray) -> None:
         """Subtract the drift of p* from all pressures, which are relative to it."""
@@ -284,8 +283,8 @@ class _Limit:
         self.rest = np.clip(self.rest - drifted, *self.ends)
 
 
-def _of_asked(task: FaultPlant, held: Held) -> list[float]:
-    """What the first jump of a period makes of what is asked for, [m/s²] and all states: of a law that asks for e1."""
+def _command_response(task: FaultPlant, held: SampledLoop) -> list[float]:
+    """Response of all states to a unit command, at the first jump of a period."""
     zero = Fraction(0)
     still = tuple((zero, zero) for _ in held.law.states)
     law = replace(held.law, measured=still, feedback=(1 / task.authority, zero), root=None, first=())
@@ -352,18 +351,18 @@ class _CourseSearch:
         self.largest = (0.0, 0.0)
 
     def follow(self, costates: np.ndarray, sweeps: int) -> np.ndarray:
-        """Follow the maximum principle forward and backward; the costates of the last sweep forward."""
+        """Sweeps of the maximum principle, forward and backward; the last forward costates."""
         slopes = None
         last = costates
         for left in reversed(range(sweeps)):
-            chosen, held, jumped = self._forward(last := costates, slopes)
-            costates = self._backward(chosen, held, jumped)
+            chosen, fixed, jumped = self._forward(last := costates, slopes)
+            costates = self._backward(chosen, fixed, jumped)
             if self.limit is not None and left <= sweeps // 2:  # before, by the sign of its costate
                 slopes = self._slopes(costates, chosen, self.limit)
         return last
 
     def end_between_samples(self) -> None:
-        """Aim at the error in each piece of the last period in turn, not at its end: with a delay it peaks between."""
+        """Aim at the error in each piece of the last period in turn, not at its end."""
         turn = np.array([(self.aim[:i] == row).all(axis=1).sum() for i, row in enumerate(self.aim)])
         self.ends = self.steps - 1 - turn % (self.steps // self.periods)
 
@@ -374,80 +373,80 @@ class _CourseSearch:
         return np.concatenate([kind[np.argsort(-reached[kind])[: count // 4]] for kind in kinds])
 
     def ascend(self, costates: np.ndarray) -> None:
-        """Climb: of each course the inputs of some pieces become those of its adjoint, and stay so where it goes on.
+        """Replace the inputs of some pieces by those of the adjoint where the error grows.
 
         While the fault is at rest, the maximum principle for all pieces at once makes no progress. The adjoint is that
         of the largest error, at the time at which it occurs.
         """
         random = np.random.default_rng(_SEED)
-        chosen, held, jumped = self._forward(costates, None)
-        top, kept = self.marks.max(axis=0), costates
+        chosen, fixed, jumped = self._forward(costates, None)
+        top, best = self.marks.max(axis=0), costates
         for turn in range(_CLIMBS):
-            adjoint = self._backward(chosen, held, jumped, self.marks.argmax(axis=0))
+            adjoint = self._backward(chosen, fixed, jumped, self.marks.argmax(axis=0))
             blocks = random.random((-(-self.steps // (1 + turn % _BLOCK)), len(top))) < _CHANGED[turn % len(_CHANGED)]
             changed = np.repeat(blocks, 1 + turn % _BLOCK, axis=0)[: self.steps]
-            tried = np.where((changed & adjoint.any(axis=2))[:, :, None], adjoint, kept)
+            tried = np.where((changed & adjoint.any(axis=2))[:, :, None], adjoint, best)
             now = self._forward(tried, None)
             reached = self.marks.max(axis=0)
             better = reached > top
-            kept = np.where(better[None, :, None], tried, kept)
+            best = np.where(better[None, :, None], tried, best)
             top = np.maximum(top, reached)
-            chosen, held, jumped = now
+            chosen, fixed, jumped = now
 
     def rest_and_push(self, rounds: int) -> None:
-        """Push ahead of the reference, hold the fault back while it rests and its law follows, and push as it lets go.
+        """Search over courses that push, rest and push again ahead of the reference.
 
-        Start and length of the first push, and the end of the rest, change from round to round, from those of the best
-        courses with the same input gain. The adjoint sees none of this: it is 0 where the fault rests.
+        Each round changes start and length of the first push and the end of the rest, from the best courses with the
+        same input gain. The adjoint gives no direction here: it is 0 while the fault is at rest.
         """
         random, courses, period = np.random.default_rng(_SEED), len(self.aim), self.steps // self.periods
         limits = [[_FIRST_PUSH * period], [_LONGEST_PUSH * period], [1]]
         tried: np.ndarray = np.array([[0], [1], [self.steps]]) + random.integers(0, limits, (3, courses))
-        kept, top, number = tried, np.zeros(courses), np.arange(self.steps)[:, None]
+        best, top, number = tried, np.zeros(courses), np.arange(self.steps)[:, None]
         for turn in range(rounds):
             begun, lasted, free = tried
             costates = np.zeros((self.steps, *self.aim.shape))
             costates[:, :, 1] = np.where(((number >= begun) & (number < begun + lasted)) | (number >= free), 1, -1)
-            _, held, _ = self._forward(costates, None)
+            _, fixed, _ = self._forward(costates, None)
             if turn:
                 reached = self.marks.max(axis=0)
-                kept, top = np.where(reached > top, tried, kept), np.maximum(top, reached)
+                best, top = np.where(reached > top, tried, best), np.maximum(top, reached)
                 ranked = np.argsort(-top.reshape(-1, 2), axis=0)  # the input gain is that of even or odd courses
                 chosen = random.integers(max(len(ranked) // 4, 1), size=ranked.shape)
                 parents = (2 * np.take_along_axis(ranked, chosen, axis=0) + [0, 1]).ravel()
-                tried = kept[:, parents] + random.integers(-_NEAR, _NEAR + 1, kept.shape)
+                tried = best[:, parents] + random.integers(-_NEAR, _NEAR + 1, best.shape)
             else:
-                kept[2] = _let_go(np.array([mask[:, 1] for mask in held]))
-                tried = kept + random.integers(-_NEAR, _NEAR + 1, kept.shape) * [[0], [0], [1]]
+                best[2] = _let_go(np.array([mask[:, 1] for mask in fixed]))
+                tried = best + random.integers(-_NEAR, _NEAR + 1, best.shape) * [[0], [0], [1]]
 
     def _slopes(self, costates: np.ndarray, chosen: list[np.ndarray], limit: float) -> np.ndarray:
-        """Of a disturbance of bounded rate, in every piece, over the largest: the best along the vertices chosen."""
-        held, moved = np.empty(costates.shape[:2]), np.empty(costates.shape[:2])
+        """Slopes of a rate-limited disturbance relative to the largest, best along the vertices."""
+        rates, moved = np.empty(costates.shape[:2]), np.empty(costates.shape[:2])
         for number, (costate, vertices) in enumerate(zip(costates[:, :, :-1], chosen, strict=True)):
             part = self.parts[number // _PIECES % len(self.parts)]
-            held[number] = (part.steps[vertices][:, :-1, -1] * costate).sum(axis=1)
+            rates[number] = (part.steps[vertices][:, :-1, -1] * costate).sum(axis=1)
             moved[number] = (part.added[vertices][:, :-1, -1] * costate).sum(axis=1)
         most = np.array([self.parts[n // _PIECES % len(self.parts)].added[0, -1, -1] for n in range(self.steps)])
-        return _steepest(held, moved, most, limit)
+        return _steepest(rates, moved, most, limit)
 
     def random(self) -> np.ndarray:
         """Costates that change at every step."""
         random = np.random.default_rng(_SEED)
-        found = random.standard_normal((self.steps, *self.aim.shape))
-        return np.asarray(found * random.choice([1.0, 1e3], (1, *self.aim.shape)))
+        costates = random.standard_normal((self.steps, *self.aim.shape))
+        return np.asarray(costates * random.choice([1.0, 1e3], (1, *self.aim.shape)))
 
     def switching(self) -> np.ndarray:
         """Costates of the slip-rate error that change sign after random times."""
         random, courses = np.random.default_rng(_SEED), len(self.aim)
         flips = np.cumsum(random.random((self.steps, courses)) < 10 ** random.uniform(-2.5, 0, courses), axis=0)
-        found = np.zeros((self.steps, *self.aim.shape))
-        found[:, :, 1] = 1 - 2 * ((flips + random.integers(2, size=courses)) % 2)
-        return found
+        costates = np.zeros((self.steps, *self.aim.shape))
+        costates[:, :, 1] = 1 - 2 * ((flips + random.integers(2, size=courses)) % 2)
+        return costates
 
     def _forward(
         self, costates: np.ndarray, slopes: np.ndarray | None
     ) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
-        state, chosen, held, jumped = self._started(costates[0]), [], [], []
+        state, chosen, fixed, jumped = self._started(costates[0]), [], [], []
         marks = []
         limit = self.rest_limit and self.rest_limit.anew()
         self._seen(state)
@@ -471,17 +470,17 @@ class _CourseSearch:
             row = np.arange(len(best))
             following = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], ways[row, best])
             chosen.append(best)
-            held.append(self._held(state, following, part.length))
+            fixed.append(self._projected(state, following, part.length))
             if limit:
                 limit.follow(state, following)
             state = following
             self._seen(state)
             marks.append((state[:, : self.size] * self.aim).sum(axis=1))
         self.marks = np.array(marks)
-        return chosen, held, jumped
+        return chosen, fixed, jumped
 
     def _soon(self, part: _EventPieces, state: np.ndarray, costates: np.ndarray, number: int) -> np.ndarray:
-        """Courses that jump at once: where it may be left to the next event, those for which the costate is better."""
+        """Courses that jump at once, by their costate where the jump may move to the next event."""
         if not part.of.soon or number + _PIECES >= len(costates) or (self.punctual and number == 0):
             return np.ones(len(state), dtype=bool)
         following = self.parts[(number // _PIECES + 1) % len(self.parts)]
@@ -494,7 +493,7 @@ class _CourseSearch:
         self.largest = max(self.largest[0], float(slip)), max(self.largest[1], float(rate))
 
     def _started(self, costate: np.ndarray) -> np.ndarray:
-        """Corners of the box of starts, by the costate after the first piece; with stick no slip rate is backward."""
+        """Initial states at corners of their box, by the costate after the first piece."""
         part = self.parts[0]
         state = np.sign(costate @ part.steps[0] @ part.jump @ self.start.T) @ self.start
         if self.back is not None:
@@ -502,21 +501,21 @@ class _CourseSearch:
         return np.asarray(state)
 
     def _sampled(self, part: _EventPieces, state: np.ndarray, costate: np.ndarray) -> np.ndarray:
-        """After a jump; that of a sample hears noise, for which the costate is that after the first piece."""
+        """States after a jump; a sample adds noise by the costate after the first piece."""
         after: np.ndarray = state @ part.jump.T
         if not part.of.samples:
             return after
         noise = self.noise * np.sign(costate @ part.steps[0] @ self.heard.T)
         return np.asarray(after + noise @ self.heard + self._beside_the_line(state[:, :2] + noise))
 
-    def _beside_the_line(self, told: np.ndarray) -> np.ndarray | float:
-        """Difference between the solution of the implicit step and its linear approximation in the nominal loop."""
+    def _beside_the_line(self, measured: np.ndarray) -> np.ndarray | float:
+        """Solution of the implicit step less its linear approximation in the nominal loop."""
         if self.root is None:
             return 0.0
-        line = float(self.root.middle) / self.step * told[:, 0]
-        return np.outer(root_of(self.root.pull, self.step, told[:, 0], told[:, 1]) + line, self.sudden)
+        line = float(self.root.middle) / self.step * measured[:, 0]
+        return np.outer(root_of(self.root.pull, self.step, measured[:, 0], measured[:, 1]) + line, self.sudden)
 
-    def _held(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
+    def _projected(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
         """Project every state onto the admissible slip rates; mask of states at rest."""
         mask = np.zeros(state.shape, dtype=bool)
         if self.back is not None:
@@ -533,55 +532,55 @@ class _CourseSearch:
     def _backward(
         self,
         chosen: list[np.ndarray],
-        held: list[np.ndarray],
+        fixed: list[np.ndarray],
         jumped: list[np.ndarray],
         when: np.ndarray | None = None,
     ) -> np.ndarray:
         """Costates of the aim at the end, or of every course after a piece."""
         last = self.ends if when is None else when
-        costate, found = np.zeros(self.aim.shape), []
+        costate, costates = np.zeros(self.aim.shape), []
         for number in reversed(range(len(chosen))):
             costate = np.where((last == number)[:, None], self.aim, costate)
             part = self.parts[number // _PIECES % len(self.parts)]
-            costate = np.where(held[number], 0, costate)
-            found.append(costate)
+            costate = np.where(fixed[number], 0, costate)
+            costates.append(costate)
             costate = np.einsum("cij,ci->cj", part.steps[chosen[number]], costate)
             if number % _PIECES == 0:
                 costate = np.where(jumped[number // _PIECES][:, None], costate @ part.jump, costate)
-        return np.array(found[::-1])
+        return np.array(costates[::-1])
 
 
 def _let_go(stuck: np.ndarray) -> np.ndarray:
     """Of every course the piece in which its longest rest ends, or the last one."""
     rested, longest = np.zeros(stuck.shape[1]), np.zeros(stuck.shape[1])
-    found = np.full(stuck.shape[1], len(stuck) - 1)
+    last = np.full(stuck.shape[1], len(stuck) - 1)
     for number, rests in enumerate(stuck):
         ends = ~rests & (rested > longest)
-        longest, found = np.where(ends, rested, longest), np.where(ends, number, found)
+        longest, last = np.where(ends, rested, longest), np.where(ends, number, last)
         rested = np.where(rests, rested + 1, 0)
-    return found
+    return last
 
 
-def _steepest(held: np.ndarray, moved: np.ndarray, most: np.ndarray, limit: float) -> np.ndarray:
-    """Slopes in [-1, 1], of every course, for the largest sum of `held`·φ + `moved`·slope over the pieces.
+def _steepest(rates: np.ndarray, moved: np.ndarray, most: np.ndarray, limit: float) -> np.ndarray:
+    """Slopes in [-1, 1] that maximise the sum of `rates`·φ + `moved`·slope over the pieces.
 
     φ is 0 at first, changes by slope·`most` over a piece and stays within the limit, on a grid of the smallest change.
     """
     if not limit or not most.min():
-        return np.zeros(held.shape)
+        return np.zeros(rates.shape)
     size = int(min(np.ceil(limit / most.min()), _LEVELS))
     grid = np.linspace(-limit, limit, 2 * size + 1)
     share = limit / size / most  # slope of a step to the next level; none is taken where that is above 1
-    worth, ways = np.zeros((held.shape[1], len(grid))), np.zeros((*held.shape, len(grid)), dtype=np.int8)
-    for number in reversed(range(len(held))):
+    worth, ways = np.zeros((rates.shape[1], len(grid))), np.zeros((*rates.shape, len(grid)), dtype=np.int8)
+    for number in reversed(range(len(rates))):
         rate = moved[number][:, None] * share[number]
         down, up = np.full_like(worth, -np.inf), np.full_like(worth, -np.inf)
         down[:, 1:], up[:, :-1] = worth[:, :-1] - rate, worth[:, 1:] + rate
         ahead = np.stack([down, worth, up]) if share[number] <= 1 else worth[None]
         best = ahead.argmax(axis=0)
         ways[number] = best - len(ahead) // 2
-        worth = np.take_along_axis(ahead, best[None], axis=0)[0] + held[number][:, None] * grid
-    level, slopes = np.full(held.shape[1], size), np.zeros(held.shape)
+        worth = np.take_along_axis(ahead, best[None], axis=0)[0] + rates[number][:, None] * grid
+    level, slopes = np.full(rates.shape[1], size), np.zeros(rates.shape)
     for number, way in enumerate(ways):
         taken = way[np.arange(len(level)), level]
         level, slopes[number] = level + taken, taken * share[number]
@@ -589,17 +588,17 @@ def _steepest(held: np.ndarray, moved: np.ndarray, most: np.ndarray, limit: floa
 
 
 def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
-    """What every constant input at a vertex does to every costate, one sum for all; several times as fast as einsum."""
+    """Products of every constant input at a vertex with every costate."""
     vertices, size, inputs = added.shape
     rows = added.transpose(1, 0, 2).reshape(size, vertices * inputs)
-    found = np.multiply.outer(costates[:, 0], rows[0])
+    products = np.multiply.outer(costates[:, 0], rows[0])
     for i in range(1, size):
-        found += np.multiply.outer(costates[:, i], rows[i])
-    return np.reshape(found, (len(costates), vertices, inputs))
+        products += np.multiply.outer(costates[:, i], rows[i])
+    return np.reshape(products, (len(costates), vertices, inputs))
 
 
 def _with_disturbance(task: FaultPlant, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
-    """Flow and columns of all inputs at full size; a disturbance of bounded rate is one more state."""
+    """Flow, and columns of all inputs at full size; a rate-limited disturbance is a state."""
     flow = np.array(loop.flow, dtype=float)
     push, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
     force, slow = float(task.reference_force), drift * float(task.drift)
@@ -614,11 +613,11 @@ def _with_disturbance(task: FaultPlant, loop: PeriodicLoop) -> tuple[np.ndarray,
 
 
 def _at(task: FaultPlant, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
-    """Flow at a vertex, from the nominal one: slopes act on the errors, the input gain on the push."""
-    found, model = flow.copy(), task.model
-    found[1] += (beta - float(model.gain / task.authority)) * push
-    found[1, :2] += slip - float(model.slip), float(model.rate) - rate
-    return found
+    """Flow at a vertex: slopes act on the errors, the input gain on the matched input."""
+    matrix, model = flow.copy(), task.model
+    matrix[1] += (beta - float(model.gain / task.authority)) * push
+    matrix[1, :2] += slip - float(model.slip), float(model.rate) - rate
+    return matrix
 
 
 def _filled(column: Row, size: int) -> np.ndarray:
@@ -633,17 +632,17 @@ def _flowing(flow: np.ndarray) -> _Event:
 
 
 def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event, *, none: bool = False) -> _EventPieces:
-    """Pieces of an event; with `none` there is one vertex more, at which no time passes where that is free."""
+    """Pieces of an event; `none` adds a vertex at which no time passes if that is free."""
     length, size = float(event.duration) / _PIECES, len(inputs)
-    found = [moved(flow, inputs, length) for flow in vertices]
+    responses = [moved(flow, inputs, length) for flow in vertices]
     if none:
-        found.append((np.eye(size), np.zeros(inputs.shape)) if event.free else found[0])
-    steps, added = zip(*found, strict=True)
+        responses.append((np.eye(size), np.zeros(inputs.shape)) if event.free else responses[0])
+    steps, added = zip(*responses, strict=True)
     return _EventPieces(event, _widened(event.jump, size), np.array(steps), np.array(added), length)
 
 
 def _periods_to_forget(parts: list[_EventPieces], size: int) -> int:
-    """Periods until the state has decayed at the slowest vertex, for a number of states, within limits."""
+    """Periods until the state has decayed at the slowest vertex, within limits."""
     maps = np.eye(parts[0].jump.shape[0])[None]
     for part in parts:
         jump = np.eye(len(part.jump)) if part.of.late else part.jump
@@ -652,9 +651,9 @@ def _periods_to_forget(parts: list[_EventPieces], size: int) -> int:
 
 
 def _widened(jump: Any, size: int) -> np.ndarray:
-    found = np.eye(size)
-    found[: len(jump), : len(jump)] = np.array(jump, dtype=float)
-    return found
+    wider = np.eye(size)
+    wider[: len(jump), : len(jump)] = np.array(jump, dtype=float)
+    return wider
 
 
 # ----------------------------------------------------------------------
@@ -667,14 +666,13 @@ _AXES = ("direct_effect", "evolution_effect", "critical_slip")
 
 
 def worst_sliding(claim: SlidingProof) -> WorstCase:
-    """Adversarial stresses at the corners of the box of a, b and D_c, on the plant without inertia.
+    """Worst case found under adversarial stress at the corners of the box, without inertia.
 
-    For every corner and every piece at which a course may end, the stress, and the rate of the reference within its
-    swing, are at their ends as the impulse response of the loop, linearised, says, which is the worst for the linear
-    loop; what it comes to is seen on the exponentials themselves, with four Runge–Kutta steps a part of the period.
-    Both may jump at every end of a piece; where the rate is largest, pieces are shorter in the end. The normal stress
-    is that at the start, or what p* leaves of it at the end of the way, where a stress moves the rate more; noise is
-    none. A rate below V counts by its logarithm as one above it.
+    For every corner and every final piece, the stress and the reference rate take their extremes by the sign of the
+    impulse response of the linearised loop: the worst case of the linear loop. The errors are those of the nonlinear
+    plant, with four Runge–Kutta steps a part of the period. Inputs may jump between pieces; where the rate is largest,
+    pieces are shorter in a last search. The normal stress is that at the start, or that at the end of the task, where
+    the rate responds more to stress. Measurements are exact. |ln(v/V)| counts rates below V as rates above it.
     """
     rate, slip = search_once(lambda: _searched_sliding(claim), "worst sliding", claim)
     return WorstCase(log_rate=rate, slip_error=slip, peak_slip_rate=float(claim.task.rate) * exp(rate))
@@ -683,11 +681,11 @@ def worst_sliding(claim: SlidingProof) -> WorstCase:
 def _searched_sliding(claim: SlidingProof) -> list[float]:
     gone = dict.fromkeys((Fraction(0), claim.task.distance))
     places = list(product(corners(claim.task), gone))
-    found = [_largest_sliding(claim, SlidingPieces(claim, *place)) for place in places]
-    worst = max(range(len(places)), key=lambda number: found[number][0])
+    errors = [_largest_sliding(claim, SlidingPieces(claim, *place)) for place in places]
+    worst = max(range(len(places)), key=lambda number: errors[number][0])
     corner, slip = places[worst]
-    found.append(_largest_sliding(claim, SlidingPieces(claim, corner, slip, _FINE_PIECES), _SLOPES[:1]))
-    return [max(values) for values in zip(*found, strict=True)]
+    errors.append(_largest_sliding(claim, SlidingPieces(claim, corner, slip, _FINE_PIECES), _SLOPES[:1]))
+    return [max(values) for values in zip(*errors, strict=True)]
 
 
 def _largest_sliding(claim: SlidingProof, plant: "SlidingPieces", slopes: tuple[float, ...] = _SLOPES) -> list[float]:
@@ -728,9 +726,9 @@ def _remembered(maps: list[tuple[Any, Any, Any]]) -> int:
 
 
 class SlidingPieces:
-    """The plant at a corner, in pieces of its periods: exact pressures, Runge–Kutta steps of slip and state.
+    """Plant at a corner in pieces of its periods: exact pressures, Runge–Kutta steps.
 
-    After some slip of the reference [m] p* has taken its share of the normal stress.
+    After some slip of the reference [m] the normal stress is lower by p*.
     """
 
     def __init__(
@@ -747,7 +745,7 @@ class SlidingPieces:
         self._friction = float(corner.ranges["direct_effect"][0]), float(corner.ranges["evolution_effect"][0])
 
     def linear(self, slope: float) -> tuple[PeriodicLoop, list[tuple[Any, Any, Any]]]:
-        """Linear loop, and of every piece e^{Ah}, what 1 Pa of stress and r′ = 2V add, and the jump before it."""
+        """Linear loop by piece: e^{Ah}, responses to 1 Pa and to r′ = 2V, the jump before."""
         model: Any = model_of(self._corner, self._claim.claims)
         steep = Fraction(slope).limit_denominator(1000)
         strength = Fraction(self._strength) + self._corner.radiation * self._corner.rate * steep
@@ -764,11 +762,11 @@ class SlidingPieces:
         return loop, [(*moved(flow, pushes, length), jump) for length, jump in _parts(loop, self._pieces)]
 
     def largest(self, stress: np.ndarray, ahead: np.ndarray) -> np.ndarray:
-        """Largest |ln(v/V)| and slip error [m] of courses of the stress [Pa] and of r′/V − 1, (pieces, courses)."""
+        """Largest |ln(v/V)| and slip error [m] under stress [Pa] and r′/V − 1."""
         parts, size = _parts(self._loop, self._pieces), len(self._loop.states)
         flow, row = np.array(self._loop.flow, dtype=float)[2:, 2:], np.array(self._loop.outputs["push"], float)[2:]
         halves = [expm(flow * length / 2) for length, _ in parts]
-        state, found = np.zeros((size, stress.shape[1])), np.zeros(2)
+        state, largest = np.zeros((size, stress.shape[1])), np.zeros(2)
         for number, (pushed, faster) in enumerate(zip(stress, ahead, strict=True)):
             length, jump = parts[number % len(parts)]
             state = jump @ state
@@ -779,8 +777,8 @@ class SlidingPieces:
             moved = self._step(state[:2], pressures, pushed, faster, length)
             state = np.vstack([moved, after])
             reached = [self.log_rate(moved, pressures[2], end) for end in (pushed, -pushed)]
-            found = np.maximum(found, [np.max(np.abs(reached)), np.max(np.abs(moved[0]))])
-        return found
+            largest = np.maximum(largest, [np.max(np.abs(reached)), np.max(np.abs(moved[0]))])
+        return largest
 
     def _step(self, now: Any, pressures: list[Any], stress: Any, ahead: Any, length: float) -> Any:
         """Slip error and log state after a piece."""
@@ -797,7 +795,7 @@ class SlidingPieces:
         return np.array([self._rate * (np.expm1(y) - ahead), aged])
 
     def log_rate(self, now: Any, pressure: Any, stress: Any) -> Any:
-        """ln(v/V) of slip error [m], log state, pressure error [Pa] and stress [Pa], by Newton's method."""
+        """ln(v/V) from slip error [m], log state, pressure error and stress [Pa], by Newton."""
         a, b = self._friction
         normal = self._strength / a - pressure
         driving = stress - self._stiffness * now[0] + self._coefficient * pressure - normal * b * now[1]
@@ -810,8 +808,8 @@ class SlidingPieces:
 
 def _parts(loop: PeriodicLoop, pieces: int) -> list[tuple[float, np.ndarray]]:
     """Length [s] of every piece of a period, and the jump before it."""
-    still, found = np.eye(len(loop.states)), []
+    still, parts = np.eye(len(loop.states)), []
     for segment in loop.segments:
         jumps = [np.array(segment.jump, dtype=float), *[still] * (pieces - 1)]
-        found += [(float(segment.duration) / pieces, jump) for jump in jumps]
-    return found
+        parts += [(float(segment.duration) / pieces, jump) for jump in jumps]
+    return parts

@@ -17,7 +17,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, continuous_peaks, guarantee
+from quakedesign.guarantees import SampledLoop, continuous_peaks, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
@@ -58,7 +58,7 @@ def implicit(scale, slope, remainder="0"):
     parts = zip(factors, ("1/3", "1/2", "0", "0"), ("slip", "rate", "slip", "rate"), strict=True)
     pull = tuple(Power(factor=(c, c), exponent=F(p), argument=of) for c, p, of in parts)
     root = ImplicitRoot(pull=pull, slopes=(F(slope), F(1)), remainder=F(remainder))
-    return Held(law=compensated(root, F("0.3"), GAIN), step=STEP)
+    return SampledLoop(law=compensated(root, F("0.3"), GAIN), step=STEP)
 
 
 OBSERVER = slip_observer(
@@ -72,19 +72,21 @@ NOISY = {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
 LOOPS = {
     "deadbeat": implicit("1", "1"),
     "sluggish": implicit("3/5", "97/100", "1/1000000"),
-    "estimate": Held(law=ESTIMATE, step=STEP),
-    "late": Held(law=ESTIMATE, step=STEP, delay=F("0.02")),
-    "integrals": Held(law=INTEGRALS, step=STEP),
-    "lagging": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.03")),
-    "noisy": Held(law=ESTIMATE, step=STEP, **NOISY),
-    "observer": Held(law=OBSERVER, step=STEP, slip_noise=F(1, 10**6)),
+    "estimate": SampledLoop(law=ESTIMATE, step=STEP),
+    "late": SampledLoop(law=ESTIMATE, step=STEP, delay=F("0.02")),
+    "integrals": SampledLoop(law=INTEGRALS, step=STEP),
+    "lagging": SampledLoop(law=ESTIMATE, step=F("0.1"), lag=F("0.03")),
+    "noisy": SampledLoop(law=ESTIMATE, step=STEP, **NOISY),
+    "observer": SampledLoop(law=OBSERVER, step=STEP, slip_noise=F(1, 10**6)),
     "noisy deadbeat": replace(implicit("1", "1"), **NOISY),
-    "jittery": Held(law=ESTIMATE, step=STEP, jitter=F("0.002"), delay_jitter=F("0.001")),
-    "mean": Held(law=ESTIMATE, step=STEP, delay=F("0.002"), averaging=F("0.004")),
+    "jittery": SampledLoop(law=ESTIMATE, step=STEP, jitter=F("0.002"), delay_jitter=F("0.001")),
+    "mean": SampledLoop(law=ESTIMATE, step=STEP, delay=F("0.002"), averaging=F("0.004")),
     "jittery deadbeat": replace(implicit("1", "1"), jitter=F("0.001")),
-    "jittery lag": Held(law=ESTIMATE, step=F("0.1"), lag=F("0.01"), jitter=F("0.0002"), delay_jitter=F("0.0002")),
-    "jittery and late": Held(law=ESTIMATE, step=STEP, delay=F("0.02"), jitter=F("0.001")),
-    "paced": Held(law=ESTIMATE, step=STEP, pump=Pump(rate=F(20_000_000), least=F(-(10**8)), largest=F(10**8))),
+    "jittery lag": SampledLoop(
+        law=ESTIMATE, step=F("0.1"), lag=F("0.01"), jitter=F("0.0002"), delay_jitter=F("0.0002")
+    ),
+    "jittery and late": SampledLoop(law=ESTIMATE, step=STEP, delay=F("0.02"), jitter=F("0.001")),
+    "paced": SampledLoop(law=ESTIMATE, step=STEP, pump=Pump(rate=F(20_000_000), least=F(-(10**8)), largest=F(10**8))),
     "noisy sluggish": replace(implicit("4/5", "97/100", "1/1000000"), slip_noise=F(1, 10**6)),
 }
 PATHS_OF = {
@@ -94,7 +96,7 @@ PATHS_OF = {
 }
 for name, path in PATHS_OF.items():
     through = family_of(uncertain_plant(load_fault("real-fault")), STEP, "slip-and-rate", ExactSetup(**path)).law
-    LOOPS[name] = Held(law=through(np.array([0.94, -8.28, 0.1237])), step=STEP, **path)
+    LOOPS[name] = SampledLoop(law=through(np.array([0.94, -8.28, 0.1237])), step=STEP, **path)
 CONTINUOUS_GAINS = tuple(map(F, ("2640677339", "523784305.9", "2647975129", "957074176.5")))
 CONTINUOUS = exact_integrals(CONTINUOUS_GAINS)
 EVERY = (*(name for name in LOOPS if name != "late rock"), "continuous")

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 from standalone_guarantee import checker
 
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.guarantees import Held, TrackingProof, guarantee
+from quakedesign.guarantees import SampledLoop, TrackingProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.norms import free_peaks, norms
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
@@ -309,7 +309,7 @@ def followed(loop, periods):
 def test_through_rock_and_late_both_bound_what_is_seen_of_the_free_response(around):
     task, step, around = stored().task, F("0.05"), {"diffusion": F(1), **around}
     law = family_of(task, step, "slip-and-rate", ExactSetup(**around)).law(np.array(THROUGH_ROCK[0]))
-    held = Held(law=law, step=step, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"), **around)
+    held = SampledLoop(law=law, step=step, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"), **around)
     loop = held.loop(task)
     raw = json.loads(guarantee_text(TrackingProof(task=task, held=held, claims=stored().claims)))
     plain = checker.read_loop(raw["loop"], checker.read_task(raw), held.start)

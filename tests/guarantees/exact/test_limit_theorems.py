@@ -16,7 +16,7 @@ from scipy.special import erfc
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, TrackingProof, guarantee
+from quakedesign.guarantees import SampledLoop, TrackingProof, guarantee
 from quakedesign.guarantees.exact.limit_theorems import (
     farthest_well,
     longest_diffusion,
@@ -567,7 +567,7 @@ def contradicted(numbers, noise=(F(0), F(0))):
     for number in numbers:
         task, step = random_task(number)
         told = {"slip_noise": noise[0] * task.amplitude * step**2, "rate_noise": noise[1] * task.amplitude * step}
-        found = guarantee(task, Held(law=law_for(task, step), step=step, **told))
+        found = guarantee(task, SampledLoop(law=law_for(task, step), step=step, **told))
         if isinstance(found, TrackingProof):
             limit, claims = smallest_peak(task, step, **told), found.claims
             proved += 1

@@ -11,7 +11,7 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, Held, NoProof, SlowGain, TrackingProof, guarantee
+from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, SlowGain, TrackingProof, guarantee
 from quakedesign.guarantees.exact import small_gain as module
 from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
@@ -30,7 +30,7 @@ BY_HAND = FaultPlant(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 
     operation_time=F(3), amplitude=F(0), change=None, growths=(F(0), F(0)),
 )  # fmt: skip
 TASK = uncertain_plant(load_fault("real-fault"))
-HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10), slip_noise=F(1, 10**6))
+HELD = SampledLoop(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10), slip_noise=F(1, 10**6))
 BOUNDS = Bounds(slip_error=F(1, 2), slip_rate_error=F(1, 7), push=TASK.authority, small_gain=F(1, 2))
 NONE = NoProof(reason="none")
 GAINS = {("slip_error", "aged"): (F(1),)}

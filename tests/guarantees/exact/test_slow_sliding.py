@@ -17,7 +17,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError, UnsupportedError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
-from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof, cell_bounds
+from quakedesign.guarantees import NoProof, SampledLoop, SlidingClaims, SlidingProof, cell_bounds
 from quakedesign.guarantees.exact import sliding_small_gain as small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
@@ -62,7 +62,7 @@ MODEL = SlidingModel(
 )  # fmt: skip
 WEIGHTS = Weights(slip=3.0, state=0.18, pressure=9000.0, slip_noise=3.0, state_noise=0.006, level_noise=20.0)
 LAW = sliding_law(replace(MODEL, weakening=F(1100000), evolution=F("0.022")), F(50), weights=WEIGHTS)
-LAGGED = Held(law=LAW, step=F(50), lag=F(10))
+LAGGED = SampledLoop(law=LAW, step=F(50), lag=F(10))
 
 
 def claims(log_rate="1/2", log_state="1/18", slip_error="4e-5", push=380000, asked=380000):
@@ -188,7 +188,7 @@ PATHS = [
 def test_both_checkers_state_the_same_loop_exactly(path, friction, swing):
     """Flow, inputs, outputs, what bounds the inputs and what may move after a step; with a rock that damps much."""
     one = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20), swing=swing, **friction)
-    held = Held(law=STIFF, step=F(200), **path)
+    held = SampledLoop(law=STIFF, step=F(200), **path)
     cell, model = alone(one, held), small_gain.model_of(one, claims())
     plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
     theirs, ours = standalone.around(plain, cell), small_gain.loop_of(held, model, one)
@@ -210,7 +210,7 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction, swing):
 @pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION)
 def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     """Exactly, of gains that are made up: what adds at once, what a step does, small gain and bounds."""
-    one, held = task(ranges=UNSURE, ramp=F(14), swing=F(1, 5), **friction), Held(law=STIFF, step=F(200), **path)
+    one, held = task(ranges=UNSURE, ramp=F(14), swing=F(1, 5), **friction), SampledLoop(law=STIFF, step=F(200), **path)
     ours = small_gain.loop_of(held, small_gain.model_of(one, claims()), one)
     phases, names = small_gain.after_a_step(ours), (*ours.inputs, *held.noise, *ours.fading)
 
@@ -237,7 +237,7 @@ def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
 
 def test_what_adds_at_once_and_after_a_step_is_that_of_the_format():
     """Through rock, with gains of 0: y, g and f have what the stress and a step add, that of the last part at first."""
-    one, held = task(ranges=UNSURE), Held(law=STIFF, step=F(200), diffusion=F(40))
+    one, held = task(ranges=UNSURE), SampledLoop(law=STIFF, step=F(200), diffusion=F(40))
     model = small_gain.model_of(one, claims())
     loop = small_gain.loop_of(held, model, one)
     phases, late, fading = small_gain.after_a_step(loop), small_gain.settled(loop), loop.fading["left_out"]
@@ -264,7 +264,7 @@ def test_what_the_loop_leaves_out_of_the_equations_stays_below_its_shares():
     The shares are no larger than it takes: at some corner each input is near its bound.
     """
     one, given = task(ranges=UNSURE, damping=F(5 * 10**20)), claims("1/2", "1/5")
-    held, model = Held(law=STIFF, step=F(200), lag=F(10)), small_gain.model_of(one, given)
+    held, model = SampledLoop(law=STIFF, step=F(200), lag=F(10)), small_gain.model_of(one, given)
     channels = {c.name: c for c in small_gain.channels_of(one, held, given, small_gain.loop_of(held, model, one))}
     strength, slope, bent, fast = map(float, (model.strength, model.slope, model.state_slope, model.state_rate))
     rate, x = float(RATE), 2e-5
@@ -287,7 +287,7 @@ def test_what_the_loop_leaves_out_of_the_equations_stays_below_its_shares():
 def test_what_the_loop_leaves_out_of_the_slip_law_stays_below_its_share():
     """Ruina's law typed in again, at the corners; where the slip evolves fastest or slowest the share is reached."""
     one, given = task(ranges=UNSURE, state_law="slip"), claims("1/2", "1/5")
-    held, model = Held(law=STIFF, step=F(200), lag=F(10)), small_gain.model_of(one, given)
+    held, model = SampledLoop(law=STIFF, step=F(200), lag=F(10)), small_gain.model_of(one, given)
     loop = small_gain.loop_of(held, model, one)
     channels = {c.name: c for c in small_gain.channels_of(one, held, given, loop)}
     assert set(channels["state"].shares) == {"ageing"}
@@ -326,7 +326,7 @@ def test_regularised_friction_differs_from_its_logarithm_by_no_more_than_is_adde
     b, y, z = F("0.015"), F(1, 2), F(1, 5)
     ranges = {**UNSURE, "direct_effect": (F(a), F(a)), "evolution_effect": (b, b), "coefficient": (F(mu), F(mu))}
     one, given = task(ranges=ranges, regularised=True), claims("1/2", "1/5")
-    held = Held(law=STIFF, step=F(200), lag=F(10))
+    held = SampledLoop(law=STIFF, step=F(200), lag=F(10))
     added = small_gain.regularisation(one, given)
     assert alone(one, held, given).stress() - alone(replace(one, regularised=False), held, given).stress() == added
     mpmath.mp.dps = 150
@@ -426,7 +426,7 @@ def test_the_task_of_a_fault_has_its_law(law, more, expected):
 @pytest.mark.parametrize("path", [{"lag": 10}, {"diffusion": 40}, {"diffusion": 40, "lag": 10}])
 def test_both_checkers_add_the_inertia_of_the_balance_of_forces(path):
     """m V e^Y sup|r| over the smallest strength, typed in again."""
-    held = Held(law=LAW, step=F(50), **{name: F(v) for name, v in path.items()})
+    held = SampledLoop(law=LAW, step=F(50), **{name: F(v) for name, v in path.items()})
     one = task(ranges=UNSURE, ramp=F(14))
     found = small_gain.inertia(one, held, claims())
     for density in (F(1, 10**9), F(2700), F(27 * 10**9)):
@@ -475,7 +475,7 @@ def test_both_checkers_find_the_same_bounds(path):
     """With a, b and D that are known to 0.2 percent, friction to a sixth of one, and a plan that is off."""
     one = task("0.002", ramp=F("11.9"))
     one = replace(one, ranges={**one.ranges, "coefficient": (F("0.599"), F("0.601"))})
-    ours, (theirs, small) = paired(one, Held(law=STIFF, step=F(200), **path), claims("1/4", "1/10"))
+    ours, (theirs, small) = paired(one, SampledLoop(law=STIFF, step=F(200), **path), claims("1/4", "1/10"))
     assert not isinstance(ours, NoProof)
     for name, value in theirs.items():
         assert float(ours[name]) == pytest.approx(float(value), rel=1e-3), name
@@ -743,7 +743,7 @@ def test_a_claim_that_is_only_reached_on_one_cell_does_not_follow(name, monkeypa
 
 def test_a_law_of_the_slip_rate_or_a_pressure_that_jumps_is_refused():
     fed = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(F(-1), F(-1)))
-    for held in (Held(law=fed, step=F(50), lag=F(10)), Held(law=LAW, step=F(50))):
+    for held in (SampledLoop(law=fed, step=F(50), lag=F(10)), SampledLoop(law=LAW, step=F(50))):
         with pytest.raises(ParameterError, match="a law of the slip alone, with a diffusion path or a lag"):
             cell_bounds(task(), held, claims())
 

@@ -8,7 +8,7 @@ import pytest
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, Held, NoProof, TrackingProof, guarantee
+from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, TrackingProof, guarantee
 from quakedesign.guarantees.exact import tracking_proof as continuous
 from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
@@ -32,10 +32,10 @@ CLAIMS = Claims(
 )
 BOUNDS = Bounds(slip_error=F(0), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
 NONE = NoProof(reason="none")
-HELD = Held(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10))
+HELD = SampledLoop(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10))
 SIGN = ImplicitRoot(pull=(Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip"),),
                     slopes=(F(0), F(0)), remainder=F(0))  # fmt: skip
-ROOTED = Held(law=compensated(SIGN, F(1, 2), F(1)), step=F(1))
+ROOTED = SampledLoop(law=compensated(SIGN, F(1, 2), F(1)), step=F(1))
 NAMES = tuple(Claims.__dataclass_fields__)
 
 
@@ -46,7 +46,7 @@ def test_claims_are_the_bounds_of_the_errors_beside_the_reference_and_the_pressu
     low, high = TASK.rest_pressure
     assert (found.least_pressure, found.largest_pressure) == (low - 3, high + 3)
     assert found.pressures == ((low - 3, high + 3),)
-    behind = Claims.of(TASK, replace(BOUNDS, asked=7 * TASK.authority))
+    behind = Claims.of(TASK, replace(BOUNDS, valve_push=7 * TASK.authority))
     assert behind.pressures == ((low - 3, high + 3), (low - 7, high + 7))
     assert behind.to_dict()["asked_pressure"] == [str(low - 7), str(high + 7)]
     assert "asked_pressure" not in found.to_dict()
@@ -118,7 +118,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     alone = LinearLaw(
         states=("z",), update=((F(1),),), measured=((F(1), F(0)),), output=(F(1),), feedback=(F(1), F(0)), root=None
     )
-    both = Held(law=replace(alone, feedback=(F(1), F(1))), step=F(1), slip_noise=F(1, 3), rate_noise=F(2, 3))
+    both = SampledLoop(law=replace(alone, feedback=(F(1), F(1))), step=F(1), slip_noise=F(1, 3), rate_noise=F(2, 3))
     said = TrackingProof(task=TASK, held=both, claims=CLAIMS).sentence()
     told = "with zero-order hold over 1 s, with any noise of at most 0.333333 m in the measured slip, "
     assert told + "with any noise of at most 0.666666 m/s in the measured slip rate, for every" in said
@@ -126,12 +126,12 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
         {"slip_noise": F(1, 3), "rate_noise": F(2, 3)},
         {"rate_noise": F(2, 3)},
     )
-    quiet = Held(law=alone, step=F(1))
+    quiet = SampledLoop(law=alone, step=F(1))
     assert (quiet.noise, quiet.setup) == ({}, ExactSetup())
     assert replace(quiet, lag=F(1, 2), ramp=F(1, 4)).setup == ExactSetup(lag=F(1, 2))
     said = TrackingProof(task=TASK, held=quiet, claims=CLAIMS).sentence()
     assert "with zero-order hold over 1 s, with the slip alone measured, for every" in said
-    assert Held(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
+    assert SampledLoop(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
     with pytest.raises(ParameterError, match="needs a law that measures the slip rate"):
         replace(quiet, rate_noise=F(1))
     for name in ("slip_noise", "rate_noise"):
@@ -147,7 +147,7 @@ def test_claims_are_shown_as_the_exact_numbers():
 
 
 def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
-    held = Held(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
+    held = SampledLoop(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
     said = TrackingProof(task=TASK, held=held, claims=CLAIMS).sentence()
     where = "on the plant without stick, from rest, with zero-order hold over 0.1 s"
     assert said.startswith(f"{where}, with a delay of 0.02 s, through a lag of 0.03 s, for every disturbance")
@@ -157,7 +157,7 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
 
 
 def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_root():
-    held = Held(law=HELD.law, step=F(1, 10))
+    held = SampledLoop(law=HELD.law, step=F(1, 10))
     assert (held.delay, held.lag) == (0, 0)
     assert (held.controller.law, held.controller.step) == (held.law, F(1, 10))
     with pytest.raises(UnsupportedError, match="states the implicit step, not the gains"):
@@ -202,7 +202,7 @@ def test_a_root_that_is_told_another_slip_may_leave_its_line(monkeypatch):
     bounds = replace(BOUNDS, slip_error=F(1, 2))
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: bounds)
     for noise, verdict in ((F(0), Verdict.PROVED), (F(1, 3), Verdict.PROVED), (F(1, 2), Verdict.UNDECIDED)):
-        held = Held(law=compensated(sign, F(1, 2), F(1)), step=F(1), slip_noise=noise)
+        held = SampledLoop(law=compensated(sign, F(1, 2), F(1)), step=F(1), slip_noise=noise)
         assert TrackingProof(task=TASK, held=held, claims=Claims.of(TASK, bounds)).check() is verdict
 
 
@@ -285,7 +285,7 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
 def test_what_a_law_is_told_is_off_by_noise_and_by_the_reference_until_it_is_measured():
     held = replace(HELD, slip_noise=F(1, 3), rate_noise=F(1, 7), jitter=F(1, 50))
     first, second = TASK.reference_rates
-    assert held.told(TASK, (F(1), F(2))) == (F(4, 3) + first / 50, F(15, 7) + second / 50)
+    assert held.measured_errors(TASK, (F(1), F(2))) == (F(4, 3) + first / 50, F(15, 7) + second / 50)
 
 
 def test_what_comes_late_may_leave_a_root_its_lines(monkeypatch):

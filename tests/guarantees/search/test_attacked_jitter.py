@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from thinned import few
 
-from quakedesign.guarantees import NoProof, guarantee, worst_found
+from quakedesign.guarantees import NoProof, guarantee, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.float_bounds import estimated
 from quakedesign.guarantees.search.worst_case import _events, _on_time
@@ -107,7 +107,7 @@ def test_no_mixed_course_of_ten_thousand_leaves_the_claims(row):
 def test_the_search_stays_inside_and_finds_more_than_on_time(row):
     claim = proved(row)
     on_time = replace(claim, held=replace(claim.held, jitter=F(0), delay_jitter=F(0)))
-    seen, before = map(worst_found, (claim, on_time))
+    seen, before = map(worst_tracking, (claim, on_time))
     assert 1.002 * before.slip_error < seen.slip_error <= claim.claims.slip_error
     assert before.slip_rate_error < seen.slip_rate_error <= claim.claims.slip_rate_error
 
@@ -115,7 +115,7 @@ def test_the_search_stays_inside_and_finds_more_than_on_time(row):
 @pytest.mark.slow
 def test_the_search_with_stick_stays_inside():
     claim = proved("late")
-    seen = worst_found(claim, sticks=True)
+    seen = worst_tracking(claim, sticks=True)
     assert claim.claims.slip_error / 4 < seen.slip_error <= claim.claims.slip_error
     assert claim.claims.slip_rate_error / 4 < seen.slip_rate_error <= claim.claims.slip_rate_error
 

@@ -14,7 +14,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import design_compensated, design_held, tightened
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
-from quakedesign.guarantees.tracking_result import attacked as beside_searches
+from quakedesign.guarantees.tracking_result import with_worst_case as beside_searches
 from quakedesign.laws import control_law
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from quakedesign.guarantees import worst_found
+from quakedesign.guarantees import worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 
 FILE = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_no-clock_lab-fault.json"
@@ -120,11 +120,11 @@ def test_intervals_that_change_do_more_than_the_longest_or_the_shortest_alone():
 @pytest.mark.slow
 def test_the_search_stays_inside_and_finds_more_than_by_a_clock():
     held = claim().held
-    seen = worst_found(claim())
+    seen = worst_tracking(claim())
     clocks = [replace(held, step=v, longest_step=F(0)) for v in (held.step, held.longest_step)]
-    before = [worst_found(replace(claim(), held=clock, reach=None)) for clock in clocks]
+    before = [worst_tracking(replace(claim(), held=clock, reach=None)) for clock in clocks]
     assert max(v.slip_error for v in before) < seen.slip_error <= claim().claims.slip_error
     assert max(v.slip_rate_error for v in before) < seen.slip_rate_error <= claim().claims.slip_rate_error
-    stuck = worst_found(claim(), sticks=True)
+    stuck = worst_tracking(claim(), sticks=True)
     assert stuck.slip_error <= claim().claims.slip_error
     assert stuck.slip_rate_error <= claim().claims.slip_rate_error

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.linalg import expm
 
 import quakedesign as qd
-from quakedesign.guarantees import Held, guarantee
-from quakedesign.guarantees.search.worst_case import worst_found
+from quakedesign.guarantees import SampledLoop, guarantee
+from quakedesign.guarantees.search.worst_case import worst_tracking
 from quakedesign.laws import LinearLaw
 from quakedesign.plant import uncertain_plant
 
@@ -47,8 +47,8 @@ def test_the_worst_case_between_samples_is_no_less_than_the_sum_of_responses():
         output=(F(-GAINS[2]),),
         feedback=(F(-GAINS[0]), F(-GAINS[1])),
     )
-    found = guarantee(task, Held(law=law, step=STEP, delay=DELAY))
-    worst = worst_found(found)
+    found = guarantee(task, SampledLoop(law=law, step=STEP, delay=DELAY))
+    worst = worst_tracking(found)
     size = float(task.amplitude + task.reference_force)
     ends = product(task.slip_chord, task.rate_chord)
     sums = size * np.max([sums_of_responses(float(s), float(w), float(task.authority)) for s, w in ends], axis=0)

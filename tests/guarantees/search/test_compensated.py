@@ -20,7 +20,7 @@ from quakedesign.guarantees import (
     design_compensated,
     guarantee_of,
     tightened,
-    worst_found,
+    worst_tracking,
 )
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import implicit_pull
@@ -147,7 +147,7 @@ def test_with_stick_no_course_leaves_the_bounds(row):
 )
 def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row, sticks):
     held, claim = numbers(row)
-    found, back = worst_found(claim, sticks=sticks), float(TASK.reference_rates[0]) if sticks else None
+    found, back = worst_tracking(claim, sticks=sticks), float(TASK.reference_rates[0]) if sticks else None
     largest, _ = attacker.run(held, 40, 12, attacker.switching(held, 500, 480, seed=4), 500, back=back)
     assert largest[1].max() <= found.slip_rate_error <= claim.claims.slip_rate_error
     assert found.slip_error <= claim.claims.slip_error

@@ -12,7 +12,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import Disturbance
-from quakedesign.guarantees import CLASSES, ContinuousProof, NoProof, certified_peaks, worst_found
+from quakedesign.guarantees import CLASSES, ContinuousProof, NoProof, certified_peaks, worst_tracking
 from quakedesign.laws import published
 from quakedesign.laws.elqr import ExtendedLQR, PressureLimits
 from quakedesign.lyapunov import Verdict
@@ -77,7 +77,7 @@ def test_the_real_fault_reaches_what_the_method_promises(peaks):
 @pytest.mark.parametrize("kind", CLASSES)
 def test_what_a_search_finds_is_below_and_near(name, kind):
     found = certified_peaks(qd.load_fault(name), law(name), disturbance_class=kind)
-    seen = worst_found(found)
+    seen = worst_tracking(found)
     assert found.check() is Verdict.PROVED
     assert seen.slip_error < found.claims.slip_error < 2 * seen.slip_error
     assert seen.slip_rate_error < found.claims.slip_rate_error < 1.5 * seen.slip_rate_error
@@ -97,7 +97,7 @@ def test_gains_with_poles_that_are_far_apart_are_decided_too(name, box):
     gains = replace(published(name)["elqr"], feedback="error")
     found = {kind: certified_peaks(qd.load_fault(name, box=box), gains, disturbance_class=kind) for kind in CLASSES}
     assert found["rate"].claims.slip_rate_error <= found["amplitude"].claims.slip_rate_error
-    assert worst_found(found["amplitude"]).slip_rate_error < found["amplitude"].claims.slip_rate_error
+    assert worst_tracking(found["amplitude"]).slip_rate_error < found["amplitude"].claims.slip_rate_error
 
 
 def test_a_quiet_fault_has_only_what_the_reference_causes(real, designed):
@@ -176,7 +176,7 @@ def test_a_law_may_have_one_integral_and_says_so_if_it_has_too_few(real):
     """k4 = 0: the same theorem with one state less; feedback of the state lets one integral drift along a reference."""
     one = certified_peaks(real, ExtendedLQR.from_values((*GAINS["real-fault"][:3], "0")))
     assert one.check() is Verdict.PROVED
-    assert worst_found(one).slip_rate_error < one.claims.slip_rate_error < 2 * worst_found(one).slip_rate_error
+    assert worst_tracking(one).slip_rate_error < one.claims.slip_rate_error < 2 * worst_tracking(one).slip_rate_error
     none = certified_peaks(real, ExtendedLQR.from_values((*GAINS["real-fault"][:2], "0", "0")))
     assert none.reason == "too few integrals for feedback of the error: 1 needed, 0 in use"
     drifting = certified_peaks(real, ExtendedLQR.from_values((*GAINS["real-fault"][:3], "0"), feedback="state"))

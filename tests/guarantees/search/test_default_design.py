@@ -68,7 +68,7 @@ def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
     found = designed("real").guarantee
     assert found.slow_gain is not None
     assert found.claims.slip_rate_error < guarantee(found.task, found.held).claims.slip_rate_error * F(3, 4)
-    monkeypatch.setattr("quakedesign.guarantees.tracking_result.worst_found", lambda *_, **__: None)
+    monkeypatch.setattr("quakedesign.guarantees.tracking_result.worst_tracking", lambda *_, **__: None)
     assert qd.guarantee(REAL).proof == assess(REAL, designed("real").controller).guarantee == found
 
 
@@ -95,25 +95,25 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     said = f"not guaranteed at T_s = 0.1 s; designed for T_s = {float(step):.4g} s"
     assert f": {said}: proved; gains" in repr(design)
     assert f": {said}: proved</b>" in design._repr_html_()
-    entry = SimpleNamespace(design=design, guaranteed=design.guarantee)
+    entry = SimpleNamespace(design=design, proof=design.guarantee)
     assert grade(entry).startswith(f"{said}; guaranteed: slip rate <= ")
     assert "fails" not in grade(entry)
     assert not positive(SimpleNamespace(of=lambda _: (SimpleNamespace(design=design, run=None),)))
     proved = SimpleNamespace(proved=True, lines=lambda: ["proved: it"], limit_lines=list)
-    first = SimpleNamespace(design=design, answer=proved)
+    first = SimpleNamespace(design=design, guarantee=proved)
     assert headlines.guarantee_lines(first)[0] == f"{said}: {design.details['reason']}"
     monkeypatch.setattr(page, "_natural", lambda _: "an earthquake")
     told = page.answer(SimpleNamespace(of=lambda _: (entry,), left_out={}))
     assert told[:2] == ["an earthquake", f"e-LQR: {said}"]
     assert designed("real").other_step == ""
-    said = headlines.limit_lines(SimpleNamespace(design=design, answer=SimpleNamespace(limit_lines=list)))[0]
+    said = headlines.limit_lines(SimpleNamespace(design=design, guarantee=SimpleNamespace(limit_lines=list)))[0]
     assert f"T_s up to at least {float(step):.3g} s, and at T_s = {float(step):.6g} s for delays up to at least" in said
     late = replace(premises(design)["delay"], certified=F(0))
-    without = SimpleNamespace(design=design.with_premise(late), answer=SimpleNamespace(limit_lines=list))
+    without = SimpleNamespace(design=design.with_premise(late), guarantee=SimpleNamespace(limit_lines=list))
     assert headlines.limit_lines(without)[0].endswith(" s no delay was found with one")
     assert late.sides == ("0 s", "0 s")
     assert account.badge(entry) == "not guaranteed at T_s = 0.1 s"
-    real = SimpleNamespace(design=designed("real"), guaranteed=designed("real").guarantee)
+    real = SimpleNamespace(design=designed("real"), proof=designed("real").guarantee)
     assert account.badge(real) == "guaranteed as it runs"
     assert grade(real).startswith("guaranteed: slip rate <= ")
     # the same law held over the fault's own T_s has none

@@ -13,7 +13,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_found
+from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.linear_design import _with_noise, closest
@@ -51,7 +51,7 @@ def designed(row):
 
 @cache
 def worst(row, sticks=False):
-    return worst_found(designed(row), sticks=sticks)
+    return worst_tracking(designed(row), sticks=sticks)
 
 
 def courses(held, pieces, count, seed, periods):
@@ -264,7 +264,7 @@ def test_the_worst_found_with_stick_is_that_of_an_attacker_who_lets_the_fault_re
     name, controller = fault_and_law
     answer = qd.guarantee(load_fault(name), controller=controller)
     claim = answer.compensation.proof if answer.compensation else answer.proof
-    found, (slip, rate) = worst_found(claim, sticks=True), BY_ASCENT[fault_and_law]
+    found, (slip, rate) = worst_tracking(claim, sticks=True), BY_ASCENT[fault_and_law]
     assert 0.99 * slip <= found.slip_error <= claim.claims.slip_error
     assert 0.99 * rate <= found.slip_rate_error <= claim.claims.slip_rate_error
 

@@ -8,7 +8,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.cli.design_commands import DesignOptions
 from quakedesign.errors import ParameterError, UnsupportedError
-from quakedesign.guarantees import Held, guarantee
+from quakedesign.guarantees import SampledLoop, guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.default_designs import SampledDesign
 from quakedesign.laws import ErrorModel, disturbance_estimate
@@ -23,7 +23,7 @@ LAW = disturbance_estimate(
     ErrorModel.delayed(((F(1), F(0)), (F("0.0722"), F("0.7475"))), ((F(0), F("0.1596")),), F("2.282e-8")),
 )
 LAG = F(1, 50)
-CLAIM = guarantee(uncertain_plant(REAL), Held(law=LAW, step=F(23, 125), lag=LAG))
+CLAIM = guarantee(uncertain_plant(REAL), SampledLoop(law=LAW, step=F(23, 125), lag=LAG))
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_it_is_compared_behind_its_path_without_what_acts_at_once(asked, monkeyp
     runs = []
     monkeypatch.setattr(comparison, "natural_earthquake", lambda fault, **more: Mock(spec=qd.Trajectory))
     monkeypatch.setattr(comparison, "simulate", lambda fault, law, **more: runs.append(law))
-    monkeypatch.setattr(comparison, "_answer", lambda *_, given: None)
+    monkeypatch.setattr(comparison, "_guarantee_of", lambda *_, given: None)
     design = qd.design(REAL, "elqr", lag=LAG)
     found = qd.compare(REAL, [design])
     assert ([entry.origin for entry in found.entries], runs) == (["designed"], [design.controller])
@@ -68,11 +68,11 @@ def test_it_is_compared_behind_its_path_without_what_acts_at_once(asked, monkeyp
 
 
 def test_the_command_designs_the_e_lqr_alone_behind_a_path():
-    assert DesignOptions().asked("real-fault")[1]["names"] == ["cta", "dia", "elqr"]
+    assert DesignOptions().problem("real-fault")[1]["names"] == ["cta", "dia", "elqr"]
     for more in ({"lag": "0.02"}, {"delay": "0.1"}, {"diffusion": "2"}):
-        asked = DesignOptions(**more).asked("real-fault")[1]
+        asked = DesignOptions(**more).problem("real-fault")[1]
         assert (asked["names"], asked["options"]["setup"]) == (["elqr"], qd.LoopSetup(**more))
-    assert DesignOptions(lag="0.02", controller="cta").asked("real-fault")[1]["names"] == ["cta"]
+    assert DesignOptions(lag="0.02", controller="cta").problem("real-fault")[1]["names"] == ["cta"]
 
 
 @pytest.mark.parametrize(

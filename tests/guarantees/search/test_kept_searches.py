@@ -50,8 +50,8 @@ def test_a_design_is_searched_once(task, tmp_path, monkeypatch):
     assert again.held.law.applied == first.held.law.applied != ()
     with pytest.raises(TypeError):
         design.closest(task, STEP / 2)
-    worst = adversary.worst_found(first)
+    worst = adversary.worst_tracking(first)
     monkeypatch.setattr(adversary, "_searched", None)
-    assert adversary.worst_found(first) == worst
+    assert adversary.worst_tracking(first) == worst
     with pytest.raises(TypeError):
-        adversary.worst_found(first, sticks=True)
+        adversary.worst_tracking(first, sticks=True)

@@ -11,7 +11,7 @@ from thinned import few
 
 import quakedesign as qd
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, NoProof, TrackingGuarantee, TrackingProof, best_guarantee
+from quakedesign.guarantees import NoProof, SampledLoop, TrackingGuarantee, TrackingProof, best_guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.compensated_search import design_compensated
@@ -109,7 +109,7 @@ def test_a_nearest_value_is_a_bound_only_where_smaller_values_are_covered(name, 
     """A guarantee is of one delay, lag or path; a jitter and a time of averages are bounds of what may happen."""
     law = qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184").law
     stored = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text(encoding="utf-8"))
-    near = replace(stored, held=Held(law=law, step=STEP, **{name: value}))
+    near = replace(stored, held=SampledLoop(law=law, step=STEP, **{name: value}))
     found = TrackingGuarantee(fault=REAL, proof=NoProof(reason="x"), nearest=(name, near), given=given)
     assert found.lines()[1].startswith(f"{'this law ' if given else ''}{said}")
 

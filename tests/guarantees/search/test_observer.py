@@ -13,7 +13,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, worst_found
+from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, worst_tracking
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.linear_design import Longest, closest, design_at
 from quakedesign.loop.loop_setup import LoopSetup
@@ -91,7 +91,7 @@ def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_
         assert within(largest, claim)
         seen.append(largest[k].max())
     assert claim.claims.slip_rate_error <= 2 * seen[1]
-    found = worst_found(claim)
+    found = worst_tracking(claim)
     assert 0.97 * seen[0] <= found.slip_error <= claim.claims.slip_error
     assert 0.97 * seen[1] <= found.slip_rate_error <= claim.claims.slip_rate_error <= 2 * found.slip_rate_error
     assert claim.claims.slip_error <= 2 * found.slip_error
@@ -101,7 +101,7 @@ def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_
 def test_the_search_uses_the_noise():
     claim = designed("slip alone")
     quiet = replace(claim, held=replace(claim.held, slip_noise=F(0)))
-    loud, still = worst_found(claim), worst_found(quiet)
+    loud, still = worst_tracking(claim), worst_tracking(quiet)
     assert loud.slip_error > 1.02 * still.slip_error
     assert loud.slip_rate_error > 1.02 * still.slip_rate_error
 
@@ -109,7 +109,7 @@ def test_the_search_uses_the_noise():
 @pytest.mark.slow
 def test_with_stick_no_course_is_found_that_leaves_the_bounds():
     claim = designed("slip alone")
-    found = worst_found(claim, sticks=True)
+    found = worst_tracking(claim, sticks=True)
     assert claim.claims.slip_rate_error / 4 < found.slip_rate_error <= claim.claims.slip_rate_error
     assert claim.claims.slip_error / 4 < found.slip_error <= claim.claims.slip_error
 

@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault, Reference, friction_law
-from quakedesign.guarantees import Held, NoProof, SlidingClaims, SlidingProof
+from quakedesign.guarantees import NoProof, SampledLoop, SlidingClaims, SlidingProof
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import sliding_design
 from quakedesign.guarantees.search.sliding_design import (
@@ -51,7 +51,7 @@ CLAIMS = SlidingClaims(**{name: UpperBound(Fraction(1)) for name in SlidingClaim
 
 def held(noise):
     law = LinearLaw(states=(), update=(), measured=(), output=(), feedback=(Fraction(1), Fraction(0)))
-    return Held(law=law, step=STEP, diffusion=Fraction(500), slip_noise=noise)
+    return SampledLoop(law=law, step=STEP, diffusion=Fraction(500), slip_noise=noise)
 
 
 def proved(task, held, log_rate):

@@ -14,7 +14,7 @@ from thinned import few
 
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held, SlidingClaims
+from quakedesign.guarantees import SampledLoop, SlidingClaims
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_small_gain import cell_bounds
@@ -37,7 +37,7 @@ MODEL = SlidingModel(
     direct=F("0.01"), evolution=F("0.022"), stiffness=F(6 * 10**6), coefficient=F("0.6"),
 )  # fmt: skip
 WEIGHTS = Weights(slip=3.0, state=0.18, pressure=9000.0, slip_noise=3.0, state_noise=0.006, level_noise=20.0)
-HELD = Held(law=sliding_law(MODEL, F(50), weights=WEIGHTS), step=F(50), lag=F(10))
+HELD = SampledLoop(law=sliding_law(MODEL, F(50), weights=WEIGHTS), step=F(50), lag=F(10))
 
 
 def task(half, stress):

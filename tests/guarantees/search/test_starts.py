@@ -13,7 +13,7 @@ import pytest
 from quakedesign import simulate
 from quakedesign.cli import main
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import WorstCase, guarantee, worst_found
+from quakedesign.guarantees import WorstCase, guarantee, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.float_bounds import estimated
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -110,7 +110,7 @@ def test_a_run_from_a_corner_stays_within_the_claims_of_its_law():
 def test_a_search_leaves_from_the_corners_and_the_floats_of_a_design_know_the_start():
     claim, errors = started("fast"), {}
     for sticks in (False, True):
-        seen = errors[sticks] = worst_found(claim, sticks=sticks)
+        seen = errors[sticks] = worst_tracking(claim, sticks=sticks)
         assert claim.claims.slip_rate_error / 1.6 <= seen.slip_rate_error <= claim.claims.slip_rate_error
         assert seen.slip_error <= claim.claims.slip_error
     assert claim.claims.slip_error <= 1.6 * errors[False].slip_error
@@ -131,7 +131,7 @@ def called(capsys, *arguments):
 @pytest.mark.slow
 def test_the_command_says_from_where(capsys, monkeypatch):
     seen = WorstCase(slip_error=1e-5, slip_rate_error=1e-4)
-    monkeypatch.setattr("quakedesign.guarantees.tracking_result.worst_found", lambda *_, **__: seen)
+    monkeypatch.setattr("quakedesign.guarantees.tracking_result.worst_tracking", lambda *_, **__: seen)
     code, said = called(
         capsys, "real-fault", *GAINS, "--initial-slip", "0.01 mm", "--initial-slip-rate", "0.04 mm/s", "--json"
     )

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held
+from quakedesign.guarantees import SampledLoop
 from quakedesign.laws import published, summed_integrals
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
@@ -134,7 +134,7 @@ def test_a_scheme_that_is_given_keeps_its_own_path():
     """By name it gets the rock that a sampled law is designed for; no seed is seed 0."""
     fault, step = load_fault("real-fault"), Fraction("0.184")
     law = summed_integrals((Fraction(10**9),) * 4, step)
-    controller = Held(law=law, step=step, diffusion=Fraction(2)).controller
+    controller = SampledLoop(law=law, step=step, diffusion=Fraction(2)).controller
     given = simulation_scheme("explicit")
     assert campaign_problem(fault, controller, scheme=given, duration=1.0).scheme is given
     named = campaign_problem(fault, controller, duration=1.0)

@@ -14,7 +14,7 @@ from quakedesign import simulate, synthesis
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Held
+from quakedesign.guarantees import SampledLoop
 from quakedesign.guarantees.search.lqg import sliding_law, sliding_model
 from quakedesign.laws import LinearLaw, SampledController, published, summed_integrals
 from quakedesign.loop import Actuator, Lag, simulation_scheme
@@ -27,7 +27,7 @@ from quakedesign.simulation.state_plant import SlidingVariation
 
 PATCH, STEP, PATH = load_fault("crustal-patch"), Fraction(300), Fraction(800)
 LAW = sliding_law(sliding_model(PATCH), STEP, diffusion=PATH)
-CONTROLLER = Held(law=LAW, step=STEP, diffusion=PATH).controller
+CONTROLLER = SampledLoop(law=LAW, step=STEP, diffusion=PATH).controller
 TOLD = {"duration": 3000.0, "spread": Fraction(1, 10), "stress": 40e3, "stress_period": 9000.0, "seed": 3}
 PROBLEM = campaign_problem(PATCH.with_box("ten-percent"), CONTROLLER, **TOLD)
 
@@ -97,7 +97,7 @@ def test_a_law_that_opens_the_fault_or_leaves_all_sizes_is_a_result(tmp_path):
     greedy = LinearLaw(
         states=("a",), update=((zero,),), measured=((zero, zero),), output=(zero,), feedback=(Fraction(10) ** 15, zero)
     )
-    problem = campaign_problem(PATCH, Held(law=greedy, step=STEP).controller, duration=9000.0, stress=40e3)
+    problem = campaign_problem(PATCH, SampledLoop(law=greedy, step=STEP).controller, duration=9000.0, stress=40e3)
     found = run_campaign(problem, 2, tmp_path, executor=SerialExecutor())
     by_kind = dict(zip((outcome.kind for outcome in found.outcomes), found.results, strict=True))
     assert set(by_kind) == {"opened", "diverged"}  # by injection, or where withdrawal without end stops the solver
