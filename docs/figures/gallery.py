@@ -70,7 +70,7 @@ def blocks():
     """Whether the blocks of a fault slide together."""
     chain = qd.load_chain(DATA / "three_blocks.toml")
     found = qd.guarantee(chain)
-    run = simulate_blocks(chain, found.law, duration=86400.0)
+    run = simulate_blocks(chain, found.controller, duration=86400.0)
     figure, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
     for number, error in enumerate((run.slip - run.reference[:, None]).T, start=1):
         axes.plot(run.times / 3600, 1e6 * error, linewidth=0.7, label=f"block {number}")
