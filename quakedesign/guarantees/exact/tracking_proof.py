@@ -1,6 +1,7 @@
 """Proofs of tracking on the plant without stick: claims, their check, and the statement.
 
-Chapters: claims about a loop; proof of a sampled loop; peaks of the idealised loop in continuous time.
+Chapters: claims about a loop; proof of a sampled loop; peaks of the idealised loop in continuous time. The theorem is
+in `quakedesign.guarantees.exact.small_gain`, the ranges of the plant in `quakedesign.plant.fault_plant`.
 """
 
 from collections.abc import Mapping
