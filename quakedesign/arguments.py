@@ -23,8 +23,16 @@ from quakedesign.text import shown
 __all__ = ["attach", "checked", "checked_dataclass", "matches"]
 
 _ABBREVIATIONS = {"sp": "sympy", "np": "numpy", "pd": "pandas", "ca": "casadi"}
-_NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real}  # SymPy takes numbers as they are
-_WORDS = {"float": "a number", "int": "a whole number", "str": "a text", "bool": "True or False", "NoneType": "None"}
+_NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real, "SX": Real}
+"""SymPy and CasADi take numbers as they are."""
+_WORDS = {
+    "float": "a number",
+    "SX": "an expression of CasADi",
+    "int": "a whole number",
+    "str": "a text",
+    "bool": "True or False",
+    "NoneType": "None",
+}
 _REMEDIES = {
     "Fault": "Write load_fault('real-fault'), say.",
     "Controller": "Take that of design(fault, 'cta') or published('real-fault')['cta'], say.",
@@ -207,6 +215,8 @@ def _test(hint: Any) -> Callable[[Any], bool]:
 
 def _test_of_class(hint: type) -> Callable[[Any], bool]:
     numbers = _NUMBERS.get(hint.__name__)
+    if hint.__name__ == "SX":  # and all other kinds of expressions and matrices of CasADi
+        hint = next(base for base in hint.__mro__ if base.__name__ == "GenericExpressionCommon")
 
     def test(value: Any) -> bool:
         if hint.__name__ == "ndarray":  # masked arrays are some as well

@@ -12,6 +12,7 @@ from inspect import isclass, isfunction, signature
 from pathlib import Path
 from typing import TypedDict, Unpack
 
+import casadi as ca
 import numpy as np
 import pytest
 import sympy as sp
@@ -25,6 +26,7 @@ from quakedesign.laws import Law, summed_integrals
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import Diffusion
 from quakedesign.loop.loop_setup import LoopSetup  # reads its quantities itself
+from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.lyapunov import Verdict
 from quakedesign.report import headline
 from quakedesign.simulation.campaign import run_campaign
@@ -244,3 +246,14 @@ def of_a_loop(**times: Unpack[Times]) -> None:
 def test_of_several_unknown_arguments_the_first_is_named():
     with pytest.raises(ParameterError, match="there is no argument 'colour'"):
         checked(of_a_loop)(lag=Fraction(1), colour=1, **{f"unknown{i}": i for i in range(20)})
+
+
+@pytest.mark.parametrize("value", [ca.SX.sym("x"), ca.MX.sym("x"), ca.DM(2.0), 2.0, 3])
+def test_an_expression_of_casadi_may_be_of_any_kind_or_a_number(value):
+    assert Measurement().measure([], [], value)[0] is value
+
+
+@pytest.mark.parametrize("value", ["x", None, True, np.ones(2)])
+def test_what_is_no_expression_of_casadi_is_refused(value):
+    with pytest.raises(ParameterError, match=r"x of Measurement\.measure must be an expression of CasADi"):
+        Measurement().measure([], [], value)

@@ -34,8 +34,8 @@ STEADY_SLIDING = FaultEquilibrium(
     coordinates="Slip x₁, slip rate v, the stretch s of the spring, whose far end rests, and the state of friction",
     poles=" about steady sliding at {:.4g} m/s",
     refused={
-        "disturbance": "a disturbance of friction with a state is a stress of its own. Received {value!r}. Give "
-        "--stress.",
+        "disturbance": "friction with a state takes the bound of a shear stress, not a disturbance. Received "
+        "{value!r}. Give --stress.",
         "diffusivity": "diffusivity along the fault needs friction without a state. Received {law}. Omit diffusivity, "
         "for steady pressures along the fault.",
         "purpose": "{value} needs a friction law of slip and slip rate alone. Received {law}, with the state {states}. "

@@ -55,3 +55,9 @@ def test_every_message_of_the_tables_can_be_written():
     for law in (friction_law("exponential-slip-weakening"), Ageing):
         for message in law.equilibrium.refused.values():
             assert "{" not in message.format(value=1, law=law.name, states="theta")
+
+
+def test_of_several_that_do_not_apply_the_first_of_the_table_is_named():
+    for given in ({"plant": "printed", "disturbance": 1.0}, {"disturbance": 1.0, "plant": "printed"}):
+        with pytest.raises(ParameterError, match="takes the bound of a shear stress, not a disturbance"):
+            PATCH.friction.require(**given)

@@ -94,9 +94,9 @@ class FrictionLaw(ABC):
 
     def require(self, **given: object) -> None:
         """Reject what is given, not None, and does not apply to the equilibrium of a fault with this friction."""
-        for name in self.equilibrium.refused.keys() & {name for name, value in given.items() if value is not None}:
-            told = {"value": given[name], "law": self.name, "states": ", ".join(self.state_names)}
-            raise ParameterError(self.equilibrium.refused[name].format(**told))
+        for name, message in self.equilibrium.refused.items():
+            if (value := given.get(name)) is not None:
+                raise ParameterError(message.format(value=value, law=self.name, states=", ".join(self.state_names)))
 
     def _holding(self, values: "Mapping[str, sp.Expr]") -> Self:
         law = object.__new__(type(self))

@@ -698,7 +698,7 @@ def _but(column: Any, place: int) -> Any:
 # columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added to the
 # outputs of the pieces that `early` reaches.
 #
-# **At once.** What an input of size 1 adds to an output at the same instant is added to the gain, whatever its weight.
+# **At once.** What an input of size 1 adds to an output at the same instant is added to the gain, for every weight.
 
 _MOST_SUMS = 5 * 10**7  # products for one input: half of what the standalone checker takes before it gives up
 _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to bound themselves
