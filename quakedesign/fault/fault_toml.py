@@ -243,7 +243,7 @@ TASK = entries_of(Reference) | {"sampling_time": PLANT.pop("sampling_time")}
 DISTURBANCE = entries_of(Disturbance)
 WIDTHS = entries_of(UncertaintyBox)
 del WIDTHS["name"]
-_UNDISTURBED = "no disturbance, so that no guarantee covers one: give amplitude in [disturbance], such as '2 kPa'"
+_UNDISTURBED = "no disturbance; for guarantees that cover one, give amplitude in [disturbance], such as '2 kPa'"
 _STILL = (
     "frequency 0 of the disturbance, so that its sine is 0 in every run; guarantees are for any course of its size. "
     "Give a frequency to see one"

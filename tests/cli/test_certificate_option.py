@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from fractions import Fraction as F
+from pathlib import Path
 
 import pytest
 import xarray as xr
@@ -45,6 +46,13 @@ def test_a_file_holds_its_law_with_the_limit_at_rest_and_what_stands_around_it(f
     assert (law.law.applied, law.sampling) == (LAW.applied, CLAIM.controller.sampling)
     assert law.sampling.path == {"delay": 0, "lag": F(1, 50), "diffusion": 0}
     assert qd.loop_transfer(REAL, law).nstates == 2 + 1 + 2
+
+
+def test_a_file_about_an_uncertain_plant_holds_no_law_of_a_fault(capsys):
+    pendulum = Path(__file__).parents[2] / "proofs" / "certificates" / "uncertain_plant_pendulum.json"
+    code, out, err = told(capsys, "simulate", "real-fault", "--certificate", pendulum, *SHORT)
+    assert (code, out) == (2, "")
+    assert "about an uncertain plant" in " ".join(err.split())
 
 
 @pytest.mark.slow

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import quakedesign as qd
+from quakedesign.checking import check_files
 from quakedesign.cli import main
 from quakedesign.cli.options import LawOptions, SpreadOptions
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.guarantees import save_guarantee
 from quakedesign.loop.sensing import Transducer
 from quakedesign.lyapunov import Verdict
+from quakedesign.plant import slow_sliding_plant
 from quakedesign.simulation.slow_sliding import simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, SlidingVariation, Tide
 from quakedesign.studies import single_runs as state_runs
@@ -136,6 +138,17 @@ def test_constants_of_friction_lie_within_those_of_a_proof():
         for ends in ((low * F(9, 10), high), (low, high * F(11, 10))):
             (found,) = CLAIM.task.differences(replace(CLAIM.task, ranges={**CLAIM.task.ranges, axis: ends}))
             assert found.startswith(f"{SAID[axis]} from ")
+
+
+@pytest.mark.parametrize(("fault", "verdict"), [("crustal-patch", "proved"), ("creeping-patch", "invalid")])
+def test_check_compares_a_fault_with_a_file_of_uncertain_friction(monkeypatch, tmp_path, fault, verdict):
+    """The ranges of the file are 1 % to both sides of the fault's constants."""
+    wide = replace(CLAIM, task=slow_sliding_plant(CRUSTAL, CLAIM.task.stress, F(1, 100)))
+    save_guarantee(wide, tmp_path / "wide.json")
+    monkeypatch.setattr(type(CLAIM), "check", lambda claim: Verdict.PROVED)
+    ((found, lines),) = check_files([tmp_path / "wide.json"], fault).values()
+    assert found.startswith(verdict)
+    assert ('the data are those of "crustal-patch"' in lines) == (verdict == "proved")
 
 
 def test_a_fault_within_the_box_of_a_proof_runs_with_the_plan_of_the_proof(capsys, monkeypatch, tmp_path):

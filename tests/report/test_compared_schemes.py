@@ -4,13 +4,14 @@ import io
 import json
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from quakedesign.cli.app import console
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Reference, load_fault
-from quakedesign.guarantees import NoProof
+from quakedesign.guarantees import NoProof, StickSlipGuarantee, load_guarantee
 from quakedesign.laws import published
 from quakedesign.lyapunov import Verdict
 from quakedesign.report import compare, headline
@@ -56,6 +57,14 @@ def test_a_search_of_other_sampling_times_is_named_only_where_there_was_one():
     ]
     assert [len(one) for one in lines] == [1, 2]
     assert lines[1][1].startswith("no T_s was found for which a design is proved")
+
+
+def test_a_proof_with_stick_is_compared_with_the_worst_case_on_the_same_plant():
+    real = load_fault("real-fault")
+    proof = load_guarantee(Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_real-fault.json")
+    answer = study._guarantee_of(real, replace(undecided(real, proof.controller), runs=proof), given=False)
+    assert isinstance(answer, StickSlipGuarantee)
+    assert 0 < answer.worst.slip_rate <= answer.proof.claims.peak_slip_rate
 
 
 def test_every_row_says_its_scheme_and_is_the_run_of_it(compared):

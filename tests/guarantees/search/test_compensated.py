@@ -14,11 +14,13 @@ from quakedesign import simulate
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import (
+    Compensation,
     NoProof,
     TrackingProof,
     compensated,
     design_compensated,
     guarantee_of,
+    load_guarantee,
     tightened,
     worst_tracking,
 )
@@ -61,6 +63,24 @@ def loop(row):
 
 # certified slip-rate error [m/s] and slip error [m] at most; scales below 0.17 are not deadbeat
 ROWS = {"cta": (3e-4, 4.2e-5), "dia": (3e-4, 4.2e-5), "1/10": (3.6e-4, 5e-5), "1/64": (4.2e-4, 6.5e-5)}
+
+
+@pytest.mark.parametrize(
+    ("slopes", "remainder", "end"),
+    [
+        ((F(1), F(1)), F(0), "its implicit step is deadbeat, e1 + T_s·w = 0: its pressures"),
+        ((F(1), F(1)), F(1, 9), "its implicit step ends at w = -γ·e1/T_s with γ from 1 to 1, up to 0.12 m/s"),
+        ((F(1, 2), F(1)), F(0), "its implicit step ends at w = -γ·e1/T_s with γ from 0.5 to 1, up to 0 m/s"),
+    ],
+)
+def test_an_implicit_step_is_deadbeat_with_slopes_1_and_no_remainder(slopes, remainder, end):
+    claim = load_guarantee(Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_cta_real-fault.json")
+    root = replace(claim.root, slopes=slopes, remainder=remainder)
+    held = replace(claim.held, law=replace(claim.held.law, root=root))
+    sampling = Sampling(step=STEP, scheme="compensated", settings=(("weight", F(1)), ("authority", F(1))))
+    found = Compensation(controller=replace(law("cta", CTA, 1), sampling=sampling), proof=replace(claim, held=held))
+    assert found.deadbeat == ("deadbeat" in end)
+    assert end in found.sentence()
 
 
 @pytest.mark.parametrize("row", ROWS)

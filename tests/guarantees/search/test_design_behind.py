@@ -13,6 +13,7 @@ from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.default_designs import SampledDesign
 from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
+from quakedesign.report.comparison_table import designed_comparison
 from quakedesign.studies import comparison
 from quakedesign.synthesis import state_feedback
 
@@ -65,6 +66,8 @@ def test_it_is_compared_behind_its_path_without_what_acts_at_once(asked, monkeyp
     assert found.path == {"lag": LAG}
     assert set(found.left_out) == {"cta", "dia"}
     assert "act at once" in found.left_out["cta"].replace("acts", "act")
+    found = designed_comparison(REAL, ["elqr"], lambda *_: None, options={"setup": qd.LoopSetup(lag=LAG)})
+    assert [entry.origin for entry in found.entries] == ["designed"]
 
 
 def test_the_command_designs_the_e_lqr_alone_behind_a_path():
