@@ -13,7 +13,8 @@ from quakedesign import lyapunov as certificates
 from quakedesign.checking import check_files, statement
 from quakedesign.errors import CertificateError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import TrackingProof
+from quakedesign.guarantees import ContinuousProof, TrackingProof, load_guarantee, save_guarantee
+from quakedesign.loop import exact_integrals
 from quakedesign.lyapunov import Certificate, Verdict, load_certificate
 from quakedesign.lyapunov.exact.claim import Equilibrium
 from quakedesign.symbolic.terms import Term
@@ -65,6 +66,14 @@ def test_a_verdict_that_is_no_proof_covers_nobody(monkeypatch):
     assert checked(path, "lab-fault") == ("proved", [*statement(ELQR), "covers lab-fault"])
     monkeypatch.setattr(Certificate, "check", lambda self: Verdict.REFUTED)
     assert checked(path, "lab-fault") == ("refuted", statement(ELQR))
+
+
+def test_a_law_in_continuous_time_has_no_sampling_time_to_compare(monkeypatch, tmp_path):
+    stored = load_guarantee(CERTIFICATES / "guarantee_lab-fault.json")
+    law = exact_integrals((F(1),) * 4)
+    save_guarantee(ContinuousProof(task=stored.task, law=law, claims=stored.claims), tmp_path / "peaks.json")
+    monkeypatch.setattr(ContinuousProof, "check", lambda self: Verdict.PROVED)
+    assert checked(tmp_path / "peaks.json", "lab-fault")[1][-1] == 'the data are those of "lab-fault", box paper'
 
 
 def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
