@@ -522,7 +522,7 @@ def test_a_run_with_noise_stays_within_the_claims():
         ("real-fault", {"slip_noise": "1 um"}, F("3e-4"), F("6e-5"), 0.65),
         # Any guarantee: which law the search ends at depends on rounding, and with the law how far its claims are from
         # the worst case found, by some per cent from machine to machine.
-        ("lab-fault", {"step": "2 ms"}, F(1), F(1), 0.5),
+        ("lab-fault", {"step": "2 ms"}, F(1), F(1), 0.6),
     ],
 )
 def test_further_loops_are_designed_and_proved_to_reach_what_was_asked(name, given, rate, slip, share):
@@ -531,5 +531,5 @@ def test_further_loops_are_designed_and_proved_to_reach_what_was_asked(name, giv
     assert answer.proved
     assert claims.peak_slip_rate < rate
     assert max(claims.slip_behind, claims.slip_ahead) < slip
-    assert answer.found.check() is Verdict.PROVED
+    assert answer.proof.check() is Verdict.PROVED
     assert share * claims.peak_slip_rate < answer.worst.peak_slip_rate < claims.peak_slip_rate
