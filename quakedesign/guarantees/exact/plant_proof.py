@@ -23,9 +23,8 @@ from msgspec import Meta
 from quakedesign.errors import ParameterError
 from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds, response_bounds
-from quakedesign.guarantees.exact.proof import Proof
+from quakedesign.guarantees.exact.proof import NoProof, Proof
 from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
-from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.plant_values import MOST, ExactSector, Matrix, Row, SlowLoad
 from quakedesign.sos.exact.strict import Entries, made, need, read_as, written
 from quakedesign.text import counted
@@ -46,7 +45,7 @@ class PlantClaims:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlantProof(Proof):
+class PlantProof(Proof[Row]):
     """Peaks of an uncertain plant under a sampled law, for all t ≥ 0; `check` decides them.
 
     Attributes
@@ -98,15 +97,17 @@ class PlantProof(Proof):
         """Peaks by the names of outputs and controls, in the units of the plant."""
         return dict(zip((*self.outputs, *self.controls), (*self.claims.outputs, *self.claims.controls), strict=True))
 
-    def check(self) -> Verdict:
-        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+    def recomputed(self) -> Row | NoProof:
+        """Peaks of outputs and controls that the theorem gives for `inputs`."""
         try:
             largest = peaks(self.part, response_bounds(self.part.loop(self.law), self.pieces), self.inputs)
-        except ParameterError:
-            return Verdict.UNDECIDED
-        claimed = (*self.claims.outputs, *self.claims.controls)
-        holds = largest is not None and all(a <= b for a, b in zip(largest, claimed, strict=True))
-        return Verdict.PROVED if holds else Verdict.UNDECIDED
+        except ParameterError as error:
+            return NoProof(reason=str(error))
+        return NoProof(reason="the bounds of the sectors exceed their inputs") if largest is None else largest
+
+    def supported(self, bounds: Row) -> bool:
+        """Whether no peak exceeds its claim."""
+        return all(a <= b for a, b in zip(bounds, (*self.claims.outputs, *self.claims.controls), strict=True))
 
     def statement(self) -> list[str]:
         """Lines of text: the statement, then the changes of the law."""

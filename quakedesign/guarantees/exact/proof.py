@@ -4,16 +4,23 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from fractions import Fraction
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.laws.implicit_root import ImplicitRoot
 from quakedesign.lyapunov.exact.claim import Verdict
 
+B = TypeVar("B")
 
-class Proof(ABC):
+
+class Proof(ABC, Generic[B]):
     """Claims about one loop that check themselves; base of one class for each theorem.
+
+    **Principle.** A theorem gives bounds of the claimed quantities up to time t, on every cell of the box of constants.
+    It may assume the claims up to t: slow sliding does for all inputs, tracking only for an implicit step and a slowly
+    varying input gain. Then each bound lies below its claim, or within it where earlier samples alone decide the input.
+    The quantities are continuous and within the claims at first, so none leaves its claim first.
 
     Attributes
     ----------
@@ -35,8 +42,6 @@ class Proof(ABC):
         Whether its law is sampled.
     root : ImplicitRoot or None
         Implicit step of its law.
-    slip_rate_error : UpperBound or None
-        [m/s]; None where it is not claimed.
     """
 
     __slots__ = ()
@@ -49,8 +54,19 @@ class Proof(ABC):
     sampled: ClassVar[bool] = True
 
     @abstractmethod
+    def recomputed(self) -> "B | NoProof":
+        """Bounds that the theorem gives on all cells, in ball arithmetic, or the reason why it gives none."""
+
+    @abstractmethod
+    def supported(self, bounds: B) -> bool:
+        """Whether the claims follow from bounds of the theorem."""
+
     def check(self) -> Verdict:
-        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
+        """PROVED if the claims follow from the bounds of the theorem; else UNDECIDED."""
+        bounds = self.recomputed()
+        if isinstance(bounds, NoProof) or not self.supported(bounds):
+            return Verdict.UNDECIDED
+        return Verdict.PROVED
 
     @abstractmethod
     def sentence(self) -> str:
@@ -83,11 +99,6 @@ class Proof(ABC):
     @property
     def root(self) -> ImplicitRoot | None:
         """Implicit step of the law."""
-        return None
-
-    @property
-    def slip_rate_error(self) -> UpperBound | None:
-        """Bound of the slip-rate error [m/s]."""
         return None
 
 

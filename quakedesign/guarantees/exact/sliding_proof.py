@@ -12,7 +12,6 @@ from quakedesign.guarantees.exact.proof import NoProof, Proof
 from quakedesign.guarantees.exact.sampled_loop import SampledLoop
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, cell_bounds, exponential, follows
 from quakedesign.lyapunov.exact.certificate_files import SLOW_SLIDING
-from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.sliding_plant import Cuts, SlidingPlant, cells
 
 if TYPE_CHECKING:
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @checked_dataclass(frozen=True, kw_only=True)
-class SlidingProof(Proof):
+class SlidingProof(Proof[Mapping[str, Fraction]]):
     """Claims about one loop in slow sliding; `check` decides them.
 
     Attributes
@@ -70,13 +69,19 @@ class SlidingProof(Proof):
         """The task on every cell."""
         return cells(self.task, self.cuts)
 
-    def check(self) -> Verdict:
-        """PROVED if the claims reproduce themselves on every cell, in ball arithmetic."""
+    def recomputed(self) -> Mapping[str, Fraction] | NoProof:
+        """Largest bounds over all cells by name, which follow from the claims, or the reason of the first cell."""
+        largest: dict[str, Fraction] = {}
         for cell in self.cells:
             bounds = cell_bounds(cell, self.held, self.claims)
-            if isinstance(bounds, NoProof) or not follows(bounds, self.claims):
-                return Verdict.UNDECIDED
-        return Verdict.PROVED
+            if isinstance(bounds, NoProof):
+                return bounds
+            largest = {name: max(bound, largest.get(name, bound)) for name, bound in bounds.items()}
+        return largest
+
+    def supported(self, bounds: Mapping[str, Fraction]) -> bool:
+        """Whether every bound lies below its claim."""
+        return follows(bounds, self.claims)
 
     @property
     def peak_slip_rate(self) -> UpperBound:

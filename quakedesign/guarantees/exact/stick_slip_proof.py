@@ -20,7 +20,6 @@ from quakedesign.guarantees.exact.tracking_proof import TrackingProof
 from quakedesign.laws import ImplicitRoot
 from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
-from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.fault_plant import FaultPlant
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StickSlipProof(Proof):
+class StickSlipProof(Proof[StickSlipClaims]):
     """Claims about one loop on the stick–slip plant, from rest; `check` decides them.
 
     Attributes
@@ -59,20 +58,16 @@ class StickSlipProof(Proof):
         return self.claims.peak_slip_rate
 
     @property
-    def slip_rate_error(self) -> UpperBound:
-        """Bound of the slip-rate error [m/s]; slip rate and reference rate are at least 0."""
-        return UpperBound(max(self.claims.peak_slip_rate, self.task.reference_rates[0]))
-
-    @property
     def motion(self) -> str:
         """States for which the slip rate is bounded, as text."""
         return ", whether the fault slides or sticks"
 
     @property
     def bounds(self) -> Mapping[str, Bound]:
-        """Claims by name, SI."""
+        """Claims by name, SI; both errors follow from them, since slip rate and reference rate are at least 0."""
         named = {part.name: getattr(self.claims, part.name) for part in fields(self.claims)}
-        return named | {"slip_error": self.claims.slip_error, "slip_rate_error": self.slip_rate_error}
+        rate_error = UpperBound(max(self.claims.peak_slip_rate, self.task.reference_rates[0]))
+        return named | {"slip_error": self.claims.slip_error, "slip_rate_error": rate_error}
 
     @property
     def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
@@ -148,12 +143,9 @@ class StickSlipProof(Proof):
         except ParameterError as error:
             return NoProof(reason=str(error))
 
-    def check(self) -> Verdict:
-        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        bounds = self.recomputed()
-        sound = isinstance(bounds, StickSlipClaims) and self.claims.follow(bounds)
-        sound = sound and self.healing >= 0 and self.disturbance >= 0
-        return Verdict.PROVED if sound else Verdict.UNDECIDED
+    def supported(self, bounds: StickSlipClaims) -> bool:
+        """Whether the claims follow, and the task's disturbance includes the healing."""
+        return self.claims.follow(bounds) and self.healing >= 0 and self.disturbance >= 0
 
     def to_dict(self) -> dict[str, Any]:
         """Exact numbers as texts, SI."""

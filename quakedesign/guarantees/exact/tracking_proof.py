@@ -27,7 +27,6 @@ from quakedesign.guarantees.exact.small_gain import (
 from quakedesign.laws import ImplicitRoot, RestLimit
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
 from quakedesign.lyapunov.exact.certificate_files import GUARANTEE
-from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant.fault_plant import FaultPlant
 
 if TYPE_CHECKING:
@@ -129,10 +128,10 @@ class Claims:
             **dict(zip(_ENDS, ends, strict=False)),
         )
 
-    def verdict(self, task: FaultPlant, bounds: Bounds) -> Verdict:
-        """PROVED if the claims follow from the bounds and the fault stays closed, else UNDECIDED."""
+    def follow(self, task: FaultPlant, bounds: Bounds) -> bool:
+        """Whether the claims follow from the bounds, and the fault stays closed."""
         tightest = Claims.of(task, bounds)
-        return Verdict.PROVED if self.covers(tightest) and not tightest.opens(task) else Verdict.UNDECIDED
+        return self.covers(tightest) and not tightest.opens(task)
 
     def opens(self, task: FaultPlant) -> str:
         """Reason why the fault may open; empty if the pressure stays below σ′."""
@@ -191,7 +190,7 @@ _FIRST = Fraction(1, 64)  # first ramp time over T_s
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class TrackingProof(Proof):
+class TrackingProof(Proof[Bounds]):
     """Claims about one loop on one task, on the plant without stick; `check` decides them.
 
     Attributes
@@ -224,11 +223,6 @@ class TrackingProof(Proof):
     def peak_slip_rate(self) -> UpperBound:
         """Bound of the slip rate [m/s], for all t ≥ 0."""
         return self.claims.peak_slip_rate
-
-    @property
-    def slip_rate_error(self) -> UpperBound:
-        """Bound of the slip-rate error [m/s], for all t ≥ 0."""
-        return self.claims.slip_rate_error
 
     @property
     def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
@@ -301,16 +295,14 @@ class TrackingProof(Proof):
             return gains
         return _slow_bounds(self.task, self.held, self.slow_gain, gains, self.claims.slip_error)
 
-    def check(self) -> Verdict:
-        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        bounds = self.recomputed()
-        if not bounds.proved or not _root_within(self.task, self.held, self.claims):
-            return Verdict.UNDECIDED
-        if _beyond_the_pump(self.held, self.claims):
-            return Verdict.UNDECIDED
-        if self.slow_gain is not None and not bounds.slip_error < self.claims.slip_error:
-            return Verdict.UNDECIDED
-        return self.claims.verdict(self.task, bounds)
+    def supported(self, bounds: Bounds) -> bool:
+        """Whether the claims follow, keep an implicit step in its sector, and the pressure within the pump's limits."""
+        return (
+            _root_within(self.task, self.held, self.claims)
+            and not _beyond_the_pump(self.held, self.claims)
+            and (self.slow_gain is None or bounds.slip_error < self.claims.slip_error)
+            and self.claims.follow(self.task, bounds)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Exact claims as texts, SI."""
@@ -517,7 +509,7 @@ PREMISES = (
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class ContinuousProof(Proof):
+class ContinuousProof(Proof[Bounds]):
     """Claims about a law in continuous time; `check` decides them.
 
     Attributes
@@ -547,10 +539,9 @@ class ContinuousProof(Proof):
         """Bounds that the theorem gives."""
         return _continuous_bounds(self.task, self.law)
 
-    def check(self) -> Verdict:
-        """PROVED if the theorem gives the claims, in ball arithmetic; else UNDECIDED."""
-        bounds = self.recomputed()
-        return self.claims.verdict(self.task, bounds) if bounds.proved else Verdict.UNDECIDED
+    def supported(self, bounds: Bounds) -> bool:
+        """Whether the claims follow, and the fault stays closed."""
+        return self.claims.follow(self.task, bounds)
 
     def to_dict(self) -> dict[str, Any]:
         """Exact claims as texts, SI, and their assumptions."""

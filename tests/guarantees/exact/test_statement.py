@@ -241,7 +241,7 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
     ends = {"least_pressure": LowerBound(F(-(10**9))), "largest_pressure": UpperBound(F(10**9))}
     wide = replace(CLAIMS, **ends, least_asked=None, largest_asked=None, largest_step=None)
     bounds = replace(BOUNDS, push=(TASK.normal_stress - off - TASK.rest_pressure[1]) * TASK.authority)
-    assert wide.verdict(TASK, bounds) is (Verdict.PROVED if proved else Verdict.UNDECIDED)
+    assert wide.follow(TASK, bounds) is proved
     monkeypatch.setattr(statement, "_bounds", lambda *_: bounds)
     found = TrackingProof(task=TASK, held=HELD, claims=wide)
     assert found.check() is (Verdict.PROVED if proved else Verdict.UNDECIDED)
