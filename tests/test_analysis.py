@@ -11,7 +11,7 @@ from quakedesign.laws import published
 from quakedesign.linear.linear_problem import FeedbackLoop, floats
 from quakedesign.linear.robust_stability import analysis, why_undecided
 from quakedesign.lyapunov import Verdict
-from quakedesign.lyapunov.exact.fault_bounds import Sectors, sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import Sectors, sectors
 
 LAB = qd.load_fault("lab-fault")
 GOOD = published("lab-fault")["elqr"]

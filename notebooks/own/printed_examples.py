@@ -5,7 +5,7 @@ from fractions import Fraction
 
 from scipy.optimize import minimize_scalar
 
-from quakedesign.lyapunov.exact.fault_bounds import Sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import Sectors
 from quakedesign.fault import load_fault
 from quakedesign.linear.linear_problem import decreases
 from own.printed_theorem import Switching, printed_row

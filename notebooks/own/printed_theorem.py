@@ -40,7 +40,7 @@ from quakedesign.linear.linear_problem import (
     trace_of_product,
 )
 from quakedesign.lyapunov import Verdict
-from quakedesign.lyapunov.exact.fault_bounds import least_authority, plant_ranges, rest_pressure
+from quakedesign.lyapunov.exact.perturbation_bounds import least_authority, plant_ranges, rest_pressure
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 

@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from quakedesign import load_fault
 from quakedesign.laws import Signals, control_law
-from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
 from quakedesign.plant import uncertain_plant
 from quakedesign.studies.errata import ErrataRow, Finding
 from quakedesign.symbolic import plant

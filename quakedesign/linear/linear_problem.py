@@ -18,7 +18,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import end_of, fraction_of, rational
 from quakedesign.fault import Fault
 from quakedesign.lyapunov import Loop
-from quakedesign.lyapunov.exact.fault_bounds import Sectors, sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import Sectors, sectors
 from quakedesign.sos.exact.polynomial import positive_definite
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.terms import value

@@ -36,7 +36,7 @@ from quakedesign.linear.linear_problem import (
     times,
     total,
 )
-from quakedesign.lyapunov.exact.fault_bounds import Sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import Sectors
 from quakedesign.lyapunov.search.lyapunov_search import quadratic_terms
 from quakedesign.symbolic.terms import Term
 

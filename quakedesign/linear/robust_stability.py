@@ -20,8 +20,8 @@ from quakedesign.laws import Controller
 from quakedesign.linear.frequency import FrequencyFacts, circle_limit, frequency_properties, slip_limit
 from quakedesign.linear.linear_problem import FeedbackLoop, Polytope, Vertex, modal_scaling, polytope_of
 from quakedesign.lyapunov import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
-from quakedesign.lyapunov.exact.fault_bounds import Sectors, plant_ranges, sectors
 from quakedesign.lyapunov.exact.obligations import Obligation, claimed, different
+from quakedesign.lyapunov.exact.perturbation_bounds import Sectors, plant_ranges, sectors
 from quakedesign.lyapunov.search.lyapunov_search import below, finish, quadratic_margin, quadratic_terms
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.proofs import Square

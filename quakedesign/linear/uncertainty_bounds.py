@@ -7,7 +7,13 @@ from typing import Any
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, float_above, float_below, fraction_of, rational, shortly
 from quakedesign.fault import Fault
-from quakedesign.lyapunov.exact.fault_bounds import Sectors, least_authority, plant_ranges, rest_pressure, sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import (
+    Sectors,
+    least_authority,
+    plant_ranges,
+    rest_pressure,
+    sectors,
+)
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 

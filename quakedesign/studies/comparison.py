@@ -30,7 +30,7 @@ from quakedesign.linear.sampled_stability import HeldLoop
 from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
-from quakedesign.lyapunov.exact.fault_bounds import equilibrium_pressure, sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import equilibrium_pressure, sectors
 from quakedesign.lyapunov.exact.premises import Variant
 from quakedesign.parallel import Background, in_background
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate

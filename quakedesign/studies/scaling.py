@@ -19,7 +19,7 @@ from quakedesign.laws.gain_scaling import (
     law_dimensions,
     printed_gains,
 )
-from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
 from quakedesign.studies.single_runs import choice
 
 SCALED = {

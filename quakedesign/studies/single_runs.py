@@ -42,7 +42,7 @@ from quakedesign.loop.sensing import (
 from quakedesign.loop.sensing.measurement import EXACT, Measurement
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
-from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
 from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.plant import plant_like, slow_sliding_plant
 from quakedesign.simulation import (

@@ -33,7 +33,7 @@ from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.lyapunov import Certificate, Verdict
 from quakedesign.lyapunov.exact.domain import Domain
-from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
 from quakedesign.lyapunov.exact.premises import Premise, Variant
 from quakedesign.plant import uncertain_plant
 from quakedesign.synthesis.method import GainProblem, SlowSlidingDesign, method_of

@@ -38,7 +38,7 @@ from quakedesign.linear.sampled_stability import HeldLoop
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup
 from quakedesign.lyapunov import Certificate, Verdict, decided_once
 from quakedesign.lyapunov.exact.domain import Domain
-from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.lyapunov.exact.premises import Premise, Variant, linear_premises
 from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.plant import FaultPlant, uncertain_plant

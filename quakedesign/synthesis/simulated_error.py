@@ -15,7 +15,7 @@ from quakedesign.fault import Fault
 from quakedesign.laws import Controller, control_law
 from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Loop
-from quakedesign.lyapunov.exact.fault_bounds import coefficient_range, least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import coefficient_range, least_authority
 from quakedesign.lyapunov.gains.path_following import look, scaled_norm, short, with_gains
 from quakedesign.lyapunov.gains.synthesise import ComparedGains, Synthesis, SynthesisProblem, question, synthesise
 from quakedesign.lyapunov.search.certify import Number

@@ -28,7 +28,12 @@ from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.loop.loop_setup import MEASURED, LoopSetup
 from quakedesign.lyapunov import Certificate, Loop, loop_of
 from quakedesign.lyapunov.exact.domain import Domain
-from quakedesign.lyapunov.exact.fault_bounds import Errors, coefficient_range, largest_matched_rate, least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import (
+    Errors,
+    coefficient_range,
+    largest_matched_rate,
+    least_authority,
+)
 from quakedesign.lyapunov.exact.premises import Premise, Variant, feedforward_variants, sliding_mode_premises
 from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.plant import FaultPlant

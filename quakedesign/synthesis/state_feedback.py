@@ -39,7 +39,7 @@ from quakedesign.linear.sampled_stability import HeldLoop, sampled_loop
 from quakedesign.loop.loop_setup import MEASURED, LoopSetup
 from quakedesign.loop.sensing.differentiator import by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
-from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.lyapunov.search.lyapunov_search import claims_of, find_certificate, finish, quadratic_margin
 from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, SlowSlidingDesign, Wanted, method_of

@@ -10,7 +10,7 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.linear.frequency import circle_limit, frequency_properties, slip_limit
 from quakedesign.linear.linear_problem import FeedbackLoop, floats
-from quakedesign.lyapunov.exact.fault_bounds import Sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import Sectors
 
 
 def loop_of(gains, *, beta, slip, rate):

@@ -14,7 +14,7 @@ from quakedesign.linear.linear_problem import Polytope, polytope_of
 from quakedesign.linear.riccati import riccati_design, vertex_poles
 from quakedesign.linear.robust_stability import CommonQuadratic, robust_stability, sector_loop
 from quakedesign.lyapunov import Verdict
-from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 
 CHECKER = Path(__file__).parents[2] / "proofs" / "check.py"
 

@@ -20,7 +20,7 @@ from quakedesign.linear.robust_stability import (
     sector_loop,
 )
 from quakedesign.lyapunov import Verdict
-from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 
 
 @pytest.fixture(scope="module", params=["real-fault", "lab-fault"])

@@ -11,7 +11,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.laws import Signals, published
 from quakedesign.linear.linear_problem import Polytope, modal_scaling, polytope_of
 from quakedesign.linear.robust_stability import sector_loop
-from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.symbolic import plant
 
 

@@ -9,7 +9,7 @@ import pytest
 from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.exact import rational
 from quakedesign.fault import load_fault
-from quakedesign.lyapunov.exact.fault_bounds import least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
 from quakedesign.report.plain_text import scale_lines
 from quakedesign.studies.scaling import scale_answer
 

@@ -288,7 +288,7 @@ def test_strengthening_is_seen():
 def test_every_proof_asks_for_confirmed_bounds():
     """Premises, sectors, margins, feed-forward: a declared slope that is too small by a thousand stops each of them."""
     from quakedesign.laws.feed_forward import feed_forward
-    from quakedesign.lyapunov.exact.fault_bounds import friction_range, sectors
+    from quakedesign.lyapunov.exact.perturbation_bounds import friction_range, sectors
     from quakedesign.synthesis import design
 
     fault = replace(LAB, friction=hyperbolic(slip_slope=0.1))

@@ -14,7 +14,7 @@ from quakedesign.fault import Disturbance
 from quakedesign.laws import published
 from quakedesign.linear.riccati import riccati_design, vertex_poles
 from quakedesign.lyapunov import Verdict
-from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.simulation.integrators import amplification
 from quakedesign.synthesis import assess
 from quakedesign.synthesis.sliding_mode_design import smallest_root

@@ -20,7 +20,7 @@ from quakedesign.fault import Fault
 from quakedesign.files import Json
 from quakedesign.laws import SlidingMode
 from quakedesign.lyapunov.exact.certificate import Certificate
-from quakedesign.lyapunov.exact.fault_bounds import (
+from quakedesign.lyapunov.exact.perturbation_bounds import (
     Errors,
     coefficient_range,
     largest_matched_rate,

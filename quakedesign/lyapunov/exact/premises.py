@@ -22,7 +22,8 @@ from quakedesign.laws.feed_forward import FEED_FORWARDS, FeedForward, feed_forwa
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.claim import Loop, require
 from quakedesign.lyapunov.exact.domain import Domain, DomainProblem, certified_domain, certified_lipschitz
-from quakedesign.lyapunov.exact.fault_bounds import (
+from quakedesign.lyapunov.exact.loop_expressions import sympy_field
+from quakedesign.lyapunov.exact.perturbation_bounds import (
     Errors,
     Range,
     coefficient_range,
@@ -34,7 +35,6 @@ from quakedesign.lyapunov.exact.fault_bounds import (
     rest_pressure,
     sectors,
 )
-from quakedesign.lyapunov.exact.loop_expressions import sympy_field
 from quakedesign.lyapunov.exact.robustness import LevelSets, robustness
 from quakedesign.symbolic import plant
 from quakedesign.symbolic.homogeneity import relative_degree

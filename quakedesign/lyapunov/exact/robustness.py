@@ -15,10 +15,10 @@ from quakedesign.exact import end_of
 from quakedesign.laws import LoopField
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.claim import require
-from quakedesign.lyapunov.exact.fault_bounds import Errors
 from quakedesign.lyapunov.exact.forms import Form, Problem, largest_ratio
 from quakedesign.lyapunov.exact.loop_expressions import error_units, full_field
 from quakedesign.lyapunov.exact.obligations import Obligations, obligation_degree
+from quakedesign.lyapunov.exact.perturbation_bounds import Errors
 from quakedesign.symbolic.enclosure import enclose
 from quakedesign.symbolic.term_expressions import from_terms, lie_derivative, to_terms
 from quakedesign.symbolic.terms import Term, cell_polynomial

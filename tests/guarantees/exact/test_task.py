@@ -9,8 +9,8 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.fault.friction.weakening import ExponentialSlipWeakening
-from quakedesign.lyapunov.exact import fault_bounds as matched
-from quakedesign.lyapunov.exact.fault_bounds import rest_pressure, sectors
+from quakedesign.lyapunov.exact import perturbation_bounds as matched
+from quakedesign.lyapunov.exact.perturbation_bounds import rest_pressure, sectors
 from quakedesign.plant import uncertain_plant
 from quakedesign.symbolic import plant
 

@@ -13,7 +13,12 @@ from quakedesign.laws import control_law
 from quakedesign.laws.feed_forward import FEED_FORWARDS, feed_forward
 from quakedesign.lyapunov.exact import robustness as robustness_module
 from quakedesign.lyapunov.exact.domain import DomainProblem, certified_domain
-from quakedesign.lyapunov.exact.fault_bounds import Errors, largest_matched_rate, largest_sensitivities, least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import (
+    Errors,
+    largest_matched_rate,
+    largest_sensitivities,
+    least_authority,
+)
 from quakedesign.lyapunov.exact.premises import feedforward_variants, sliding_mode_premises
 from quakedesign.lyapunov.exact.robustness import LevelSets, robustness
 from quakedesign.symbolic.terms import value

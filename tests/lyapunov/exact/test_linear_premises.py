@@ -14,7 +14,7 @@ from quakedesign.fault import Disturbance, FrictionLaw, UncertaintyBox, friction
 from quakedesign.laws import published
 from quakedesign.laws.elqr import PressureLimits
 from quakedesign.lyapunov import Certificate, Loop
-from quakedesign.lyapunov.exact.fault_bounds import (
+from quakedesign.lyapunov.exact.perturbation_bounds import (
     Errors,
     equilibrium_pressure,
     initial_perturbation,

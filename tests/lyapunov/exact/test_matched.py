@@ -9,7 +9,7 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.fault import Disturbance, friction_law
-from quakedesign.lyapunov.exact.fault_bounds import (
+from quakedesign.lyapunov.exact.perturbation_bounds import (
     Errors,
     initial_perturbation,
     largest_matched_rate,

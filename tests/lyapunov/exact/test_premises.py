@@ -13,7 +13,7 @@ from quakedesign.fault import Disturbance
 from quakedesign.laws import control_law, published
 from quakedesign.laws.feed_forward import FEED_FORWARDS, feed_forward
 from quakedesign.lyapunov.exact.claim import Equilibrium
-from quakedesign.lyapunov.exact.fault_bounds import (
+from quakedesign.lyapunov.exact.perturbation_bounds import (
     Errors,
     coefficient_range,
     largest_matched_rate,

@@ -13,8 +13,8 @@ from quakedesign.exact import rational, to_sympy
 from quakedesign.fault import Disturbance, UncertaintyBox, friction_law, load_fault
 from quakedesign.laws import published
 from quakedesign.lyapunov import Certificate, Loop
-from quakedesign.lyapunov.exact import fault_bounds
-from quakedesign.lyapunov.exact.fault_bounds import sectors
+from quakedesign.lyapunov.exact import perturbation_bounds as bounds
+from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.lyapunov.exact.premises import Premise, linear_premises
 from quakedesign.plant import uncertain_plant
 from quakedesign.symbolic import plant
@@ -137,14 +137,14 @@ def test_the_stress_at_rest_by_hand():
 def test_ball_arithmetic_encloses_the_ranges_of_the_plant_and_is_less_tight(name, widths):
     """A second derivation: friction in symbols, its stress at rest in balls. It was 0.35 % wider, never narrower."""
     fault = replace(load_fault(name), box=UncertaintyBox(name="own", **widths))
-    ranges, start = fault_bounds.plant_ranges(fault), to_sympy(fault_bounds.static_friction(fault))
-    known = {fault_bounds._growth: to_sympy(rational(fault.disturbance.slip_growth)), fault_bounds._drift: 0}
-    net = fault_bounds._net_stress().subs(known | {plant.mu_star: start})
+    ranges, start = bounds.plant_ranges(fault), to_sympy(bounds.static_friction(fault))
+    known = {bounds._growth: to_sympy(rational(fault.disturbance.slip_growth)), bounds._drift: 0}
+    net = bounds._net_stress().subs(known | {plant.mu_star: start})
     slope = to_sympy(friction_bounds(fault.friction).slip_slope)
-    least = sp.Max(to_sympy(fault_bounds.friction_range(fault)[0]), start - slope * fault_bounds._r)
+    least = sp.Max(to_sympy(bounds.friction_range(fault)[0]), start - slope * bounds._r)
     box = {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)}
-    box |= {fault_bounds._r: (F(0), rational(fault.reference.target_slip))}
-    numerator = sp.collect(sp.expand(net * fault_bounds._mu), fault_bounds._r)
+    box |= {bounds._r: (F(0), rational(fault.reference.target_slip))}
+    numerator = sp.collect(sp.expand(net * bounds._mu), bounds._r)
     enclosed = upper_bound(numerator / least, box, pieces=400)
     largest = sectors(fault).largest_effective_stress
     assert largest == max(map(abs, uncertain_plant(fault).stress))

@@ -13,8 +13,8 @@ from quakedesign.fault import load_fault
 from quakedesign.laws.cta import ContinuousTwisting
 from quakedesign.laws.dia import DiscontinuousIntegral
 from quakedesign.lyapunov import Verdict, loop_of
-from quakedesign.lyapunov.exact.fault_bounds import least_authority
 from quakedesign.lyapunov.exact.loop_expressions import error_units
+from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
 from quakedesign.symbolic import SignedPower
 from quakedesign.synthesis.design import assess
 

@@ -14,7 +14,7 @@ from quakedesign.laws.feed_forward import NONE, feed_forward
 from quakedesign.lyapunov import Certificate, Loop
 from quakedesign.lyapunov.exact import domain
 from quakedesign.lyapunov.exact.domain import DomainProblem, certified_domain, certified_lipschitz
-from quakedesign.lyapunov.exact.fault_bounds import Errors, least_authority
+from quakedesign.lyapunov.exact.perturbation_bounds import Errors, least_authority
 from quakedesign.lyapunov.exact.robustness import Robustness
 from quakedesign.symbolic.terms import Term
 

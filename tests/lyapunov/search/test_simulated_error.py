@@ -17,7 +17,7 @@ def fault():
 
 def test_the_scale_makes_the_unit_bound_enough_for_the_fault(fault):
     trial = sampling(fault)
-    from quakedesign.lyapunov.exact.fault_bounds import Errors, largest_matched_rate
+    from quakedesign.lyapunov.exact.perturbation_bounds import Errors, largest_matched_rate
 
     needed = largest_matched_rate(fault, trial.divisor, Errors())
     assert 1.1 * float(needed) <= float(trial.scale) <= 1.25 * float(needed)

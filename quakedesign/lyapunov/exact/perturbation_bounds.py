@@ -1,4 +1,4 @@
-"""Rigorous bounds of a fault: matched perturbation, control coefficient, sectors, pressure.
+"""Bounds of the matched perturbation, the input gain, sectors and equilibrium pressures of a fault.
 
 All bounds hold over the uncertainty box and are computed in ball arithmetic. Chapters: bounds of the
 matched perturbation h and its rate, with and without feed-forward; sectors and equilibrium pressures
@@ -22,7 +22,7 @@ from quakedesign.symbolic.enclosure import enclose, upper_bound
 from quakedesign.symbolic.friction_bounds import friction_bounds
 
 # ----------------------------------------------------------------------
-# What the matched perturbation h of a fault asks for, with and without feed-forward. Ball arithmetic only.
+# Matched perturbation h and its rate, with and without feed-forward, in ball arithmetic.
 
 Range = tuple[Fraction, Fraction]
 
