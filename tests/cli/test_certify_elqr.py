@@ -109,7 +109,7 @@ def test_a_design_in_continuous_time_is_reported_with_its_peaks_and_without_a_gu
     arguments = ("design", short(tmp_path), "--controller", "elqr", "--continuous", "--out", str(out), "--json")
     code, said, _ = run(capsys, *arguments)
     found = json.loads(said)["controllers"]["elqr"]
-    assert code == 0
+    assert code == 1  # no guarantee at the fault's own T_s
     assert found["guarantee"]["sentence"].startswith("none: ")
     assert found["guarantee"]["verdict"] == "undecided"
     assert set(found["gains"]) == {"k1", "k2", "k3", "k4"}
@@ -127,7 +127,9 @@ def test_a_design_is_reported_with_the_guarantee_of_the_loop_that_ran(capsys, tm
     found = json.loads(said)["controllers"]["elqr"]
     assert code == 0
     assert next(iter(found)) == "guarantee"
-    assert found["guarantee"]["sentence"].startswith("from rest, with zero-order hold over 0.001 s")
+    assert found["guarantee"]["sentence"].startswith(
+        "on the plant without stick, from rest, with zero-order hold over 0.001 s"
+    )
     told, metrics = found["guarantee"], found["metrics"]
     assert metrics["peak_slip_rate"] <= Fraction(told["peak_slip_rate"])
     assert Fraction(told["pressure"][0]) <= metrics["min_pressure"] < metrics["max_pressure"]

@@ -96,7 +96,7 @@ def test_bad_input_is_one_line_and_code_two(command, wrong, capsys, tmp_path, mo
 
 @pytest.mark.slow
 def test_all_figures_of_the_laboratory_fault(tmp_path):
-    command = [sys.executable, "-m", "quakedesign", "figures", "lab-fault", "--json"]
+    command = [sys.executable, "-m", "quakedesign", "figures", "lab-fault", "--plant", "printed", "--json"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
     found, folder = json.loads(done.stdout), tmp_path / "quakedesign-lab-fault-figures"
