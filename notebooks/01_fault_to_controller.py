@@ -55,7 +55,7 @@ print(cta.guarantee.sentence())
 display(cta)
 
 # %% [markdown]
-# In continuous time, as in the paper, a proof needs more **premises**. `level_set` does not hold: the initial condition is outside the region where the bound on $|\dot h|$ is proved.
+# In continuous time, as in the paper, a proof needs more **premises**. Here `level_set` does not hold: the initial condition is outside the region where the bound on $|\dot h|$ is proved.
 
 # %%
 paper = qd.design(fault, "cta", continuous=True)
@@ -66,7 +66,7 @@ for premise in paper.premises:
 
 # %% [markdown]
 # ## A forged certificate
-# If one gain of a certificate is replaced, the check rejects the certificate. The changed set of gains may still have a proof of its own.
+# If one gain of a certificate is replaced, the check rejects the certificate. The changed gains may still have another proof.
 
 # %%
 loop = cta.certificate.loop

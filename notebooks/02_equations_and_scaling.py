@@ -14,7 +14,7 @@
 # %% [markdown]
 # # From the force balance to instability and scaling
 #
-# Nothing on this page is typed in that can be derived: the equations come from one force balance, the verdicts from exact arithmetic.
+# This page derives the equations from one force balance, and the verdicts by exact arithmetic.
 
 # %%
 import dataclasses
@@ -30,13 +30,13 @@ from quakedesign.symbolic import critical_stiffness, nucleation_length, stabilit
 display(plant.force_balance())
 
 # %% [markdown]
-# Measured from the equilibrium without pressure and disturbance, per unit mass, with $x_1$ the slip [m] and $x_2$ the slip rate [m/s]:
+# Relative to the equilibrium without pressure and disturbance, and per unit mass ($x_1$: slip [m], $x_2$: slip rate [m/s]):
 
 # %%
 display(plant.shifted_acceleration())
 
 # %% [markdown]
-# The Jacobian keeps the pressure $p$, because withdrawal ($p<0$) raises the softening. The origin is unstable if **either** inequality holds.
+# The Jacobian contains the pressure $p$, because withdrawal ($p<0$) increases the softening. The origin is unstable if **either** inequality holds.
 
 # %%
 fault = qd.load_fault("real-fault")
@@ -60,8 +60,8 @@ from quakedesign.report import stability_map
 display(stability_map(fault))
 
 # %% [markdown]
-# ## Friction of one's own
-# [own/hyperbolic_friction.py](own/hyperbolic_friction.py) lies outside the package. It goes through the same calls.
+# ## User-defined friction
+# [own/hyperbolic_friction.py](own/hyperbolic_friction.py) lies outside the package. The same functions accept it.
 
 # %%
 from own.hyperbolic_friction import HyperbolicWeakening
@@ -72,8 +72,8 @@ print(stability(mine).outcome.name.lower())
 display(qd.derive(mine).acceleration)
 
 # %% [markdown]
-# ## A control law of one's own
-# [own/third_order_law.py](own/third_order_law.py) has signed powers inside a sign. The weights that make it homogeneous follow from linear equations;
+# ## A user-defined control law
+# [own/third_order_law.py](own/third_order_law.py) has signed powers inside a sign function. The weights that make it homogeneous follow from linear equations;
 # the degree is then proved by an identity, or refuted by a point.
 
 # %%

@@ -14,8 +14,8 @@
 # %% [markdown]
 # # Certificates: read one, check one, break one
 #
-# A certificate is a text file with a Lyapunov function and rational numbers that prove it. This page opens one, has it verified by two programs
-# that share no code, changes single numbers until both refuse it, and ends with a law that this package has never seen.
+# A certificate is a text file with a Lyapunov function and rational numbers that prove it. This page opens one and verifies it with two programs
+# that share no code. It then changes single numbers, whereupon both reject the file, and ends with a user-defined law.
 
 # %%
 import dataclasses
@@ -46,7 +46,7 @@ print(verdict)
 print("\n".join(lines))
 
 # %% [markdown]
-# `positive` is $\varepsilon$ in $V \ge \varepsilon\sum u_i^5$, `decrease` is $\varepsilon'$ in $\dot V \le -\varepsilon'\sum u_i^4$. `bound_…` give the size of every error from $V$, and `decay` is
+# `positive` is $\varepsilon$ in $V \ge \varepsilon\sum u_i^5$, `decrease` is $\varepsilon'$ in $\dot V \le -\varepsilon'\sum u_i^4$. `bound_…` bound every error by $V$, and `decay` is
 # $\kappa$ in $\dot V \le -\kappa V^{4/5}$: the origin is reached within $\frac{5}{\kappa}V(0)^{1/5}$.
 
 # %%
@@ -56,7 +56,7 @@ print(f"settles from |e_i| <= 1 within {settling(certificate, 1).seconds:.3g} s"
 
 # %% [markdown]
 # ## What proves it
-# One witness for every polynomial: squares times products of the variables, in matrices that must be positive definite.
+# Every polynomial has a witness: squares times products of the variables, as matrices that must be positive definite.
 
 # %%
 raw = json.loads(path.read_text())
@@ -67,7 +67,7 @@ for square in witness["squares"]:
 
 # %% [markdown]
 # ## Two checkers
-# `quakedesign check` derives the field from the law again. `proofs/check.py` needs nothing but Python, and says what it could not know.
+# `quakedesign check` derives the field from the law again. `proofs/check.py` needs only Python, and says what it did not verify.
 
 
 # %%
@@ -84,7 +84,7 @@ display(both)
 
 # %% [markdown]
 # ## Break it
-# One entry of one matrix, one gain, one coefficient of $V$, one claim, the range of the disturbance. Each change is a thousandth.
+# One entry of one matrix, one gain, one coefficient of $V$, one claim, the range of the disturbance. Each is changed by a thousandth.
 
 
 # %%
@@ -130,8 +130,8 @@ broken = {edit.__name__: changed(edit) for edit in (edit_gram, edit_gain, edit_f
 display(broken)
 
 # %% [markdown]
-# ## A law of one's own, with a nested power
-# $\nu = -k_2\lceil e_1 + k_1\lceil e_2\rfloor^{3/2}\rfloor^{1/3} + \xi$, $\dot\xi = -k_3\lceil e_1\rfloor^0$. The field is all there is to say: the nested power gets a variable of its own, candidates for $V$ follow from
+# ## A user-defined law with a nested power
+# $\nu = -k_2\lceil e_1 + k_1\lceil e_2\rfloor^{3/2}\rfloor^{1/3} + \xi$, $\dot\xi = -k_3\lceil e_1\rfloor^0$. Only the field is given. An additional variable replaces the nested power, candidates for $V$ follow from
 # weights and degree, and the same call proves the gains.
 
 # %%
@@ -156,7 +156,7 @@ own_verdict, own = qd.certify(mine, ("0.5", "8", "2"), lipschitz="1", gain_range
 print(own_verdict, "with lifts", own.loop.lifts)
 
 # %% [markdown]
-# Its file is checked again with the field, since no name in the package stands for it; `proofs/check.py` verifies it as it is.
+# The package re-checks the file together with the field, because it has no name for this law. `proofs/check.py` verifies the file alone.
 
 # %%
 file = Path("own.json")

@@ -14,8 +14,8 @@
 # %% [markdown]
 # # Gain design: the smallest, the fastest, the most tolerant
 #
-# Gains of sliding modes are usually taken from a published list. Here they are found, together with the Lyapunov function that proves them. Whatever is returned
-# has a certificate that was checked in exact arithmetic; what a solver merely believes is never returned.
+# Gains of sliding modes are usually taken from a published list. Here they are synthesised, together with the Lyapunov function that proves them. Every result
+# has a certificate that was checked in exact arithmetic; the status of a solver is never a verdict.
 
 # %%
 import pandas as pd
@@ -29,8 +29,8 @@ from quakedesign.lyapunov import largest_lipschitz
 
 # %% [markdown]
 # ## The smallest gains for a given disturbance
-# With $e \to \lambda e$ a set of gains for $|\dot h| \le \bar L$ becomes one for $\lambda\bar L$; the norm $\|(k_1\bar L^{-2/3}, k_2\bar L^{-1/2}, k_3/\bar L, k_4/\bar L)\|_2$ does not change, so it compares shapes, not sizes. The exponents follow from the terms
-# of the field. From the gains in the literature the search steps along the bilinear inequalities, moving $V$ and the gains together.
+# With $e \to \lambda e$ a set of gains for $|\dot h| \le \bar L$ becomes one for $\lambda\bar L$; the norm $\|(k_1\bar L^{-2/3}, k_2\bar L^{-1/2}, k_3/\bar L, k_4/\bar L)\|_2$ does not change, so it compares ratios of gains, not their scale. The exponents follow from the terms
+# of the field. The search starts from the gains in the literature and follows the bilinear inequalities, changing $V$ and the gains together.
 
 # %%
 small = synthesise("cta", "norm", lipschitz=1, degrees=(5, 6), starts=1)
@@ -39,7 +39,7 @@ print("checked again:", small.certificate.check())
 display(pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.norm, "times larger": c.ratio} for c in small.compared]))
 
 # %% [markdown]
-# Small is not everything: how far do these gains reach beyond $\bar L = 1$, against the limit $k_3-k_4$ that no Lyapunov function can pass?
+# Up to which $\bar L > 1$ are these gains proved, compared with the limit $k_3-k_4$ that no Lyapunov function can exceed?
 
 # %%
 reach = {
@@ -54,9 +54,9 @@ for name, found in reach.items():
 
 # %% [markdown]
 # ## Other objectives, at equal norm
-# `"beta"` asks for the widest range $[b/\rho, b\rho]$ of the control coefficient, `"decay"` for the shortest certified settling time from $|e_i| \le \bar L$, told as one
-# over it: $\kappa$ alone would depend on how $V$ is scaled. The smallest published set lends its norm as the bound, and every set gets the best $V$ that is found for it,
-# too; the others have larger norms. (`benchmarks/synthesis.py` asks about every objective at the norm of every set.)
+# `"beta"` maximises the range $[b/\rho, b\rho]$ of the control coefficient. `"decay"` minimises the certified settling time from $|e_i| \le \bar L$, reported as its
+# reciprocal: $\kappa$ alone would depend on the scale of $V$. The norm of the smallest published set is the bound; the other sets have larger norms. Every published set also gets
+# the best $V$ that is found for it. (`benchmarks/synthesis.py` runs every objective at the norm of every set.)
 
 # %%
 wide = synthesise("cta", "beta", degrees=(5,), starts=1)
@@ -65,7 +65,7 @@ display(pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.no
 
 # %% [markdown]
 # ## A map
-# A coarse map over $k_1$ and $k_2$ around the first published set, at two levels of $\bar L$, with $V$ of degree 5: shades are screened in floating point, markers
+# A coarse map over $k_1$ and $k_2$ around the first published set, at two levels of $\bar L$, with $V$ of degree 5. Shaded points are screened in floating point; markers
 # are proved exactly. (The gains found above lie outside: they need a $V$ of degree 6.)
 
 # %%
@@ -77,7 +77,7 @@ print(counts)
 display(gain_map_figure(drawn))
 
 # %% [markdown]
-# The command line asks the same questions: `quakedesign synthesise cta --objective decay --out gains.json`, or, for the smallest measured error of a
+# The command line solves the same problems: `quakedesign synthesise cta --objective decay --out gains.json`, or, for the smallest measured error of a
 # sampled run among gains that are proved, `quakedesign synthesise cta real-fault --objective sampled --step 0.184`; and `quakedesign map cta --over k1 k2`.
 
 # %%

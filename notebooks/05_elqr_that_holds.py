@@ -16,10 +16,10 @@
 # %% [markdown]
 # # An e-LQR that holds where the printed theorem does not
 #
-# The extended LQR feeds back the slip error, the slip-rate error and two integrals, $p=-Kx$. Theorem 2 of the paper wants $K$ to be optimal for
-# some $Q \ge Q_0 + R\,G^\top G$, where the row $G=[g_1\;g_2\;0\;0]$ shall bound what is uncertain. Two plants show that this is not enough
-# (rows 6 and 7 of `quakedesign errata`). This page runs them, puts another premise in the place of the printed one, judges the published gains
-# with it, and goes where the theorem does not go: to a bound on the slip rate under the reference and the disturbance of the task.
+# The extended LQR feeds back the slip error, the slip-rate error and two integrals, $p=-Kx$. Theorem 2 of the paper requires $K$ to be optimal for
+# some $Q \ge Q_0 + R\,G^\top G$, where the row $G=[g_1\;g_2\;0\;0]$ is meant to bound the uncertainty. Two plants show that this is not sufficient
+# (rows 6 and 7 of `quakedesign errata`). This page simulates them, replaces the printed premise, and assesses the published gains
+# with the new one. Beyond the theorem, it bounds the slip rate under the reference and the disturbance of the task.
 
 # %%
 from dataclasses import replace
@@ -45,8 +45,8 @@ from own import printed_examples as examples  # beside this notebook
 
 # %% [markdown]
 # ## Friction that the bound does not contain
-# The first entry of $G$, as printed, contains the *uncertainty* of $\hat N$ instead of the value of $\hat N$. For the real fault with $\hat N$ known the bound is zero,
-# whatever the friction is. The theorem then accepts a $K$ that leaves the fault unstable.
+# The first entry of $G$, as printed, contains the *uncertainty* of $\hat N$ instead of the value of $\hat N$. For the real fault with $\hat N$ known the bound is zero
+# for any friction. The theorem then accepts a $K$ that leaves the fault unstable.
 
 # %%
 missing = examples.printed_bound_example()
@@ -106,8 +106,8 @@ fault = qd.load_fault("real-fault")
 print(uncertainty_bounds(fault).table())
 
 # %% [markdown]
-# Turned round: with a given $Q$ the guarantee holds for every $R$ that leaves $Q - R\,W$ positive definite for some $w$. With $s_1 = R/w$ and $s_2 = R/(1-w)$ that
-# is a linear matrix inequality, $Q \ge \mathrm{diag}(g_1^2 s_1,\; g_2^2 s_2,\; 0,\; 0)$ and $\mathrm{diag}(s_1, s_2) \ge R\,11^\top$, to solve with cvxpy and to extend. It also has a closed form:
+# Conversely, with a given $Q$ the guarantee holds for every $R$ that leaves $Q - R\,W$ positive definite for some $w$. With $s_1 = R/w$ and $s_2 = R/(1-w)$ that
+# is a linear matrix inequality, $Q \ge \mathrm{diag}(g_1^2 s_1,\; g_2^2 s_2,\; 0,\; 0)$ and $\mathrm{diag}(s_1, s_2) \ge R\,11^\top$, which cvxpy solves and which is easy to extend. It also has a closed form:
 # $R < (ab - c^2)/(g_1^2 b + g_2^2 a + 2 g_1 g_2 |c|)$, where $a$, $b$ and $c$ are the entries of the Schur complement of $Q$ on $(x_1, x_2)$, that is, of $x^\top Q x$ minimised over the two integrals.
 
 # %%
@@ -123,16 +123,16 @@ print(f"largest R: {searched.value:.6f} by the matrix inequality, {closed:.6f} i
 
 # %% [markdown]
 # ## The published gains
-# `quakedesign certify elqr real-fault --gains …` answers for any $K$. A premise that fails says nothing against a $K$: the published gains tolerate almost
-# 25 times the friction slope of this fault. No quadratic $V$ could prove much more, because the loop is unstable with a constant slope just above that limit. What they do not
-# tolerate is a pressure that is held for the 184 ms of this task.
+# `quakedesign certify elqr real-fault --gains …` gives a verdict for any $K$. A failed premise does not refute a $K$: the published gains tolerate almost
+# 25 times the friction slope of this fault. No quadratic $V$ could prove much more, because the loop is unstable with a constant slope just above that limit. They do not
+# tolerate zero-order hold over the 184 ms of this task.
 
 # %%
 printed = judge(fault, qd.published("real-fault")["elqr"])
 print("\n".join(verdict_lines(printed)))
 
 # %% [markdown]
-# `design` with `continuous=True` gives gains in the way of the paper, for a pressure that acts at once. They are proved for every constant reference. With zero-order hold they are
+# `design` with `continuous=True` designs gains as the paper does, for a pressure without delay. They are proved for every constant reference. With zero-order hold they are
 # unstable, like the published ones. By default `design` is about the sampled loop with zero-order hold. It proves bounds for all
 # friction, stiffness and damping inside their ranges.
 
@@ -148,7 +148,7 @@ print(sampled.sentence())
 # The theorem is about a constant reference and a disturbance that vanishes. The task has neither: $r(t)$ moves and $|\varphi_e| \le 3.2\cdot10^{-4}$ m/s² does not
 # vanish. We therefore write the loop with the midpoint of every range, and collect all other terms in one bounded input, $a = \varphi_e - w r' - r'' + \delta_s e_1 - \delta_w e_2 + \delta_\beta b(p-p^*)$. The gains from $a$ to
 # $e_1$, $e_2$ and $p$ are integrals of absolute impulse responses, $g_1$, $g_2$, $g_p$; if $m = \delta_s g_1 + \delta_w g_2 + \delta_\beta g_p < 1$, then $|a| \le H/(1-m)$ for all $t \ge 0$, and $e_1$, $e_2$ and $p$ are bounded as well. *amplitude*: any
-# measurable disturbance of that size; *rate*: one that is also no faster than the sine of the task. This is continuous time, for a pressure that acts at once; `design.guarantee` says the same of the loop that runs.
+# measurable disturbance of that size; *rate*: one that is also no faster than the sine of the task. This is continuous time, for a pressure without delay; `design.guarantee` is the result for the sampled loop.
 
 # %%
 peaks = {kind: design.certified_peaks(kind) for kind in ("amplitude", "rate")}
@@ -170,7 +170,7 @@ plt.xlabel("time [s]"), plt.ylabel("relative to its peak"), plt.title("impulse r
 plt.show()
 
 # %% [markdown]
-# The bound is a file like any other certificate (`quakedesign certify elqr … --peaks amplitude --out FILE`), and `proofs/check.py` verifies it without this package, from the fault's data to the sentence. For a bound that is
+# The bound has a file, like any other certificate (`quakedesign certify elqr … --peaks amplitude --out FILE`), and `proofs/check.py` verifies it without this package, from the fault's data to the sentence. For a bound that is
 # one percent smaller the file is rejected, because it does not prove that bound.
 
 # %%
@@ -181,8 +181,8 @@ refused = replace(certificate, claims=smaller).check() is Verdict.UNDECIDED
 print(certificate.sentence())
 
 # %% [markdown]
-# It holds from rest, on the plant without stick. A run of the first 4000 s on the stick–slip plant
-# with the sine of the task stays far below.
+# The bound holds from rest, on the plant without stick. A run of the first 4000 s on the stick–slip plant
+# with the sine of the task stays far below it.
 
 # %%
 run = qd.simulate(fault, design.controller, duration=4000)

@@ -14,9 +14,9 @@
 # %% [markdown]
 # # Closed loop, sampling and sensing
 #
-# A proof speaks about continuous time and exact states. A computer measures every $T_s$, holds its pressure in between, and reads a noisy slip.
-# This page shows what that costs, what helps, and how a controller leaves the computer as C. The gains are designed in continuous time, so that every way to
-# run them may be tried; without `continuous` a design has its own, with a guarantee (notebook 01).
+# Proofs in continuous time assume exact states. A computer measures a noisy slip every $T_s$, and the pressure is constant in between (zero-order hold).
+# This page shows the loss of accuracy, remedies, and the export of a controller as C. The gains are designed in continuous time, so that they can be
+# simulated in every scheme; without `continuous` a design has its own scheme, with a guarantee (notebook 01).
 
 # %%
 import tempfile
@@ -37,10 +37,10 @@ law = design.controller
 print(design.verdict, {name: f"{float(value):.4g}" for name, value in design.gains.items()})
 
 # %% [markdown]
-# ## One run, and where its energy went
-# The first 2000 s of the task, on the plant without stick, for which the orders of schemes are known; `continuous` evaluates the law in every stage of the integrator. The budget is integrated along with the motion, so what is
-# missing in it is the error of the integration. Where the law switches inside a step, the integrator gets the energy of the chatter wrong; a pressure that is
-# held costs no accuracy. Runs with `continuous` show what the law would do, not what a controller does.
+# ## One run and its energy budget
+# The runs cover the first 2000 s of the task, on the plant without stick, for which the orders of schemes are known. `continuous` evaluates the law in every stage of the integrator. The energy budget is integrated along with the motion, so its
+# residual is the integration error. If the law switches inside a step, the energy of the chatter is wrong; with zero-order hold
+# no accuracy is lost. Runs with `continuous` show the ideal law, not a digital controller.
 
 # %%
 SHORT = {"duration": 2000.0, "samples": 2000, "plant": "printed"}
@@ -51,7 +51,7 @@ display(runs["explicit"].plot())
 
 # %% [markdown]
 # ## Four ways to sample
-# `explicit` evaluates the law at the sample, `implicit` at the end of the step (one monotone inclusion, solved to rounding), `semi-implicit` only its jump.
+# `explicit` evaluates the law at the sample, `implicit` at the end of the step (one monotone inclusion, solved to rounding error), `semi-implicit` only its discontinuous part there.
 # `compensated` is the implicit step with an estimate of the disturbance in place of the integral state. The last column is $|\Delta h/\Delta t|$ over the certified bound.
 # The published controllers run as in the paper.
 
@@ -79,8 +79,8 @@ print(table.map("{:.3g}".format).to_string())
 
 # %% [markdown]
 # ## Orders of accuracy
-# Sampled explicitly, a homogeneous sliding mode of this kind has $|e_1|\sim T_s^3$, $|e_2|\sim T_s^2$, $|e_3|\sim T_s$. The implicit step gives up an order of $e_1$
-# (a constant force leaves $T_s^2$ times that force), and the estimate wins it back.
+# Sampled explicitly, a homogeneous sliding mode of this kind has $|e_1|\sim T_s^3$, $|e_2|\sim T_s^2$, $|e_3|\sim T_s$. The implicit step loses one order of $e_1$
+# (a constant force leaves $T_s^2$ times that force), and the estimate restores it.
 
 # %%
 study = sim.accuracy(
@@ -96,8 +96,8 @@ print(pd.DataFrame(orders).T.round(2))
 display(study.figure())
 
 # %% [markdown]
-# ## What the estimate does not do
-# It takes noise for a disturbance. With noise of the slip rate of up to about 0.1 µm/s (standard deviation) both errors of the compensated scheme are nearly those without noise.
+# ## Limits of the estimate
+# The estimate does not distinguish noise from a disturbance. With noise of the slip rate of up to about 0.1 µm/s (standard deviation) both errors of the compensated scheme are nearly those without noise.
 # With more, its slip-rate error grows almost in proportion to the noise, and only a better sensor makes it smaller. Over the whole range of input gains of the
 # box `ten-percent` the errors remain small. Both studies are on the plant without stick.
 
@@ -112,7 +112,7 @@ print(gain.to_pandas())
 
 # %% [markdown]
 # ## Between well and fault
-# The pressure that a law asks for is cut off, held, and diffuses through the rock before it acts. Volume and flow rate at the well are outputs.
+# The commanded pressure is saturated, held, and diffuses through the rock before it acts. Volume and flow rate at the well are outputs.
 
 # %%
 rock = Diffusion(length=1.0, diffusivity=7.0, storage=1e-9, cells=3)
@@ -124,7 +124,7 @@ display(lagged.to_xarray()[["well_pressure", "injected_volume", "flow_rate"]].is
 # %% [markdown]
 # ## Sensing on the laboratory fault
 # Only the slip is measured; a differentiator supplies the slip rate. With a sliding mode the third derivative of the slip has no bound, so the printed order
-# $n_d=2$ with $\lambda_d=10^{-5}$ cannot follow. With $n_d=1$ a $\lambda_d$ that goes with the sampling period exists, and is computed.
+# $n_d=2$ with $\lambda_d=10^{-5}$ cannot follow. With $n_d=1$ there is an admissible $\lambda_d$ for the sampling period; it is computed.
 
 # %%
 lab, cta = qd.load_fault("lab-fault"), qd.published("lab-fault")["cta"]
@@ -145,8 +145,8 @@ print(f"printed: {printed.metrics.max_slip_error:.1e} m; smallest bound at 10 µ
 print(f"n_d = 1, 100 m/s²: {better.metrics.max_slip_error:.1e} m; implicit at 1 ms: {coarse.metrics.max_slip_error:.1e} m")
 
 # %% [markdown]
-# ## Out of the computer
-# The sampled step as C without dynamic memory; the same function in Python asks for the pressures of the simulated loop.
+# ## Export
+# The sampled step is exported as C without dynamic memory. The same function in Python reproduces the pressures of the simulated loop.
 
 # %%
 with tempfile.TemporaryDirectory() as folder:

@@ -14,8 +14,8 @@
 # %% [markdown]
 # # A campaign over the uncertainty box
 #
-# One run shows one fault. The design has to hold for every fault in the box, every phase of the disturbance and every start that it admits. A campaign
-# runs many of them, keeps what is done, and finds the worst.
+# One run shows one fault. The design must work for every fault in the box, every phase of the disturbance and every admissible initial condition. A campaign
+# simulates many of them, stores the results, and finds the worst.
 
 # %%
 import tempfile
@@ -31,9 +31,9 @@ design = qd.design(fault, "cta")
 print(design.verdict, {name: f"{float(value):.4g}" for name, value in design.gains.items()})
 
 # %% [markdown]
-# ## The question
-# The laboratory fault for 20 s, with the law as it was designed: sampled every millisecond. Sample i is a point of a scrambled Sobol' sequence and
-# depends on the seed and on i alone: stiffness, viscosity, effective area and friction within ±10 %, amplitude and phase of the disturbance.
+# ## The problem
+# The laboratory fault is simulated for 20 s with the designed law, T_s = 1 ms. Sample i of the campaign is a point of a scrambled Sobol' sequence and
+# depends on the seed and on i alone. It varies stiffness, viscosity, effective area and friction within ±10 %, amplitude and phase of the disturbance.
 
 # %%
 problem = campaign_problem(fault, design.controller, duration=20.0, seed=7)
@@ -42,9 +42,9 @@ half = run_campaign(problem, 16, Path(folder.name) / "campaign", executor=Thread
 print(half.quantiles()["max_slip_rate_error"])
 
 # %% [markdown]
-# ## Interrupted, and gone on with
-# The folder holds one file for each batch. Asking for more samples goes on from those that are there, and so does the same call after any interruption:
-# the digits are those of a run that was never interrupted.
+# ## Interruption and continuation
+# The folder contains one file for each batch. A call for more samples continues from the stored ones, and so does the same call after any interruption.
+# The results are bitwise those of an uninterrupted run.
 
 # %%
 whole = run_campaign(problem, 32, Path(folder.name) / "campaign", executor=ThreadPoolExecutor(2), batch=8)
@@ -56,7 +56,7 @@ print("the same digits in batches of another size:", same)
 
 # %% [markdown]
 # ## The worst samples
-# Any of them can be run again by its number, as a trajectory with everything in it. None may leave what is guaranteed for all faults of the box.
+# Any sample can be repeated by its number, as a complete trajectory. None may exceed the bounds that are guaranteed for all faults of the box.
 
 # %%
 metric = "max_slip_rate_error"

@@ -16,11 +16,11 @@
 # %% [markdown]
 # # Your own fault, from a record
 #
-# **A laboratory has slid the gouge of a reservoir's fault at two rates. Can the fault slip slowly instead of in earthquakes, and what can be promised?** This page goes from
-# a CSV file of velocity steps to a fault file, from there to stability, the cycle of its earthquakes and limits that no controller can beat, to a controller with a guarantee for
-# every friction that the record allows, to a campaign, and to figures for a paper.
+# **A laboratory has sheared the gouge of a reservoir fault at two rates. Can the fault slip slowly instead of in earthquakes, and what can be guaranteed?** This page goes from
+# a CSV file of velocity steps to a fault file, then to stability, the earthquake cycle and the performance limits of every controller. A controller with a guarantee for
+# all friction that the record allows, a campaign and figures for a paper follow.
 #
-# The record here is made up, with noise, so that the answer can be checked; put the name of your own file in its place. A record of slip weakening goes the same way
+# The record here is synthetic, with noise, so that the result can be checked; replace it by your own file. The same steps apply to a record of slip weakening
 # (`--law exponential-slip-weakening`).
 
 # %%
@@ -54,7 +54,7 @@ columns = "time [s],load_point_displacement [um],friction"
 np.savetxt(folder / "gouge.csv", np.transpose([time, 1e6 * load_point, friction]), delimiter=",", header=columns, comments="", fmt="%.6f")
 
 # %% [markdown]
-# ## Friction, with what the record allows
+# ## Friction and its confidence intervals
 # Every parameter has an interval of 95 % confidence. (`quakedesign identify gouge.csv --stiffness 2000 --fault geothermal-fault --out gouge.toml` does the same.)
 
 # %%
@@ -66,9 +66,9 @@ residuals.savefig(folder / "record.pdf")
 display(residuals)
 
 # %% [markdown]
-# ## A fault file, its stability, and what the fault does if nobody acts
-# The file holds the best fit; its head says which `spread` of a, b and D_c holds all that the record allows. Everything else is that of the preset `geothermal-fault`; for your
-# own, start from `quakedesign init`.
+# ## The fault file, its stability and its cycle without control
+# The file contains the best fit; its header gives the `spread` of a, b and D_c that covers all values that the record allows. Everything else is that of the preset `geothermal-fault`; for your
+# own fault, start from `quakedesign init`.
 
 # %%
 save_fault(found, qd.load_fault("geothermal-fault"), folder / "gouge.toml")
@@ -81,16 +81,16 @@ cycle = natural.cycle
 print(f"{natural.outcome.kind}s of magnitude {cycle['magnitude']:.2f}, {1e3 * cycle['slip']:.0f} mm each, up to {natural.natural_peak:.2g} m/s")
 
 # %% [markdown]
-# ## What no controller can do
-# Theorems about the fault linearised about slow sliding; of the fault itself they are true as far as that is.
+# ## Performance limits of every controller
+# The limits are theorems about the fault linearised about slow sliding. For the fault they are as accurate as this linearisation.
 
 # %%
 limits = qd.limits(fault, stress=15e3, prove=False)
 print("\n".join(limits_lines(limits)))
 
 # %% [markdown]
-# ## A controller, and what is guaranteed
-# For every a, b and D_c of the record, and every shear stress up to 15 kPa: tides are several times smaller.
+# ## A controller and its guarantee
+# The guarantee covers every a, b and D_c of the record, and every shear stress disturbance up to 15 kPa: tides are several times smaller.
 
 # %%
 design = qd.design(fault, "elqr", stress="15000", spread=spread)
@@ -98,7 +98,7 @@ print(design.guarantee.sentence())
 
 # %% [markdown]
 # ## Sixteen faults that the record allows
-# Friction anywhere within the spread, under stress of any share and phase that swings once in ten hours, run for half a day each.
+# Each run lasts half a day. Friction is anywhere within the spread; the stress is sinusoidal with a period of ten hours and any amplitude within its bound and phase.
 
 # %%
 problem = qd.campaign_problem(fault, design.controller, spread=spread, stress=15e3, stress_period=36e3, duration=43200.0, seed=7)
@@ -122,8 +122,8 @@ figure.savefig(folder / "gouge.pdf")
 plt.show()
 
 # %% [markdown]
-# **The answer:** an e-LQR that reads the slip every 400 s and sets the pressure of a well near the fault lets it slip 20 mm in 20 days; the slip rate never exceeds that of the
-# plan by more than a quarter, proved for every friction that the record allows, where the fault left alone makes earthquakes of magnitude 3.5 at decimetres per second.
+# **Result:** an e-LQR measures the slip every 400 s and sets the pressure of a well near the fault. The fault then slips 20 mm in 20 days. It is proved, for all friction that the record allows, that the slip rate
+# never exceeds the planned rate by more than a quarter. Without control the fault has earthquakes of magnitude 3.5 with decimetres per second.
 
 # %%
 guarantee = design.guarantee

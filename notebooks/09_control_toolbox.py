@@ -16,9 +16,9 @@
 # %% [markdown]
 # # The control toolbox
 #
-# **Can a controller be designed with the tools that every control engineer knows, and what is then guaranteed of it on a fault?** This page takes the fault
-# into python-control, designs a discrete-time LQR with `dlqr`, reads its margins, proves bounds in m/s for it, and puts the nonlinear fault and the law
-# into a diagram of python-control.
+# **Can standard control tools design a controller for a fault, and what is then guaranteed?** This page exports the fault
+# to python-control, designs a discrete-time LQR with `dlqr`, computes its margins, proves bounds in m/s, and connects the nonlinear fault and the law
+# as python-control systems.
 
 # %%
 from fractions import Fraction
@@ -35,9 +35,9 @@ fault = qd.load_fault("real-fault")
 period = fault.sampling_time  # T_s [s]
 
 # %% [markdown]
-# ## The plant, once a sample
+# ## The sampled plant
 # `to_statespace` linearises the fault at rest at a slip, with the pressure [Pa] as input and slip [m] and slip rate [m/s] as outputs. One pole lies in the right
-# half-plane. A pressure that is held from sample to sample gives the exact discrete-time plant.
+# half-plane. Zero-order hold of the pressure gives the exact discrete-time plant.
 
 # %%
 plant = qd.to_statespace(fault)
@@ -47,7 +47,7 @@ print("poles [1/s]:", np.round(plant.poles(), 4), " held:", np.round(sampled.pol
 # %% [markdown]
 # ## A discrete-time LQR with two integrals
 # The e-LQR feeds back slip error, slip-rate error and two sums, which are formed once per sample: $\xi_1^+ = \xi_1 + T_s e_1$, $\xi_2^+ = \xi_2 + T_s \xi_1^+$. The
-# weights follow Bryson's rule: one over the square of what would be acceptable, here 10 µm, 100 µm/s, 10 µm s, 10 µm s² and 1 MPa.
+# weights follow Bryson's rule: one over the square of the acceptable value, here 10 µm, 100 µm/s, 10 µm s, 10 µm s² and 1 MPa.
 
 # %%
 sums = np.array([[period, 0], [period**2, 0]]), np.array([[1, 0], [period, 1]])
@@ -60,8 +60,8 @@ print(gains, "closed-loop poles:", np.round(np.abs(poles), 3))
 
 # %% [markdown]
 # ## Margins
-# The loop opened at the pressure, as it runs: sampled, summed and held. `loop_transfer` does the same for a law of the package; this law has a pressure that acts at once
-# until a scheme samples it, and then tolerates less.
+# The loop is opened at the pressure, and includes sampling, sums and zero-order hold. `loop_transfer` opens the loop of a law of the package. This law is in continuous time
+# until a scheme samples it; sampling reduces its margins.
 
 # %%
 law = control_law("elqr")(gains={name: Fraction(value) for name, value in gains.items()})
@@ -75,12 +75,12 @@ plt.gcf().set_size_inches(7, 5)
 plt.tight_layout()
 
 # %% [markdown]
-# Margins are about one linear plant at one slip. The friction of the fault weakens as it slips, its parameters are known within a box, and tides and neighbours push.
+# Margins are about one linear plant at one slip. The friction of the fault weakens as it slips, its parameters are known only within a box, and tides and neighbouring faults disturb it.
 
 # %% [markdown]
 # ## What is guaranteed
-# One call proves, in exact arithmetic, how far slip and slip rate of the loop as it runs can be from the reference, whatever the friction law, the parameters and the
-# disturbance inside the box; beside it stands the worst that a search for bad courses finds. From the command line: `quakedesign guarantee real-fault --gains …`.
+# One call proves, in exact arithmetic, bounds on the slip error and slip-rate error of the sampled loop, for every friction law, all parameters and every
+# disturbance of the box. The worst case found by a search is reported with them. From the command line: `quakedesign guarantee real-fault --gains …`.
 
 # %%
 found = qd.guarantee(fault, gains=tuple(gains.values()))
@@ -90,8 +90,8 @@ for name in ("slip_error", "slip_rate_error"):
 
 # %% [markdown]
 # ## The nonlinear loop as a diagram
-# Fault and law as systems of python-control: `interconnect` joins them, with the pressure acting at once as in the paper. The package's simulation samples and holds. Both
-# follow the reference; 200 s of it.
+# `interconnect` connects fault and law as python-control systems. The pressure acts without delay, as in the paper. The package's simulation uses sampling and zero-order hold. Both
+# follow the reference for 200 s.
 
 # %%
 duration = 200.0
@@ -120,7 +120,7 @@ plt.show()
 
 # %% [markdown]
 # ## Uniform instants
-# `resample` gives a run at uniform instants, for spectra and filters. The pressure answers the disturbance of the fault at its frequency.
+# `resample` gives a run at uniform instants, for spectra and filters. The pressure responds to the disturbance at its frequency.
 
 # %%
 even = run.resample(0.25)
@@ -136,8 +136,8 @@ plt.show()
 print(f"strongest at {strongest:.2f} rad/s; the disturbance has {fault.disturbance.frequency} rad/s")
 
 # %% [markdown]
-# **The answer:** yes. Six lines of python-control give an LQR whose slip-rate error stays below 0.2 mm/s for every fault of the box, proved, where the uncontrolled
-# fault reaches an earthquake's slip rate; its margins alone would not have said so.
+# **Result:** yes. Six lines of python-control give an LQR with a slip-rate error that is proved to stay below 0.2 mm/s for every fault of the box. The uncontrolled
+# fault reaches the slip rate of an earthquake. Margins alone do not give this bound.
 
 # %%
 known, proved = found.worst_case["slip_rate_error"], found.bounds["slip_rate_error"]
