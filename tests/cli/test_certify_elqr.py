@@ -106,7 +106,8 @@ def short(folder):
 @pytest.mark.slow
 def test_a_design_in_continuous_time_is_reported_with_its_peaks_and_without_a_guarantee(capsys, tmp_path):
     out = tmp_path / "o"
-    arguments = ("design", short(tmp_path), "--controller", "elqr", "--continuous", "--out", str(out), "--json")
+    arguments = ("design", short(tmp_path), "--controller", "elqr", "--continuous", "--plant", "printed")
+    arguments = (*arguments, "--out", str(out), "--json")
     code, said, _ = run(capsys, *arguments)
     found = json.loads(said)["controllers"]["elqr"]
     assert code == 1  # no guarantee at the fault's own T_s
