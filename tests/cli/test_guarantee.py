@@ -102,7 +102,9 @@ def test_given_gains_for_people(call):
     answer, told = out.split("\n\n", 1)
     first = "real-fault: guaranteed. On the plant without stick, the slip rate never exceeds "
     assert " ".join(answer.split()).startswith(first)
-    assert "% of the natural earthquake's 74.5 mm/s, magnitude 5.8), and the slip stays within" in " ".join(answer.split())
+    assert "% of the natural earthquake's 74.5 mm/s, magnitude 5.8), and the slip stays within" in " ".join(
+        answer.split()
+    )
     assert told.startswith(
         "proved: on the plant without stick, from rest, with zero-order hold over 0.184 s, for every disturbance of at "
         "most 0.00032 m/s^2 (4 kPa"

@@ -188,7 +188,7 @@ def test_a_design_whose_run_opens_the_fault_is_no_positive_answer(capsys, tmp_pa
 @pytest.mark.slow
 def test_a_proved_design_that_is_faster_than_the_natural_earthquake_is_no_positive_answer(capsys):
     path = Path(__file__).parent.parent / "data" / "undersampled_fault.toml"
-    code, out, _ = run(capsys, "compare", path, "--controller", "cta", "--continuous", "--json")
+    code, out, _ = run(capsys, "compare", path, "--controller", "cta", "--continuous", "--plant", "printed", "--json")
     answer = json.loads(out)
     (found,) = answer["controllers"].values()
     assert code == 1
