@@ -27,7 +27,7 @@ PROOFS = Path(__file__).parents[3] / "proofs" / "certificates"
 REAL, LAB, STEP, SHORT = "real-fault", "lab-fault", F("0.184"), F("0.05")
 PEAK, SLIP = {"objective": "peak"}, {"measured": "slip", "slip_noise": F(1, 10**6)}
 LONG = (120, 60, 6)  # periods that are run, over how many of them responses are followed, small steps in each
-# fault, T_s, what else is asked
+# fault, T_s, objective and loop setup, extent of the attack
 ROWS = {
     "peak": (REAL, STEP, PEAK, LONG),
     "tracking": (REAL, STEP, {}, LONG),
@@ -53,16 +53,18 @@ GAINS = {"cta": ("7", "5", "2.3", "1.1"), "dia": ("25/16", "27/5", "6/5", "0")}
 @cache
 def designed(row):
     """A guarantee and the numbers of its loop."""
-    name, step, around, _ = ROWS[row]
+    name, step, given, _ = ROWS[row]
+    setup = ExactSetup(**{key: value for key, value in given.items() if key not in ("objective", "measured")})
+    wanted = {key: value for key, value in given.items() if key in ("objective", "measured")}
     fault, kind = load_fault(name), row.split(",")[0]
     task = uncertain_plant(fault, rate_limited=kind == "rate")
     if kind in GAINS:
         law = control_law(kind).from_values(GAINS[kind], scale=F(1), divisor=task.authority)
-        made = design_compensated(task, law, step, setup=ExactSetup(**around))
+        made = design_compensated(task, law, step, setup=setup, **wanted)
         claim = tightened(made.proof)
         held = attacker.sliding(made.controller, made.weight, made.authority, claim, float(task.authority))
     else:
-        claim = design_held(task, step, setup=ExactSetup(**around))
+        claim = design_held(task, step, setup=setup, **wanted)
         claim = beside_searches(fault, claim).proof if kind == "rate" else claim  # claims with room for stick
         held = attacker.numbers(claim, force=task.amplitude if kind == "rate" else None)
     return claim, held if claim.slow_gain else replace(held, slope=0.0)  # any course of the gain where none is slow
