@@ -619,7 +619,7 @@ def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Cont
         text = ", ".join(f"{part} {time:g} s" for part, time in path.items())
         sooner = f"--step '{float(result.shorter.held.step):g} s', where it has, " if result.shorter else ""
         raise ParameterError(
-            f"designed gains must have a proof behind what is around them. Received {name} with {text}, "
+            f"designed gains must have a proof with this delay, lag or diffusion path. Received {name} with {text}, "
             f"T_s = {fault.sampling_time:g} s: {result.proof.reason}. Give {sooner}gains as numbers, or see limits."
         )
     law: Controller = result.controller
@@ -667,20 +667,20 @@ def run_single(
     list of Premise
         `on_trajectory` of a sliding mode, certified or not, and `differentiator`.
     """
-    around: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
-    around |= {"actuator": actuator} if actuator.stages else {}
+    given: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
+    given |= {"actuator": actuator} if actuator.stages else {}
     if law is None and duration is None:
         more = dict(tuning or {}) | dict(initial or {}) | ({"load": load} if load else {})
-        return _natural(fault, settings, around | more), []
+        return _natural(fault, settings, given | more), []
     name = settings["scheme"]
     if tuning:
         substeps = settings.pop("substeps")
-        around |= {"substeps": substeps} if substeps != 1 else {}
-        settings, around = settings | {"scheme": simulation_scheme(name, **tuning, **around)}, {}
+        given |= {"substeps": substeps} if substeps != 1 else {}
+        settings, given = settings | {"scheme": simulation_scheme(name, **tuning, **given)}, {}
     chosen = law if isinstance(law, Choice) or law is None else Choice(controller=law)
     own = chosen.controller if chosen else None
-    around |= dict(initial or {})
-    run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **around)
+    given |= dict(initial or {})
+    run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **given)
     if chosen is None:
         return run, []
     return run, _premises(fault, chosen, run, noise, name)
@@ -695,11 +695,11 @@ def _premises(fault: Fault, chosen: Choice, run: Trajectory, seen: Sensor, schem
     return [premise for premise in premises if premise is not None]
 
 
-def _natural(fault: Fault, settings: dict[str, Any], around: dict[str, Any]) -> Trajectory:
+def _natural(fault: Fault, settings: dict[str, Any], given: dict[str, Any]) -> Trajectory:
     """Natural earthquake, to which nothing but the plant can be told."""
     usual = {"step": None, "scheme": "continuous", "method": "dormand-prince", "substeps": 1}
     others = [name for name, value in settings.items() if name != "plant" and value != usual[name]]
-    others += list(around)
+    others += list(given)
     if others:
         raise ParameterError(
             f"the natural earthquake runs with the settings of the fault. Received {', '.join(others)}. "
