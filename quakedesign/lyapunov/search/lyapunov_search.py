@@ -323,7 +323,7 @@ def _largest(one: Obligation, direction: Polynomial, domain: str, scale: Sequenc
 # question; what else was searched for on this machine is in `quakedesign.cache`. A certificate counts after its exact
 # check only, so that a wrong file costs time and proves nothing.
 
-FOLDER = Path(__file__).parent / "found"
+FOLDER = Path(__file__).parent / "stored"
 _NOTHING = "null\n"
 
 Search = Callable[[Loop, int, Subject | None], Certificate | None]
