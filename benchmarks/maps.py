@@ -43,7 +43,7 @@ def screening(law: str, every: int) -> None:
         return {place: level for row in rows for place, _, level in screener.row(row)[0]}
 
     new, along = spent(levels)
-    with patch.object(Path, "found", lambda _self, _loop: None):
+    with patch.object(Path, "feasible", lambda _self, _loop: None):
         old, alone = spent(levels)
     other = sum(along[place] != alone[place] for place in alone)
     print(

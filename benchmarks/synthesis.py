@@ -37,7 +37,7 @@ def proved(law: str, objective: str, degrees: tuple[int, ...]) -> Iterator[Row]:
     asked = question(law, objective, lipschitz=1, gain_range=(1, 1), degrees=degrees)
     starts = STARTS.get((law, objective), 1)
     found = None
-    for place, loop in enumerate(asked.known):
+    for place, loop in enumerate(asked.published):
         bound = scaled_norm(loop, asked.setting.exponents) * SAME if asked.setting.objective.bounded else None
         if found is None or bound is not None:
             found = synthesise(law, objective, bound=bound, degrees=degrees, starts=starts)
