@@ -33,7 +33,7 @@ print(design.verdict, {name: f"{float(value):.4g}" for name, value in design.gai
 # %% [markdown]
 # ## The problem
 # The laboratory fault is simulated for 20 s with the designed law, T_s = 1 ms. Sample i of the campaign is a point of a scrambled Sobol' sequence and
-# depends on the seed and on i alone. It varies stiffness, viscosity, effective area and friction within ±10 %, amplitude and phase of the disturbance.
+# depends on the seed and on i alone. It varies stiffness, damping and area per mass within ±10 %, the friction drop, and amplitude and phase of the disturbance.
 
 # %%
 problem = campaign_problem(fault, design.controller, duration=20.0, seed=7)

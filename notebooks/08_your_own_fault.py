@@ -98,7 +98,7 @@ print(design.guarantee.sentence())
 
 # %% [markdown]
 # ## Sixteen faults that the record allows
-# Each run lasts half a day. Friction is anywhere within the spread; the stress is sinusoidal with a period of ten hours and any amplitude within its bound and phase.
+# Each run lasts half a day. Friction is anywhere within the spread; the stress is sinusoidal with a period of ten hours, any phase, and any amplitude within its bound.
 
 # %%
 problem = qd.campaign_problem(fault, design.controller, spread=spread, stress=15e3, stress_period=36e3, duration=43200.0, seed=7)
@@ -123,7 +123,7 @@ plt.show()
 
 # %% [markdown]
 # **Result:** an e-LQR measures the slip every 400 s and sets the pressure of a well near the fault. The fault then slips 20 mm in 20 days. It is proved, for all friction that the record allows, that the slip rate
-# never exceeds the planned rate by more than a quarter. Without control the fault has earthquakes of magnitude 3.5 with decimetres per second.
+# never exceeds the planned rate by more than a quarter. Without control the fault has earthquakes of magnitude 3.5, with slip rates of decimetres per second.
 
 # %%
 guarantee = design.guarantee

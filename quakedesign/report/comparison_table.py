@@ -61,7 +61,7 @@ def compare(
     progress: Callable[[str, float], None] | None = None,
     **entered: Quantity | None,
 ) -> Comparison:
-    """Run all controllers of a fault over the whole task, step T_s; of a slow one with a state over 500 D_c/V.
+    """Run all controllers of a fault over the whole task, step T_s; with rate-and-state friction over 500 D_c/V.
 
     Parameters
     ----------

@@ -332,7 +332,7 @@ def export_controller(
     fmu: bool = False,
     force: bool = False,
 ) -> ControllerStep:
-    """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder that appears whole.
+    """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder, all files or none.
 
     The C has no dynamic memory and no state of its own, needs the standard mathematics library only, and gives the
     digits of `ControllerStep.function` when compiled with ``-ffp-contract=off``.

@@ -241,7 +241,7 @@ def run_campaign(
     renew: bool = False,
     tell: Tell = lambda _what, _done: None,
 ) -> Campaign:
-    """Run many samples of a closed loop, and keep every batch that is done in a folder.
+    """Run many samples of a closed loop, and store every finished batch in a folder.
 
     Interrupted or killed at any moment, the same call goes on from the files, and its answer has the digits of an
     uninterrupted one, whatever the workers and their number. More samples than before go on from those that are there.
