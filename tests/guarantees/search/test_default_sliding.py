@@ -41,7 +41,7 @@ CERTIFICATE = Path(__file__).parents[3] / "proofs" / "certificates" / "cta_7_5_2
 
 @cache
 def designed(name="cta"):
-    return qd.design(REAL, name)
+    return qd.design(REAL, name, plant="printed")
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def unreached(monkeypatch):
 
 
 def run(controller, **options):
-    return simulate(REAL, controller, duration=36.8, samples=201, compiled=False, **options)
+    return simulate(REAL, controller, duration=36.8, samples=201, compiled=False, plant="printed", **options)
 
 
 def recursion(run, claim):
@@ -102,7 +102,7 @@ def test_its_base_gains_stay_proved_in_continuous_time():
 
 @pytest.mark.usefixtures("unproved", "unreached")
 def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for():
-    design = qd.design(REAL, "cta", slip_noise="1e-6", rate_noise="1e-5")
+    design = qd.design(REAL, "cta", slip_noise="1e-6", rate_noise="1e-5", plant="printed")
     claim, told = design.guarantee, {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
     assert (design.verdict, claim.check(), claim.held.noise) == (Verdict.PROVED, Verdict.PROVED, told)
     assert replace(design, runs=None).guarantee == claim
@@ -117,12 +117,12 @@ def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for():
 def test_how_far_other_designs_go_is_asked_with_the_same_noise(monkeypatch):
     asked = []
 
-    def seen(task, *_, kind, **around):
-        asked.append((type(kind).__name__, around.get("slip_noise")))
+    def seen(task, *_, kind, setup):
+        asked.append((type(kind).__name__, setup.slip_noise))
 
     for name in ("longest_step", "longest_delay"):
         monkeypatch.setattr(DEFAULT, name, seen)
-    qd.design(REAL, "dia", slip_noise="1e-6")
+    qd.design(REAL, "dia", slip_noise="1e-6", plant="printed")
     assert asked == 2 * [("Deadbeat", F(1, 10**6))]
 
 
@@ -187,13 +187,14 @@ def test_it_travels_and_its_base_gains_may_be_scaled_as_they_are():
 
 
 def test_both_objectives_are_what_they_are_called(unproved, unreached):
-    peak, tracking = (qd.design(REAL, "dia", objective=name).guarantee.claims for name in ("peak", "tracking"))
+    laws = [qd.design(REAL, "dia", objective=name, plant="printed") for name in ("peak", "tracking")]
+    peak, tracking = (law.guarantee.claims for law in laws)
     assert peak.slip_rate_error < tracking.slip_rate_error
     assert peak.slip_rate_error <= F(25, 10**5)
 
 
 def test_a_guarantee_needs_no_certificate_in_continuous_time(unproved, unreached):
-    design = qd.design(REAL, "cta")
+    design = qd.design(REAL, "cta", plant="printed")
     assert (design.verdict, design.certificate) == (Verdict.PROVED, None)
     assert design.guarantee == designed().guarantee
     again = assess(REAL, design.controller)
@@ -206,7 +207,7 @@ def test_a_guarantee_needs_no_certificate_in_continuous_time(unproved, unreached
 
 @pytest.mark.slow
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(unproved):
-    design = qd.design(SLOW, "cta")
+    design = qd.design(SLOW, "cta", plant="printed")
     base = replace(design.controller, gains=dict(design.controller.gains), sampling=None)
     assert isinstance(design_compensated(uncertain_plant(SLOW), base, F(1, 10)).proof, NoProof)
     step = design.controller.sampling.step
@@ -223,7 +224,7 @@ def test_where_no_step_has_a_guarantee_it_is_the_design_in_continuous_time(monke
     known = load_certificate(CERTIFICATE)
     monkeypatch.setattr(DESIGN, "find_certificate", lambda *_, **__: known)
     monkeypatch.setattr(COMPENSATED, "compensated", lambda *_, **__: fails)
-    design = qd.design(REAL, "cta")
+    design = qd.design(REAL, "cta", plant="printed")
     assert design.controller == qd.design(REAL, "cta", continuous=True).controller
     assert (design.verdict, design.controller.sampling) == (Verdict.PROVED, None)
     assert design.guarantee.sentence() == "none: run in the scheme compensated, small gain 1.2"
@@ -253,6 +254,6 @@ UNUSUAL = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", UNUSUAL)
 def test_unusual_faults_are_designed_with_a_guarantee_that_holds(unproved, name):
-    design = qd.design(UNUSUAL[name], "dia")
+    design = qd.design(UNUSUAL[name], "dia", plant="printed")
     assert isinstance(design.guarantee, TrackingProof)
     assert design.guarantee.check() is design.verdict is Verdict.PROVED
