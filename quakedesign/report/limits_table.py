@@ -75,8 +75,8 @@ def _meaning(limits: Limits) -> list[str]:
     return [
         *lines,
         "other rows: a constant disturbance begins just after a sample; before the next pressure acts, the fault has "
-        f"slipped so far that a withdrawal of {UpperBound(limits.withdrawal).quantity('Pa', 4)} (last row: of the "
-        f"value there) no longer stops it; D = {float(limits.diffusivity):g} m^2/s",
+        f"slipped so far that a withdrawal of {UpperBound(limits.withdrawal).quantity('Pa', 4)} (last row: the "
+        f"withdrawal in that row) no longer stops it; D = {float(limits.diffusivity):g} m^2/s",
     ]
 
 

@@ -125,7 +125,7 @@ def simulate(
     -------
     Trajectory
         A `LoopTrajectory`; with a friction state a `SlidingRun`, or a `StateTrajectory` without a controller.
-        A diverging run ends at that time, which `events` contains, and has no metrics.
+        A run that diverges ends there, with the time in `events` and without metrics.
 
     Raises
     ------

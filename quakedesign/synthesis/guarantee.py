@@ -72,7 +72,7 @@ def answers(
         for place, one in crew.answers(_called, [(call,) for call in questions]):
             results[place] = one
             if tell is not None:
-                tell(f"{len(results)} of {len(questions)} answered", len(results) / len(questions))
+                tell(f"{len(results)} of {len(questions)} computed", len(results) / len(questions))
     return [results[place] for place in range(len(questions))]
 
 
@@ -147,7 +147,7 @@ def guarantee(
         ``printed``: the plant without stick, its friction continued to negative slip rates. By default the first where
         it applies and has a proof, else the second.
     progress : callable, optional
-        Called with the task of a search for rate-and-state friction or the stick–slip plant, and its fraction [-].
+        Called with the current task of a search (rate-and-state friction, stick–slip plant) and the completed fraction.
     accept_poor_fit : bool
         Whether to continue for a fault whose friction its record does not support (`Fault.poor_fit`); its name then
         ends with ``poor-fit``.
