@@ -166,7 +166,7 @@ def statement(certificate: Certificate) -> list[str]:
     """What a certificate says, in lines."""
     loop = certificate.loop
     lines = ["in continuous time, for the equations below: sampling with zero-order hold is not covered"]
-    lines.append(f"law {loop.law}, field equal to the law's own")
+    lines.append(f"law {loop.law}, vector field equal to that of the law")
     lines.append(", ".join(f"{name} = {v}" for name, v in loop.parameters.items()))
     weights = ", ".join(f"{name} = {weight}" for name, weight in loop.states.items())
     lines.append(f"domain: {loop.domain}; states with weights: {weights}")

@@ -9,14 +9,14 @@ from quakedesign.text import nearest_name, one_line, shown
 
 
 class QuakedesignError(Exception):
-    """Anything that quakedesign refuses; the command line prints it as one line and exits with 2.
+    """Base class of all errors of quakedesign; the command line prints one line and exits with code 2.
 
     Attributes
     ----------
     parts : tuple of QuakedesignError
-        What is wrong one by one, where several things are.
+        The single errors, if one exception reports several; empty otherwise.
     code : str
-        Kind of the error for scripts, such as ``parameter``: that of its class.
+        Kind of the error for scripts, such as ``parameter``; each class has its own.
     """
 
     parts: "tuple[QuakedesignError, ...]" = ()
@@ -30,7 +30,7 @@ class QuakedesignError(Exception):
 
     @property
     def quantity(self) -> str:
-        """What is wrong: the subject of the condition that the message begins with; empty without one."""
+        """Quantity at fault: the text before "must" or "needs" in the message; empty without these words."""
         subject, verb, _ = re.split(r" (must|needs?) ", f"{self.args[0]} must ", maxsplit=1)
         return subject if verb and subject != self.args[0] else ""
 
@@ -48,7 +48,7 @@ class ScenarioError(QuakedesignError, ValueError):
 
 
 class RecordError(QuakedesignError, ValueError):
-    """A record of an experiment that cannot be read, is incomplete, or does not fit what is asked of it."""
+    """A record of an experiment that cannot be read, is incomplete, or is unsuitable for the analysis."""
 
 
 class UnknownNameError(QuakedesignError, KeyError):
@@ -59,7 +59,7 @@ class UnknownNameError(QuakedesignError, KeyError):
 
 
 class UserCodeError(QuakedesignError, RuntimeError):
-    """Code of the user's that raises what is no refusal of quakedesign, `SystemExit` among it."""
+    """User code that raises an exception other than a `QuakedesignError`, including `SystemExit`."""
 
 
 class UnsupportedError(QuakedesignError, NotImplementedError):
@@ -67,23 +67,23 @@ class UnsupportedError(QuakedesignError, NotImplementedError):
 
 
 class KinkError(QuakedesignError, ArithmeticError):
-    """A derivative asked for at a point where the expression has none."""
+    """A derivative at a point where the expression is not differentiable."""
 
 
 class PolynomialError(QuakedesignError, ValueError):
-    """A text that is not a polynomial or a constraint, or too large to be read as one."""
+    """A text that is not a polynomial or a constraint, or is too large to be parsed."""
 
 
 class CertificateError(QuakedesignError, ValueError):
-    """A certificate file that is not one, or whose proof does not hold."""
+    """A file that is not a certificate, or a certificate whose proof is invalid."""
 
 
 class WorkError(QuakedesignError, ArithmeticError):
-    """An exact check that takes more work than it may: it is undecided."""
+    """An exact check that exceeds its work limit; its verdict is undecided."""
 
 
 class SimulationError(QuakedesignError, RuntimeError):
-    """A closed loop that cannot be integrated as asked."""
+    """A closed loop that cannot be integrated as requested."""
 
 
 class OutputError(QuakedesignError, OSError):
@@ -91,12 +91,12 @@ class OutputError(QuakedesignError, OSError):
 
 
 def is_whole(value: object, least: float, most: float = math.inf) -> bool:
-    """Whether a value is a whole number from `least` to `most`; True and False are none."""
+    """Whether a value is a whole number from `least` to `most`; booleans are not."""
     return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
 
 
 def require_whole(least: int, **values: object) -> None:
-    """Raise for values that are no whole numbers of at least `least`; the keyword is the name."""
+    """Raise unless all values are whole numbers of at least `least`; keywords are their names in the message."""
     for name in (name for name, value in values.items() if not is_whole(value, least)):
         raise ParameterError(f"{name} must be a whole number of at least {least}. Received {values[name]!r}.")
 
@@ -104,19 +104,19 @@ def require_whole(least: int, **values: object) -> None:
 def require_known(
     name: object, known: Iterable[str], what: str, refusal: type[QuakedesignError] = ParameterError
 ) -> None:
-    """Refuse a name that is none of those known: the message lists them, and asks whether the nearest is meant.
+    """Raise for an unknown name; the message lists the known names and suggests the nearest.
 
     Parameters
     ----------
     name : object
-        As it was received.
+        As received.
     what : str
-        What the name is of, such as ``"controller"``.
+        Kind of the name, such as ``"controller"``.
 
     Raises
     ------
     QuakedesignError
-        Of the type `refusal`.
+        Of the type `refusal`, for an unknown name.
     """
     names = list(known)
     if not isinstance(name, str) or name not in names:

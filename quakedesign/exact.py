@@ -1,7 +1,7 @@
 """Exact rational numbers from decimal text and floats, and certified bounds.
 
-Every other module receives numbers as `fractions.Fraction` from here. The second chapter holds one-sided
-bounds and enclosures; they are printed rounded outwards (an upper bound up, a lower bound down).
+Every other module receives numbers as `fractions.Fraction` from here. The second chapter defines
+one-sided bounds and enclosures, which are printed rounded outward (an upper bound up, a lower bound down).
 """
 
 import math
@@ -35,13 +35,13 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     value : float, int, str or Fraction
         Number, also one of NumPy or SymPy; a float means the decimal that Python prints for it, so 0.1 is 1/10.
     name : str
-        What the number is, for the message.
+        Name of the number in error messages.
 
     Raises
     ------
     ParameterError
-        When the value is not a finite number of at most 300 characters and 308 digits, or has more digits than a float
-        without being a rational.
+        When the value is not a finite number of at most 300 characters and 308 digits, or is of a real type, not
+        rational, that exceeds float precision.
     """
     if isinstance(value, Fraction):
         return value if type(value) is Fraction else Fraction(value)
@@ -57,22 +57,23 @@ def _read(value: object, name: str) -> Fraction:
     number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else value
     if isinstance(number, float) and number != value and not math.isnan(number):
         raise ParameterError(
-            f"{name} must be a float, a rational or text. Received {value!r:.60}, which is no float. Give it as text."
+            f"{name} must be a float, a rational or text. Received {value!r:.60}, which a float cannot represent. "
+            "Give it as text."
         )
     written = number.strip() if isinstance(number, str) else repr(number)
     if len(written) > 300 or not _NUMBER.fullmatch(written) or re.search(r"/0+$", written):
         raise ParameterError(
             f"{name} must be a finite number: a decimal, an exponent form or p/q, in at most 300 characters. "
-            f"Received {written[:60]!r}. Write for example {_instead(written)}."
+            f"Received {written[:60]!r}. Write for example {_example(written)}."
         )
     return Fraction(written)
 
 
-def _instead(written: str) -> str:
-    """Number to suggest in a message in place of a text."""
-    share = written.removesuffix("%").strip()
-    if share != written and len(share) <= 20 and _NUMBER.fullmatch(share) and "/" not in share:
-        return f"{float(share) / 100:g}"
+def _example(written: str) -> str:
+    """Example of a valid number, for the message on an invalid text."""
+    percentage = written.removesuffix("%").strip()
+    if percentage != written and len(percentage) <= 20 and _NUMBER.fullmatch(percentage) and "/" not in percentage:
+        return f"{float(percentage) / 100:g}"
     return "2.3, 4.51e-4 or 23/10"
 
 
@@ -95,7 +96,7 @@ def fraction_of(value: Any) -> Fraction:
 
 
 def end_of(ball: Any) -> Fraction:
-    """Fraction of an exact ball of python-flint, such as an end of another."""
+    """Fraction of a python-flint ball of radius 0, such as the end of a wider ball."""
     return fraction_of(ball.fmpq())
 
 
@@ -115,7 +116,7 @@ def to_sympy(value: Fraction) -> "sp.Rational":
 
 
 def exact_text(value: Any) -> str:
-    """A rational as p/q, or p, whatever its length: ``str`` refuses more than 4300 digits, `Decimal` none.
+    """A rational as p/q, or p, of any length: ``str`` rejects more than 4300 digits, `Decimal` does not.
 
     Values of other types are written by ``str``.
     """
@@ -140,7 +141,7 @@ def float_below(value: Fraction) -> float:
 
 
 def shortly(value: Fraction | float) -> str:
-    """Text of a number as that of a float, or six digits if it is outside the range of floats."""
+    """Text of a number with six digits, also outside the range of floats."""
     try:
         number = float(value)
     except OverflowError:
@@ -149,7 +150,7 @@ def shortly(value: Fraction | float) -> str:
 
 
 def apart(*values: Fraction) -> tuple[str, ...]:
-    """Texts of numbers, with six digits or as many as show the difference between a value and its limit."""
+    """Texts of numbers, with six digits or as many as distinguish them, such as a value and its limit."""
     texts, count = tuple(map(shortly, values)), len(set(values))
     for digits in (9, 12, 24):
         if len(set(map(Fraction, texts))) == count:
@@ -159,7 +160,7 @@ def apart(*values: Fraction) -> tuple[str, ...]:
 
 
 def six_digits(value: Fraction) -> str:
-    """Six digits, rounded to nearest, by `Decimal`, which has no largest number."""
+    """Text with six digits, rounded to nearest, by `Decimal`, which does not overflow."""
     return f"{Decimal(value.numerator) / Decimal(value.denominator):.6g}"
 
 
@@ -221,7 +222,7 @@ class Bound(Fraction):
         Raises
         ------
         ValueError
-            For any other.
+            For any other format.
         """
         match = _SPEC.fullmatch(spec)
         if match is None:
@@ -235,13 +236,13 @@ class Bound(Fraction):
         return format(text, f"{match['align'] or '>'}{match['width']}")
 
     def _significant(self, digits: int) -> tuple[Decimal, int]:
-        """Outer decimal of so many digits, and the power of ten of its first."""
+        """Decimal with `digits` digits, rounded outward, and the power of ten of its first digit."""
         context = Context(prec=max(digits, 1), rounding=self._side)
-        found = context.divide(Decimal(self.numerator), Decimal(self.denominator))
-        return found, found.adjusted()
+        rounded = context.divide(Decimal(self.numerator), Decimal(self.denominator))
+        return rounded, rounded.adjusted()
 
     def _whole(self, factor: int) -> int:
-        """Outer whole multiple of 1/factor."""
+        """Number of multiples of 1/factor in the bound, rounded outward."""
         return (math.ceil if self._side == ROUND_CEILING else math.floor)(self * factor)
 
     def _scientific(self, digits: int) -> str:
@@ -311,7 +312,7 @@ class Enclosure:
 
 
 def _mantissa(number: Decimal, exponent: int, digits: int) -> str:
-    """Number divided by its power of ten, with a number of places; exact, since it has no further digits."""
+    """Mantissa with `digits` decimal places; exact, because the number has no further digits."""
     sign, figures, _ = number.as_tuple()
     written = "".join(map(str, figures)).ljust(digits + 1, "0")
     whole = f"{written[0]}.{written[1:]}" if digits else written[0]

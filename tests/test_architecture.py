@@ -1,4 +1,4 @@
-"""The structure that DESIGN.md and CONTRIBUTING.md promise: imports, start-up, docstrings."""
+"""The structure that CONTRIBUTING.md describes: imports, start-up, docstrings."""
 
 import ast
 import dataclasses
@@ -23,7 +23,7 @@ LAYERS = (
     *("lyapunov.exact", "lyapunov.search", "lyapunov.maps", "lyapunov.gains", "lyapunov"),
     *("guarantees.exact", "guarantees.search", "guarantees", "linear", "synthesis", "studies", "report", "cli"),
 )
-"""Packages in the order of DESIGN.md: each imports only what stands before it, and less where `LESS` says so."""
+"""Packages in the order of CONTRIBUTING.md: each imports only packages before it, and less where `LESS` says so."""
 DECIDING = (
     "fault",
     "symbolic",
@@ -98,7 +98,7 @@ def room(module):
     for length in (2, 1):
         if ".".join(parts[:length]) in MAY_IMPORT:
             return ".".join(parts[:length])
-    raise AssertionError(f"{module} is in no room of DESIGN.md")
+    raise AssertionError(f"{module} is in no package of CONTRIBUTING.md")
 
 
 @cache

@@ -112,7 +112,7 @@ def test_a_certificate_is_said_in_lines():
     )  # fmt: skip
     head = [
         "in continuous time, for the equations below: sampling with zero-order hold is not covered",
-        "law cta, field equal to the law's own",
+        "law cta, vector field equal to that of the law",
         "k = 3",
         "domain: cells; states with weights: x = 2",
         "beta in [1, 2]",

@@ -223,7 +223,7 @@ def row_11(bound: Callable = lambda g1, g2, x1, x2: g1 * abs(x1) + g2 * abs(x2))
     return Finding(
         bool(covered and printed > 0 and excess > 0 and abs(late / gain - 1) < 0.01 and late > 0),
         f"{printed} of 5000 points leave the printed bound, none the sum of both; at the origin the sine exceeds every "
-        f"such bound by {excess:.1e} m/s², and the loop keeps swinging by {late:.3g} m ({gain:.3g} m by its gain)",
+        f"such bound by {excess:.1e} m/s², and the loop oscillates by {late:.3g} m ({gain:.3g} m by its gain)",
     )
 
 

@@ -174,7 +174,7 @@ ROWS = (
     ErrataRow(
         number=29,
         printed="e-LQR feeds back k1x1 and k2x2",
-        correct="feed back x1−r and x2−ṙ: the term −k1r̈/k4 of the error and 1.5 GPa of cancellation go",
+        correct="feed back x1−r and x2−ṙ: the term −k1r̈/k4 of the error and 1.5 GPa of cancellation vanish",
         kind="numeric reproduction",
         check=row_29,
     ),

@@ -173,7 +173,7 @@ Formats = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
     Parameter(consume_multiple=True, negative="", help="Of the figures, one or several: svg, pdf, png."),
 ]
-Force = Annotated[bool, Parameter(negative="", help="Replace what an earlier run has written.")]
+Force = Annotated[bool, Parameter(negative="", help="Replace the output of an earlier run.")]
 
 
 @Parameter(name="*")
@@ -296,7 +296,7 @@ class LawOptions:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class NoLawOptions(LawOptions):
-    """Law with its gains; none unless given."""
+    """Law with its gains; none by default."""
 
     controller: str = "none"
 
@@ -316,8 +316,8 @@ class RunOptions:
         Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: radau (by
         default), dop853, cvodes or idas without control; cvodes (by default) or idas with control.
     plant
-        stick-slip (by default; friction holds the fault at rest) or printed (the paper's, continued to negative slip
-        rates). Rate-and-state faults never rest: smooth (by default) or quasi-dynamic (without inertia).
+        stick-slip (by default; friction holds the fault at rest) or printed (the paper's plant, without
+        stick). Rate-and-state faults never rest: smooth (by default) or quasi-dynamic (without inertia).
     step
         Length of one step; the fault's sampling time by default.
     duration

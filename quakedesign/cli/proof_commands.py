@@ -284,9 +284,9 @@ def attraction(
     everywhere
         Prove global convergence, or refute V (without V, every V) by a point.
     relative
-        Width of the last bisection step, from 1e-6 to below 1.
+        Relative width of the last bisection interval, from 1e-6 to below 1.
     degree
-        Search V of at most this even degree, for a larger part of the shape in the region.
+        Also search for V of at most this even degree, to enlarge the sublevel set of --shape in the region.
     shape
         Positive definite polynomial, such as "x^2 + 2*y^2": proves the largest b whose sublevel set shape <= b lies in
         the region. With --degree by default the sum of squares of the states.

@@ -43,17 +43,17 @@ from quakedesign.text import nearest_name
 # Where descriptions of faults come from: presets, and files of the user.
 
 LARGEST_FILE = 1 << 16
-"""Bytes; reading a key of many dots takes the square of its length."""
+"""Largest file size in bytes; the time to parse a dotted key grows with the square of its length."""
 _PRESETS = Path(__file__).parent / "presets"
 
 
 def presets() -> list[str]:
-    """Names of the faults that come with the package."""
+    """Names of the presets of the package."""
     return sorted(path.stem for path in _PRESETS.glob("*.toml"))
 
 
 def require_source(source: str) -> str:
-    """Name of a preset or of a file."""
+    """Return the name of a preset or path of a .toml file; raise for anything else."""
     if source not in presets() and Path(source).suffix != ".toml":
         raise UnknownNameError(
             f"fault must be a preset ({', '.join(presets())}) or the path of a .toml file. Received {source!r}."
@@ -70,20 +70,20 @@ def source_text(source: str | Path) -> str:
 
 
 # ----------------------------------------------------------------------
-# What a file may leave out: damping from physics, a task like that of the paper's faults.
+# Default values: damping from physics, a task like that of the paper's faults.
 
 PERIODS = 4.6e5
 """ω_n times the operation time [-] of both faults of Table I."""
 SAMPLES = 10.0
-"""Samples while the fastest of an error and of a free oscillation grows or turns by one."""
+"""Samples per e-folding time of an error, or per radian of the free oscillation if that is faster."""
 AGEINGS = 20.0
-"""Samples in D_c/V, few enough to be summed in a proof of slow sliding at V and many enough to control it."""
+"""Samples per D_c/V in slow sliding at V: few enough for the sums of a proof, enough to control the fault."""
 _STEP = "sampling time"
-_SHARE = 1000  # of the operation time, which a sampling time must not exceed
+_SHARE = 1000  # least operation time over sampling time
 
 
 def radiation_damping(density: float, shear_modulus: float, area: float) -> float:
-    """GA/(2c_s) [kg/s]: what plane shear waves carry away from both sides of a sliding patch.
+    """GA/(2c_s) [kg/s]: damping by plane shear waves radiated from both sides of a sliding patch.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def sliding_step(law: FrictionLaw, task: Reference) -> float:
     Parameters
     ----------
     law : FrictionLaw
-        With a state.
+        Friction law with a state.
     """
     ageing = float(min(law.steady_state(mean_rate(task))))
     return _cut(min(ageing / AGEINGS, task.operation_time / _SHARE), digits=2)
@@ -119,9 +119,9 @@ def mean_rate(task: Reference) -> float:
 
 
 def beyond_rates(law: FrictionLaw, rate: float, *, source: str = "") -> str:
-    """That a slip rate [m/s] lies outside the working range of a law, as one sentence; empty for one inside.
+    """Statement that a slip rate [m/s] is outside the working range of a law; empty for a rate inside.
 
-    The range is that of slowest_rate and fastest_rate, unless another `source` of it is named.
+    The range is given by slowest_rate and fastest_rate unless `source` names another origin.
     """
     slowest, fastest = law.working_rates
     if slowest <= rate <= fastest:
@@ -134,26 +134,26 @@ def beyond_rates(law: FrictionLaw, rate: float, *, source: str = "") -> str:
 
 
 def step_assumed(fault: Fault) -> bool:
-    """Whether the T_s of a fault was filled in, so that another friction has another."""
+    """Whether the T_s of a fault is a default value, which depends on its friction."""
     return any(text.startswith(_STEP) for text in fault.assumed)
 
 
 def completed(parts: Json, task: Mapping[str, float], remarks: tuple[str, ...] = ()) -> Fault:
-    """Fault of what a file has, the rest filled in and told in `Fault.assumed`.
+    """Fault from the entries of a file, with default values that `Fault.assumed` lists.
 
     Parameters
     ----------
     parts : mapping
-        Arguments of `Fault`, those of the task and perhaps the damping excepted.
+        Arguments of `Fault` without those of the task; the damping is optional.
     task : mapping
-        target_slip [m], operation_time [s], ramp [-], sampling_time [s], as far as given.
+        target_slip [m], operation_time [s], ramp [-], sampling_time [s]; all are optional.
     remarks : tuple of str
-        What was assumed before.
+        Assumptions made before.
 
     Raises
     ------
     ScenarioError
-        For a task that has to be given.
+        For a missing target slip that has no default.
     ParameterError
         For an unphysical value.
     """
@@ -222,15 +222,15 @@ _step = by_equilibrium(rest=_step_at_rest, sliding=_step_of_sliding)
 
 
 def _growth(fault: Fault) -> float:
-    """Largest real pole [1/s] without pressure, friction as steep as it can be; others turn faster than they grow."""
-    push, law = fault.authority * fault.effective_normal_stress, fault.friction
-    damping = fault.specific_damping - push * law.rate_slope
-    stiffness = fault.specific_stiffness - push * law.slip_slope
+    """Largest real pole [1/s] without pressure at the steepest friction; complex poles turn faster than they grow."""
+    load, law = fault.authority * fault.effective_normal_stress, fault.friction
+    damping = fault.specific_damping - load * law.rate_slope
+    stiffness = fault.specific_stiffness - load * law.slip_slope
     return (math.sqrt(max(damping**2 - 4 * stiffness, 0)) - damping) / 2
 
 
 def _cut(value: float, digits: int = 3) -> float:
-    """Rounded down to so many digits."""
+    """Value rounded down to `digits` significant digits."""
     return float(Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(Decimal(value)))
 
 
@@ -245,8 +245,8 @@ WIDTHS = entries_of(UncertaintyBox)
 del WIDTHS["name"]
 _UNDISTURBED = "no disturbance; for guarantees that cover one, give amplitude in [disturbance], such as '2 kPa'"
 _STILL = (
-    "frequency 0 of the disturbance, so that its sine is 0 in every run; guarantees are for any course of its size. "
-    "Give a frequency to see one"
+    "frequency 0 of the disturbance: its sine is 0 in every run, while guarantees cover any course of its amplitude. "
+    "Give a frequency to simulate one"
 )
 
 
@@ -262,10 +262,10 @@ def load_fault(
     box : str, optional
         Name of an uncertainty box that replaces the one in the file.
     disturbance : str, optional
-        Amplitude in place of the file's: an acceleration, or a shear stress on the fault, such as ``"35 kPa"``, that
-        its own area and mass make one.
+        Amplitude in place of the file's: an acceleration, or a shear stress on the fault, such as ``"35 kPa"``,
+        which its area and mass convert to one.
     allow_code : bool
-        Whether the file may name a friction law ``module:Class`` of the user's own, whose module is imported and run.
+        Whether the file may name a user-defined friction law ``module:Class``, whose module is imported and run.
 
     Returns
     -------
@@ -293,7 +293,7 @@ def load_fault(
 
 
 def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
-    """Fault from the text of a TOML file; `name` names it in messages, all errors in one. See `load_fault`."""
+    """Fault from the text of a TOML file; `name` is its name in messages. See `load_fault`."""
     if len(text) > LARGEST_FILE:
         raise ScenarioError(f"{name}: a fault file must be at most 64 KiB. Received {len(text)} characters.")
     try:
@@ -311,7 +311,7 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
 
 
 def fault_of_tables(table: Table, allow_code: bool) -> Fault | None:
-    """Fault of a whole file; None if the table has problems."""
+    """Fault of a whole file; None if the table has errors, which are collected."""
     parts: Json = {"source": TEXTS["source"].default_text} | table.read(TEXTS | PLANT)
     parts["friction"] = read_friction(table.table("friction"), allow_code)
     task = _task(table.table("task", optional=True))
@@ -330,7 +330,7 @@ def fault_of_tables(table: Table, allow_code: bool) -> Fault | None:
 
 
 def read_friction(table: Table, allow_code: bool) -> FrictionLaw | None:
-    """Friction law of a table; None for one that is wrong."""
+    """Friction law of a table; None for an invalid law, whose error is collected."""
     name = table.read({"law": FileEntry(name="law")})["law"]
     if name is None:
         table.report_missing()
@@ -344,7 +344,7 @@ def read_friction(table: Table, allow_code: bool) -> FrictionLaw | None:
 
 
 def _task(table: Table) -> dict[str, float] | None:
-    """Entries of the task in a file; None if one is wrong."""
+    """Entries of the task in a file; None if an entry is invalid."""
     values = table.read(TASK)
     table.close()
     given = {key: value for key, value in values.items() if value is not None}
@@ -355,7 +355,7 @@ def _task(table: Table) -> dict[str, float] | None:
 
 
 def _authority(parts: Json) -> Fraction:
-    """A/m [m²/kg]; any number for a plant that is wrong, whose error is reported elsewhere."""
+    """A/m [m²/kg]; 1 for an invalid plant, whose error is reported elsewhere."""
     density, *sides = (parts.get(name) for name in ("density", "length", "width"))
     given = [value for value in (density, *sides) if value is not None]
     if density is None or len(given) == 1 or not all(map(is_ordinary, given)):
@@ -364,7 +364,7 @@ def _authority(parts: Json) -> Fraction:
 
 
 def _assumed(parts: Json, table: Table) -> tuple[str, ...]:
-    """What a file leaves open of its disturbance, for friction without a state."""
+    """Remark on a disturbance that is missing or of frequency 0, for friction without a state."""
     if "disturbance" in parts["friction"].equilibrium.refused:
         return ()
     if "disturbance" not in table.entries:
@@ -399,11 +399,11 @@ def _box(parent: Table) -> UncertaintyBox | None:
 
 
 # ----------------------------------------------------------------------
-# A fault as a TOML file with all numbers that a result rests on.
+# A fault as a TOML file with all numbers that a result depends on.
 
 
 def fault_toml(fault: Fault) -> str:
-    """Text of a TOML file that `load_fault` reads as this fault, every number in SI units and nothing left out."""
+    """Text of a TOML file that `load_fault` reads as this fault, with every number in SI units."""
     law = type(fault.friction)
     name = law.name if law in friction_laws().values() else f"{law.__module__}:{law.__qualname__}"
     friction = _values(fault.friction, entries_of(law))
@@ -436,7 +436,7 @@ def _values(part: object, entries: Mapping[str, FileEntry]) -> Json:
 
 
 def _stresses(fault: Fault) -> dict[str, str]:
-    """What of the disturbance was given as a stress: the least float that is read as no less."""
+    """Parts of the disturbance that were given as a stress: least float [Pa] whose acceleration is not smaller."""
     stresses = {}
     for name in fault.disturbance.stresses:
         size = abs(getattr(fault.disturbance, name))

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# How far the real fault may be from the nominal one.
+# Uncertainty box: largest deviations of the real fault from the nominal one.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,7 +87,7 @@ def uncertainty_box(name: str) -> UncertaintyBox:
 # Where a fault that starts to slip comes to rest.
 
 _SCAN = 4096
-_DIGITS = 40  # the slip of a fault that is only just unstable is a small difference
+_DIGITS = 40  # cancellation: the excess of a barely unstable fault is a small difference
 
 
 _strength_drop = by_equilibrium(rest=lambda law: law.bounds[1] - law.bounds[0], sliding=lambda law: math.nan)
@@ -97,9 +97,8 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
     """Smallest positive slip [m] where the excess of load over strength turns from driving to resisting.
 
     The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift), for a load σ'_n A [N] and a
-    stiffness k [N/m]. All roots lie below
-    (μ_max − μ_min)σ'_n A/k. A fault whose origin is stable stays where it is; friction with a state has no strength
-    of its own at rest, and nan is returned.
+    stiffness k [N/m]. All roots lie below (μ_max − μ_min)σ'_n A/k. The result is 0 for a fault with a stable origin,
+    and nan for friction with a state, which has no fixed strength at rest.
     """
     furthest = float(_strength_drop(friction)) * load / stiffness * 1.0001
     if not furthest > 0:
@@ -113,7 +112,7 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
     drive, drive_in_floats = (sp.lambdify(x, excess, module) for module in ("mpmath", "math"))
     try:
         ends = _turn(drive_in_floats, furthest)
-    except (NameError, ArithmeticError, ValueError):  # a function that floats do not have, or beyond their range
+    except (NameError, ArithmeticError, ValueError):  # a function that `math` lacks, or float overflow
         ends = _turn(drive, furthest)
     if ends is None:
         return 0.0
@@ -122,7 +121,7 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
 
 
 def _turn(drive: Callable[[float], float], furthest: float) -> tuple[float, float] | None:
-    """Slips [m] between which an excess turns from driving to resisting; None where it does not drive at the start."""
+    """Slips [m] between which an excess turns from driving to resisting; None if it does not drive near 0."""
     grid = [furthest * i / _SCAN for i in range(_SCAN + 1)]
     if drive(grid[1] / _SCAN) <= 0:
         return None
@@ -131,33 +130,33 @@ def _turn(drive: Callable[[float], float], furthest: float) -> tuple[float, floa
 
 
 # ----------------------------------------------------------------------
-# Checks of physical values, shared by the types of this room.
+# Checks of physical values, shared by the types of this package.
 
 MOST_WORKERS = 256
-"""Processes that one command may start."""
+"""Largest number of processes of one command."""
 
 _Value = TypeVar("_Value")
 _LARGEST = 1e40
 _NAME = re.compile(r"\w[\w .-]{0,59}")
-_MOST_BYTES = 120  # files and folders are named after it, and a system gives them 255
+_MOST_BYTES = 120  # the name is part of file names, which systems limit to 255 bytes
 
 
 class Problems:
-    """What is wrong with one input, collected so that all of it is said at once."""
+    """Errors of one input, collected so that one exception reports all of them."""
 
     def __init__(self) -> None:
         self.errors: list[QuakedesignError] = []
 
     @contextmanager
     def collected(self) -> Iterator[None]:
-        """Keep the refusal that the block ends with, and go on."""
+        """Collect a `QuakedesignError` of the block instead of propagating it."""
         try:
             yield
         except QuakedesignError as error:
             self.errors += error.parts or (error,)
 
     def refuse(self, where: str = "") -> None:
-        """Raise what was collected, if anything: as it is, or as one error that counts and names them all."""
+        """Raise the collected errors, if any, as one exception that numbers several; `where` begins its message."""
         if not self.errors:
             return
         kinds = {type(error) for error in self.errors}
@@ -170,14 +169,14 @@ class Problems:
         raise error from None
 
     def resolved(self, value: _Value | None, where: str = "") -> _Value:
-        """Return a value that is None only if there are errors, which are raised; `where` begins their message."""
+        """Raise the collected errors, see `refuse`, or return the value, which is None only if there are errors."""
         self.refuse(where)
         assert value is not None
         return value
 
 
 def require_all(*checks: Callable[[], None]) -> None:
-    """Make every check, and refuse all that is wrong at once."""
+    """Run every check, and raise all errors as one exception."""
     problems = Problems()
     for check in checks:
         with problems.collected():
@@ -186,27 +185,27 @@ def require_all(*checks: Callable[[], None]) -> None:
 
 
 def require_positive(remedy: str = "", **values: float | Fraction) -> None:
-    """Refuse values that are not positive finite numbers, all at once; the keyword is the name."""
+    """Raise unless all values are positive and finite; keywords are their names in the message."""
     _require(values, lambda v: v > 0, "positive and finite", remedy)
 
 
 def require_nonnegative(remedy: str = "", **values: float) -> None:
-    """Refuse values that are negative or no finite numbers."""
+    """Raise unless all values are finite and at least 0."""
     _require(values, lambda v: v >= 0, "zero or positive, and finite", remedy)
 
 
 def require_finite(remedy: str = "", **values: float) -> None:
-    """Refuse values that are no finite numbers."""
+    """Raise unless all values are finite numbers."""
     _require(values, lambda v: True, "finite", remedy)
 
 
 def is_ordinary(size: float | Fraction, least: float = 1 / _LARGEST) -> bool:
-    """Whether a positive number can be the size of something in SI units."""
+    """Whether a positive number is from `least` to 1e40, the range of physical values in SI units."""
     return least <= size <= _LARGEST
 
 
 def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) -> None:
-    """Refuse values that are no sizes of anything, so that no product of them leaves the floats; zero is one."""
+    """Raise unless each value is 0 or of a size from `least` to 1e40, so that products of values do not overflow."""
     problems = Problems()
     for name, value in values.items():
         with problems.collected():
@@ -219,25 +218,25 @@ def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) ->
 
 
 def require_count(most: int, **values: int) -> None:
-    """Refuse values that are no whole numbers from 1 to `most`."""
+    """Raise unless all values are whole numbers from 1 to `most`."""
     for name, value in values.items():
         if not isinstance(value, Integral) or isinstance(value, bool) or not 1 <= value <= most:
             raise ParameterError(f"{name} must be a whole number from 1 to {most}. Received {shown(value)}.")
 
 
-def _require(values: dict[str, Any], fine: Callable[[Any], bool], what: str, remedy: str) -> None:
+def _require(values: dict[str, Any], condition: Callable[[Any], bool], what: str, remedy: str) -> None:
     problems = Problems()
     for name, value in values.items():
         with problems.collected():
             if not isinstance(value, Real) or isinstance(value, bool):
                 raise ParameterError(f"{name} must be a number in SI units, {what}. Received {shown(value)}.")
-            if not (is_finite(value) and fine(value)):
+            if not (is_finite(value) and condition(value)):
                 raise ParameterError(f"{name} must be {what}. Received {shown(value)} (SI units). {remedy}".strip())
     problems.refuse()
 
 
 def is_finite(value: Real | float) -> bool:
-    """Whether a number is one that a float holds."""
+    """Whether a number is finite as a float."""
     try:
         return math.isfinite(value)
     except OverflowError:
@@ -245,7 +244,7 @@ def is_finite(value: Real | float) -> bool:
 
 
 def require_name(name: str) -> None:
-    """Refuse a name after which no file can be named everywhere."""
+    """Raise for a name that is not a valid file name on every system."""
     if not isinstance(name, str) or not _NAME.fullmatch(name) or len(name.encode()) > _MOST_BYTES:
         raise ParameterError(
             "name must be a text of at most 60 letters, digits, spaces and _ . - (120 bytes in UTF-8), beginning "
@@ -254,12 +253,12 @@ def require_name(name: str) -> None:
 
 
 # ----------------------------------------------------------------------
-# The slip that the controller shall follow.
+# Reference slip of the controller.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """Smooth slip r(t) from rest to rest, eq. ref, held at its end for t > operation_time (ERRATA 26).
+    """Smooth slip r(t) from rest to rest, eq. ref, constant at its final value for t > operation_time (ERRATA 26).
 
     Attributes
     ----------
@@ -296,7 +295,7 @@ class Reference:
         Raises
         ------
         ParameterError
-            For anything that has no powers, or too large ones.
+            For a stage without powers, or whose powers overflow.
         """
         if isinstance(stage, type) or not hasattr(stage, "__pow__"):
             raise ParameterError(
@@ -327,7 +326,7 @@ class SlidingReference:
     Attributes
     ----------
     task : Reference
-        With d_max, t_op and λ, its ramp; 0 without one.
+        Gives d_max, t_op, and λ, its ramp or 0.
     """
 
     task: Reference
@@ -350,7 +349,7 @@ class SlidingReference:
         return Fraction(15, 8) * share / steady
 
     def slip(self, time: Any) -> Any:
-        """r [m] at times [s] from 0 on, number or array; V goes on behind t_op."""
+        """r [m] at times [s] from 0 on, number or array; the rate is V after t_op."""
         steady, share = map(float, self._shares)
         stage = time / self.task.operation_time
         ended = (stage < 1) * stage + (stage >= 1)
@@ -365,29 +364,29 @@ class SlidingReference:
 
 
 # ----------------------------------------------------------------------
-# What acts on the fault besides the spring, the dashpot, friction and the injected fluid.
+# Disturbance: forces besides spring, dashpot, friction and injected fluid.
 
 STRESSES = ("constant", "amplitude")
 
 
 def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[float, bool]:
-    """Value [m/s²] of a text such as ``"1e-4 m/s^2"``, or of a shear stress such as ``"35 kPa"``; whether it was that.
+    """Acceleration [m/s²] of a text such as ``"1e-4 m/s^2"`` or ``"35 kPa"``; whether the text is a shear stress.
 
-    A stress τ accelerates a fault by τA/m: rounded up in size, so that what is proved of the float is so of the stress.
+    A stress τ accelerates a fault by τA/m, rounded away from 0, so that a proof for the float covers the stress.
 
     Parameters
     ----------
     authority : Fraction
         A/m [m²/kg] of the fault, the nominal one.
     name : str
-        What the quantity is, for the message.
+        Name of the quantity in error messages.
 
     Raises
     ------
     UnitError
         For another unit.
     ParameterError
-        For a stress that is no size of anything on this fault.
+        For a stress outside the range of `require_ordinary`.
     """
     try:
         return si_value(quantity, "m/s^2", name), False
@@ -397,7 +396,7 @@ def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[floa
         except UnitError as other:
             if "Did you mean" in str(other):
                 raise
-            raise UnitError(f"{error} A shear stress in Pa will do as well.") from None
+            raise UnitError(f"{error} A shear stress in Pa is accepted too.") from None
     require_ordinary(**{name: float(stress)})
     exact = abs(stress) * authority
     size = float(exact)
@@ -462,9 +461,9 @@ class Disturbance:
         return self.amplitude * self.frequency
 
     def exact_bounds(self, width: Fraction = Fraction(0)) -> tuple[Fraction, Fraction]:
-        """Both bounds [m/s²] and [m/s³] of the decimals given, for proofs: of floats they may be rounded inward.
+        """Exact bounds [m/s²], [m/s³] from the given decimals, for proofs; those in floats may be rounded inward.
 
-        A stress accelerates by up to 1 + `width` times as much, the half-width of the area per mass [-].
+        `width` [-] is the half-width of the area per mass: a stress accelerates by up to 1 + `width` times as much.
         """
         constant, amplitude = (
             abs(rational(getattr(self, name))) * (1 + width * (name in self.stresses)) for name in STRESSES
@@ -505,15 +504,15 @@ class Fault:
     disturbance : Disturbance
     box : UncertaintyBox
     assumed : tuple of str
-        What a file left to physics or to the paper's example, each in a sentence.
+        Default values that replace missing entries of a file, one sentence each.
     poor_fit : str
         Reason why the friction identified from a record is not reliable; empty if it is.
 
     Notes
     -----
-    A patch of two sides is a row of squares of its shorter side h that slip as one. Stress that slip changes reaches
-    about h into the rock, so each has the paper's mass ρh³ and stiffness Gh, and the damping is shared among them: the
-    natural frequency √(G/ρ)/h is that of one square, and moment, mass and stiffness are those of all.
+    A rectangular patch is a row of squares of its shorter side h that slip as one. Slip changes the stress up to a
+    distance of about h, so each square has the paper's mass ρh³ and stiffness Gh, and all share the damping. The
+    natural frequency √(G/ρ)/h is that of one square; moment, mass and stiffness are sums over all squares.
 
     Raises
     ------
@@ -537,7 +536,7 @@ class Fault:
     reference: Reference
     sampling_time: float = field(
         metadata=quantity(
-            "s", "10 ms", "at least ten samples while an error grows e-fold, with a state near D_c/(20 V)", symbol="T_s"
+            "s", "10 ms", "at least ten samples per e-folding time; near D_c/(20 V) with friction state", symbol="T_s"
         )
     )
     disturbance: Disturbance = field(default_factory=Disturbance)
@@ -562,7 +561,7 @@ class Fault:
             )
 
     def require_memoryless(self, purpose: str) -> None:
-        """Refuse friction with a state variable where only slip and slip rate are covered."""
+        """Raise for friction with a state variable, which `purpose` does not cover."""
         self.friction.require(purpose=purpose)
 
     def with_box(self, name: str) -> "Fault":
@@ -571,7 +570,7 @@ class Fault:
 
     @property
     def disturbance_bounds(self) -> tuple[Fraction, Fraction]:
-        """Bounds of the disturbance [m/s²] and of its rate [m/s³]; of a stress for every area per mass of the box."""
+        """Bounds of the disturbance [m/s²] and its rate [m/s³]; for a stress, over every area per mass of the box."""
         return self.disturbance.exact_bounds(self.box.authority)
 
     def with_disturbance(self, disturbance: Disturbance) -> "Fault":
@@ -580,12 +579,12 @@ class Fault:
 
     @property
     def side(self) -> float:
-        """h [m], the shorter side of the patch; L of a square one."""
+        """h [m], the shorter side of the patch; L for a square patch."""
         return min(self.length, self.width or self.length)
 
     @cached_property
     def squares(self) -> Fraction:
-        """n, exact: the longer over the shorter side [-]; 1 of a square one."""
+        """n, exact: the longer over the shorter side [-]; 1 for a square patch."""
         sides = [rational(self.length), rational(self.length if self.width is None else self.width)]
         return max(sides) / min(sides)
 
@@ -643,31 +642,31 @@ class Fault:
 
     @property
     def stress_drop(self) -> float:
-        """Δτ = (μ_max − μ_res)σ'_n [Pa]; nan for friction with a state, whose drop is that of an event."""
+        """Δτ = (μ_max − μ_res)σ'_n [Pa]; nan for friction with a state, whose drop depends on the event."""
         return float(_strength_drop(self.friction)) * self.effective_normal_stress
 
     @property
     def seismic_moment(self) -> float:
         """M0 = GAD [N·m] of the rest slip D; 0 for a stable fault, nan for friction with a state: see `moment_of`.
 
-        The paper's nh³Δτ is that of a fault on which friction loses all that it can.
+        The paper's nh³Δτ assumes that friction drops from its maximum to its residual value.
         """
         return self.moment_of(self.rest_slip)
 
     @property
     def magnitude(self) -> float:
-        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity for a stable fault, nan as `seismic_moment`."""
+        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity for a stable fault, nan if the moment is."""
         return magnitude(self.seismic_moment)
 
     def moment_of(self, slip: float) -> float:
-        """M0 = GAD [N·m] of an event that slips by D [m]: L³Δτ with the stress that the spring loses."""
+        """M0 = GAD [N·m] of an event that slips by D [m]: L³Δτ, with Δτ the stress drop of the spring."""
         return self.shear_modulus * self.area * slip
 
     @cached_property
     def rest_slip(self) -> float:
         """Slip [m] at which the fault comes to rest next: the stable root of the statics; 0 for a stable fault.
 
-        nan for friction with a state, which has no strength of its own at rest.
+        nan for friction with a state, which has no fixed strength at rest.
         """
         return rest_slip(self.friction, self.effective_normal_stress * self.area, self.stiffness)
 
@@ -676,7 +675,7 @@ _UNITS = {each.name: each.metadata["unit"] for each in fields(Fault) if "unit" i
 
 
 def require_plant(**numbers: float) -> None:
-    """Refuse numbers of a fault that are unphysical, all of them at once."""
+    """Raise for unphysical numbers of a fault, all in one exception."""
     problems = Problems()
     compression = "Compression is positive here; check the sign."
     for name, value in numbers.items():
@@ -691,7 +690,7 @@ def require_plant(**numbers: float) -> None:
 
 
 def magnitude(seismic_moment: float) -> float:
-    """M_w = ⅔log10(M0) − 6.07 [-] of a seismic moment [N·m], eq. magnitude; minus infinity of none."""
+    """M_w = ⅔log10(M0) − 6.07 [-] of a seismic moment [N·m], eq. magnitude; minus infinity for a moment of 0."""
     return -math.inf if seismic_moment <= 0 else 2 / 3 * math.log10(seismic_moment) - 6.07
 
 
@@ -699,12 +698,12 @@ _ACCEPTED = "poor-fit"
 
 
 def with_accepted_fit(fault: Fault, accept_poor_fit: bool) -> Fault:
-    """A fault to design for: one whose friction a record does not support only if that is accepted, and named so."""
+    """The fault to design for; a poor fit must be accepted, and the name then ends with ``poor-fit``."""
     if not fault.poor_fit:
         return fault
     if not accept_poor_fit:
         raise ParameterError(
-            f"the friction of {fault.name} must be one that its record supports. Received: {fault.poor_fit}. Identify "
+            f"the friction of {fault.name} must be supported by its record. Received: {fault.poor_fit}. Identify "
             "it from a better record, or accept it with --accept-poor-fit (accept_poor_fit=True)."
         )
     source = f"poor fit accepted ({fault.poor_fit}); {fault.source}"
@@ -712,7 +711,7 @@ def with_accepted_fit(fault: Fault, accept_poor_fit: bool) -> Fault:
 
 
 def require_fault(fault: Fault) -> Fault:
-    """The fault, if it is one."""
+    """Return the fault; raise for any other object."""
     if not isinstance(fault, Fault):
         raise ParameterError(f"fault must be a Fault. Received {fault!r:.60}. Write load_fault('real-fault'), say.")
     return fault

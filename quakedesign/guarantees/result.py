@@ -22,11 +22,11 @@ class Guarantee:
     ----------
     proof : Proof or NoProof
     worst : WorstCase or None
-        Largest values that a search reaches on the same loop; None without a proof, and where none is searched.
+        Largest values that a search reaches on the same loop; None without a proof or a search.
     worst_with_stick : WorstCase or None
         The same on the stick–slip plant, for a proof on the plant without stick.
     compensation : Compensation or None
-        Of a sliding mode: its gains, scale and settings in the scheme that is guaranteed.
+        Gains, scale and settings of a sliding mode in the guaranteed scheme.
     not_at_rest, stick_slip_gap : str
         Why there is no proof on the stick–slip plant, and what is not searched there.
     least_slip_rate : LowerBound or None
@@ -94,7 +94,7 @@ class Guarantee:
         return str(self.proof.sentence())
 
     def lines(self) -> list[str]:
-        """For people: the guarantee first, then the worst case found."""
+        """Lines of text: the guarantee, then the worst case found."""
         return [f"proved: {self.sentence()}" if self.proved else self.sentence()]
 
     def limit_lines(self) -> list[str]:
@@ -106,7 +106,7 @@ class Guarantee:
         return []
 
     def check(self) -> Verdict:
-        """Decide the guarantee again in exact arithmetic; UNDECIDED without one."""
+        """Re-check the guarantee in exact arithmetic; UNDECIDED without one."""
         return Verdict(self.proof.check())
 
     def to_dict(self) -> dict[str, Any]:
@@ -159,7 +159,7 @@ class PlantGuarantee(Guarantee):
     compensation: None = None
 
     def lines(self) -> list[str]:
-        """The guarantee, then what was changed in the law."""
+        """Lines of text: the guarantee, then changes of the law."""
         return self.proof.statement() if self.proof.proved else super().lines()
 
     @property

@@ -46,20 +46,20 @@ class TrackingGuarantee(Guarantee):
     fault : Fault
     proof : TrackingProof or NoProof
     worst, stick_search : WorstCase or None
-        Of a search on the same loop, and on the stick–slip plant; None without a guarantee.
+        Worst cases found on the same loop, and on the stick–slip plant; None without a guarantee.
     shorter : TrackingProof or None
-        For a design without a guarantee at its step: one near the longest step that has one.
+        Proof near the longest step that has one, if the design has no guarantee at its own step.
     unproved_step : Fraction or None
         T_s [s] that has no guarantee where `shorter` has one.
     nearest : (str, TrackingProof) or None
-        For a loop without a guarantee: another quantity of its setup and a design with the value nearest to it that
-        has one, all else as it is; `GAINS` for a design in place of given gains, `FACTOR` for a law with its pressure
-        times `factor`.
+        For a loop without a guarantee: a quantity of its setup, and the proof of a design with the nearest value of
+        this quantity alone. `GAINS` is a design in place of given gains, `FACTOR` the law with its pressure times
+        `factor`.
     factor : Fraction or None
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode in the scheme ``compensated``.
     notes : tuple of str or None
-        Of a user's law: what was changed when its floats became exact numbers; None for others.
+        Changes of a user-defined law when its floats became exact numbers; None for other laws.
     not_at_rest : str
         Why there is no guarantee on the stick–slip plant, where one was searched for.
     given : bool
@@ -81,7 +81,7 @@ class TrackingGuarantee(Guarantee):
 
     @cached_property
     def worst_with_stick(self) -> WorstCase | None:
-        """Worst case found on the stick–slip plant; for a given law it is searched for here.
+        """Worst case found on the stick–slip plant; for a given law the search runs on access.
 
         None for a law that uses the slip, the slip rate or the reference itself, or that is unstable by itself.
         """
@@ -124,8 +124,8 @@ class TrackingGuarantee(Guarantee):
         lines += [*filter(None, [self.stick_slip_gap]), *self._differentiator_lines(), *self.task_lines()]
         if self.leaves_with_stick:
             lines.append(
-                "on the stick-slip plant a course was found that exceeds the bounds, which are those of the plant "
-                "without stick"
+                "on the stick-slip plant a run was found that exceeds the bounds, which are proved on the plant "
+                "without stick only"
             )
         return lines if self.compensation is None else [*lines, self.compensation.sentence()]
 
@@ -159,7 +159,7 @@ class TrackingGuarantee(Guarantee):
         return UpperBound(least_bound(self.proof.slip_acceleration, self.proof.held.slip_noise, self.proof.held.step))
 
     def _differentiator_lines(self) -> list[str]:
-        """For people; nothing of a law without a differentiator."""
+        """Line of text on the differentiator; none for a law without one."""
         bound = self.differentiator_bound
         if bound is None:
             return []
@@ -169,7 +169,7 @@ class TrackingGuarantee(Guarantee):
         ]
 
     def _at_rest(self) -> list[str]:
-        """For people; nothing of a law that does not grow."""
+        """Warning about a law whose states grow while the fault is at rest; none for other laws."""
         if not self.proof.proved:
             return []
         limited = self.proof.rest_limit is not None
@@ -276,7 +276,7 @@ FACTOR = "pressure_factor"
 _QUANTITIES = {
     "delay_jitter": ("jitter of the delay", "s"),
     "jitter": ("jitter", "s"),
-    "averaging": ("time of averaging", "s"),
+    "averaging": ("averaging time", "s"),
     "delay": ("delay", "s"),
     "lag": ("lag", "s"),
     "diffusion": ("diffusion time L^2/D", "s"),
@@ -285,7 +285,7 @@ _QUANTITIES = {
 
 
 def _with_nearest(name: str, proof: TrackingProof) -> str:
-    """For people."""
+    """Clause that names the nearest setup with a guarantee."""
     if name == GAINS:
         return "with designed gains"
     if name in _QUANTITIES:
@@ -294,7 +294,7 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
             return f"without any {title}"
         if name not in ("delay", "lag", "diffusion"):
             return f"with a {title} of at most {LowerBound(value).quantity(unit)}"
-        text = shortly(value)  # one value: nothing is proved of smaller ones
+        text = shortly(value)  # not "at most": nothing is proved for smaller values
         return f"with a {title} of {text if Fraction(text) == value else exact_text(value)} {unit}"
     if name == BOX:
         pairs = zip(proof.task.spreads, ("k", "eta", "N"), strict=True)
@@ -312,7 +312,7 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
 
 
 def _nearest(name: str, proof: TrackingProof, factor: Fraction | None) -> dict[str, Any]:
-    """Plain values, SI; exact numbers as texts, of a box and of a pump's pressures several."""
+    """Plain values, SI; exact numbers as texts; a list for a box and for limits of a pump."""
     pump, value = proof.held.pump, None
     if name == FACTOR:
         value = str(factor)
@@ -350,12 +350,12 @@ def given_law_with_worst_case(
 
 
 def _with_room(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
-    anyhow, worst = guarantee(proof.task, proof.held), seen.worst_with_stick
-    if not anyhow.proved or worst is None:
+    arbitrary, worst = guarantee(proof.task, proof.held), seen.worst_with_stick
+    if not arbitrary.proved or worst is None:
         return seen
-    left = ["slip_error"] if worst.slip_error > proof.claims.slip_error else []
-    left += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate > proof.claims.slip_rate_error else []
-    claims = replace(proof.claims, **{name: getattr(anyhow.claims, name) for name in left})
+    exceeded = ["slip_error"] if worst.slip_error > proof.claims.slip_error else []
+    exceeded += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate > proof.claims.slip_rate_error else []
+    claims = replace(proof.claims, **{name: getattr(arbitrary.claims, name) for name in exceeded})
     wider = replace(seen, proof=replace(proof, claims=claims))
     return seen if wider.leaves_with_stick or wider.proof.check() is not Verdict.PROVED else wider
 

@@ -58,7 +58,7 @@ class Setup:
     experiment: Experiment
     used: ndarray
     notes: tuple[str, ...]
-    starts: tuple[Coordinate, ...] = ()  # Of a beginning off the equilibrium, where there are any
+    starts: tuple[Coordinate, ...] = ()  # coordinates of an unsteady beginning, if any
 
 
 def set_up(
@@ -68,10 +68,11 @@ def set_up(
     loading: Loading | None = None,
     nuisance: Collection[str] = (),
 ) -> Setup:
-    """The experiment of a record as `prepared` gives it, by what its law depends on and what was measured.
+    """Experiment of a prepared record, chosen by the variables of the law and the measured columns.
 
-    `nuisance` is what is fitted besides law and stiffness: `TREND` or `TREND_IN_TIME`, `START_STATE` (with
-    `START_RATE`). Raises `RecordError` when the law is of neither kind, or something is missing.
+    `nuisance` names what is fitted besides law and stiffness: `TREND` or `TREND_IN_TIME`, `START_STATE` (with
+    `START_RATE`). Raises `RecordError` when the law depends on neither slip nor state, or a column
+    is missing.
     """
     setup = _setup(law, record, stiffness, loading, START_STATE in nuisance)
     for name, along in ((TREND, record.path), (TREND_IN_TIME, record.time)):
@@ -86,7 +87,7 @@ def _template(law: type[FrictionLaw]) -> FrictionLaw:
 
 
 def _coordinate(name: str, law: type[FrictionLaw], record: Record, path: float) -> Coordinate:
-    """Where one quantity of a law is sought; `path` is how far the block can have slipped [m]."""
+    """Search range of one quantity of a law; `path` is the largest possible slip of the block [m]."""
     unit = law.quantities()[name].metadata["unit"]
     if name in ("evolution_effect", SECOND_EFFECT):
         start = (-0.005, 0.025) if name == "evolution_effect" else (-0.01, 0.01)
@@ -109,8 +110,8 @@ def _of_slip(
     slip, rate = sp.symbols("slip rate", positive=True)
     if sp.sympify(_template(law).symbolic().coefficient(slip, rate)).has(rate):
         raise RecordError(
-            f"a law that is identified must depend on slip or on a state. Received {law.name}, which depends on the "
-            "slip rate alone. Take another."
+            f"a law to identify must depend on slip or on a state. Received {law.name}, which depends on the slip "
+            "rate alone. Choose another law."
         )
     return _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
 
@@ -127,7 +128,7 @@ def _sliding(
     if not first > 0:
         raise RecordError(
             f"a record for {law.name} must begin in steady sliding. Received a load point that moves at {first:.3g} "
-            "m/s. Cut off what is before with --from."
+            "m/s. Cut off the part before with --from."
         )
     drive, measured = loading.drive(record)
     path = float(np.ptp(record.load_point))
@@ -149,7 +150,7 @@ def _sliding(
         steps=tuple((length,) for length in drive.lengths.tolist()),
         measured=measured,
     )
-    begins = f"in {'a state off that of ' if unsteady else ''}steady sliding at {first:.4g} m/s"
+    begins = f"in {'a state other than ' if unsteady else ''}steady sliding at {first:.4g} m/s"
     notes = (f"the record begins {begins}", *loading.notes)
     late = delayed(experiment, *loading.delays(record))
     return Setup(experiment=late, used=np.ones(len(record.time), dtype=bool), notes=notes, starts=_START)
@@ -159,7 +160,7 @@ _setup = by_equilibrium(rest=_of_slip, sliding=_sliding)
 
 
 def _stiffness(record: Record, path: float, given: float | None) -> list[Coordinate]:
-    """Unless given, about that at which the whole friction takes between all and 1e-4 of the path."""
+    """Coordinate of the stiffness unless it is given, scaled by the largest shear load over the path."""
     if given is not None:
         return []
     whole = float(np.max(record.normal) * np.max(np.abs(record.friction))) / path
@@ -168,7 +169,7 @@ def _stiffness(record: Record, path: float, given: float | None) -> list[Coordin
 
 
 def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
-    """Samples after the slip has left the noise about zero for good."""
+    """Experiment of a measured slip, after its last sample within the noise about zero."""
     assert record.slip is not None
     noise = scatter(record.time, record.slip)
     resting = np.flatnonzero(record.slip <= FAR_OFF * noise)
@@ -211,14 +212,14 @@ AGEING, SLIP = "rate-and-state-aging", "rate-and-state-slip"
 _LEAST_NEAR = 2  # searches, where the first begins near the fit of a similar law
 _EFFECTS_OF = ("direct_effect", "evolution_effect", SECOND_EFFECT)
 _MOST_BETTER = 10
-_MOST_MOVES = 4  # of the times of changes of rate, which a delay moves to first order
+_MOST_MOVES = 4  # corrections of the times of rate changes, each to first order in the delay
 _TRENDS = {"": "without a trend", TREND: "with a trend in displacement", TREND_IN_TIME: "with a trend in time"}
 _ONE_TREND = {"displacement": {TREND}, "time": {TREND_IN_TIME}}
 TREND_CHOICES = "auto", *_ONE_TREND, "none"
-_STAYS = 0.5  # deviations: a delay as small needs no move
-_UNFELT = 0.1  # deviations of the whole record by which an error of a rate moves friction unseen
-_UNSEEN = 1e-5  # of the range of friction
-_CHANCE = 0.01  # of a trend or an unsteady beginning that is fitted to noise: they move a - b
+_STAYS = 0.5  # standard deviations: a smaller delay needs no correction
+_UNFELT = 0.1  # negligible effect of a rate error, in standard deviations of the whole record
+_UNSEEN = 1e-5  # of the range of friction: resolution that no machine reaches
+_CHANCE = 0.01  # probability that a trend or an unsteady beginning is fitted to noise, which changes a - b
 
 
 def identify(
@@ -234,33 +235,32 @@ def identify(
 ) -> Identification:
     """Friction parameters of a laboratory record, each with its profile likelihood at 95 %.
 
-    A law with state is fitted to the simulated experiment: a block without inertia that a spring draws after the load
-    point, which moves in straight pieces. A law that weakens with slip is fitted at the measured slip, or without one
-    to a block that sticks at first and then slips as the stiff spring lets it. A trend of friction with displacement
-    and a beginning off steady sliding are fitted as well where their likelihood says so. Noise is white, with a part
-    that fades with time or displacement where that is likelier. Of a long record, means of neighbouring samples are
-    fitted, each with the weight of its samples.
+    A law with state is fitted by simulation of the experiment: a spring connects a block without inertia to the load
+    point, whose rate is piecewise constant. A law that weakens with slip is fitted at the measured slip, or without one
+    to a block that sticks at first and then slips against a stiff spring. A trend of friction with displacement and an
+    unsteady beginning are fitted as well where the likelihood favours them. Noise is white, with a part correlated over
+    time or displacement where the likelihood favours it. A long record is fitted by means of neighbouring samples, each
+    with the weight of its samples.
 
     Parameters
     ----------
     record : Record, str or Path
-        Or a file of one, see `read_record`.
+        A record, or the path of its file, see `read_record`.
     law : str, optional
-        Name of a friction law with state, or of one that depends on slip. Unless told, the ageing and the slip law are
-        both fitted, and the one that leaves the smaller residuals is taken.
+        Name of a friction law with state, or of one that depends on slip. By default the ageing and the slip law are
+        both fitted, and the one with smaller residuals is selected.
     stiffness : float, optional
-        Of the machine, known exactly [Pa/m; N/m for a record of forces, 1/m for one of friction alone]; fitted unless
-        given.
+        Exact machine stiffness [Pa/m; N/m for a record of forces, 1/m for one of friction alone]; fitted unless given.
     normal_stress : float, optional
-        Constant [Pa], where a file has no such column.
+        Constant normal stress [Pa], where a file has no such column.
     rates : sequence of float
-        Of the load point [m/s], one after the other, where they are known; from its displacement unless given.
+        Successive rates of the load point [m/s], if known; by default from its displacement.
     states : int
-        1, or 2 for a second evolution effect with its own slip; no fault file holds two.
+        1, or 2 for a second evolution effect with its own slip, which a fault file cannot state.
     trend : str
         ``"displacement"``, ``"time"`` or ``"none"``; chosen by likelihood by default.
     seed : int
-        Of the draw of the starts.
+        Seed of the random starting points.
 
     Returns
     -------
@@ -269,7 +269,7 @@ def identify(
     Raises
     ------
     RecordError
-        When the record cannot be read, or does not suit the law.
+        When the record cannot be read, or is unsuitable for the law.
     UnknownNameError
         For a law that does not exist.
     """
@@ -277,14 +277,14 @@ def identify(
     if not isinstance(record, Record):
         record = read_record(record, normal_stress=normal_stress)
     elif normal_stress is not None:
-        raise RecordError("normal_stress is for a file. Received it with a Record. Put it into the record.")
+        raise RecordError("normal_stress is for a file. Received it with a Record. Set it in the record.")
     return identified_as(record, kinds_of(law, states), stiffness=stiffness, rates=rates, trend=trend, seed=seed)
 
 
 def kinds_of(law: str | None, states: int) -> list[type[FrictionLaw]]:
-    """Laws that are fitted: the one that was asked for, or the ageing and the slip law."""
+    """Laws to fit: the requested law, or the ageing and the slip law."""
     if states not in (1, 2):
-        raise RecordError(f"states must be 1 or 2. Received {states}. Take 2 where one does not explain the record.")
+        raise RecordError(f"states must be 1 or 2. Received {states}. Use 2 if one state does not explain the record.")
     return [friction_law(name) if states == 1 else with_two_states(name) for name in ([law] if law else [AGEING, SLIP])]
 
 
@@ -297,7 +297,7 @@ def identified_as(
     trend: str = "auto",
     seed: int = 0,
 ) -> Identification:
-    """`identify` by given laws, of which the likeliest is taken."""
+    """Identification with given laws, of which the likeliest is selected."""
     require_whole(0, seed=seed)
     require_positive(stiffness=1.0 if stiffness is None else stiffness)
     require_known(trend, TREND_CHOICES, "trend", UnknownNameError)
@@ -319,7 +319,7 @@ class _Fitted:
 
 @dataclass(frozen=True, kw_only=True)
 class _Choice:
-    """Which law, which nuisance parameters and which noise a record has."""
+    """Selection of the law, the nuisance parameters and the noise of a record."""
 
     record: Record
     raw: Record
@@ -327,19 +327,19 @@ class _Choice:
     stiffness: float | None
     seed: int
     trend: str = "auto"
-    by_load: ndarray | None = None  # when pieces begin by the load point alone [s]
+    by_load: ndarray | None = None  # starts of the pieces by the load point alone [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
-        """Profiles about the best fit of the best law, at the times of changes of rate that friction shows."""
+        """Profiles about the best fit of the best law, with the times of rate changes corrected by friction."""
         first = _ONE_TREND.get(self.trend, {TREND} if self.trend == "auto" else set())
         fits: list[_Fitted] = []
         for kind in kinds:
             try:
                 near = fits[0].best if fits else None
-                if len(kind.state_names) > 1:  # which a trend helps to stand for each other
+                if len(kind.state_names) > 1:  # with a trend, two states can replace each other
                     near = self._fitted(kind, (), None).best
                 fits.append(self._fitted(kind, first, near))
-            except RecordError:  # which no spring holds without a jump
+            except RecordError:  # no spring prevents a jump with this law
                 if not fits:
                     raise
         choice = self
@@ -354,7 +354,7 @@ class _Choice:
         return replace(result, assessment=choice._assessed(result, others))
 
     def _moved(self, fitted: _Fitted) -> "_Choice | None":
-        """The same with changes of rate at the times that friction shows; nothing where they are there already."""
+        """Choice with the times of rate changes corrected by friction; None if they need no correction."""
         coordinates = fitted.best.experiment.coordinates
         places = [place for place, c in enumerate(coordinates) if c.name.startswith(DELAY)]
         delays, errors = fitted.best.fitted[places], fitted.best.deviations[places]
@@ -372,9 +372,9 @@ class _Choice:
         return replace(self, record=record, loading=loading, by_load=original)
 
     def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, Rival | None, dict[str, tuple[_Fitted, float]]]:
-        """The best law, with trend and beginning where these are likelier; the next law, and fits that may be right.
+        """Best law, with trend and unsteady beginning where likelier; rival law; alternative fits.
 
-        These are fits with other trends, and of the next law where the record hardly tells the laws apart.
+        Alternatives are fits with other trends, and of the rival law if the record hardly distinguishes the laws.
         """
         noise, rival = self._noise(min(fits, key=lambda fitted: fitted.best.squares)), None
         fits = sorted((_with_noise(each, noise) for each in fits), key=lambda fitted: fitted.best.squares)
@@ -391,25 +391,25 @@ class _Choice:
         return better, rival, others
 
     def _trend(self, fitted: _Fitted) -> tuple[_Fitted, dict[str, tuple[_Fitted, float]]]:
-        """The fit with the trend that is taken or without one; others, with what their AIC is higher by.
+        """Fit with the selected trend or without one; other fits, with the excess of their AIC.
 
-        A trend in time takes the place of one in displacement where its AIC is lower by `DECISIVE`.
+        A trend in time replaces one in displacement where its AIC is lower by `DECISIVE`.
         """
         own, rest = next(iter(_nuisance(fitted) & _TRENDS.keys()), ""), _nuisance(fitted) - _TRENDS.keys()
         names = {"", own} if self.trend in _ONE_TREND else _TRENDS
         same = fitted, fitted.best.squares
         fits = {name: same if name == own else self._among(fitted, {*rest, name} - {""}) for name in sorted(names)}
         aic = {name: fitted.best.excess(squares) + 2 * bool(name) for name, (_, squares) in fits.items()}
-        late = self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE
-        taken = TREND_IN_TIME if late else own
-        if taken and not needed(fits[taken][0].best, fits[""][1]):
-            taken = ""
-        better, _ = fits.pop(taken)
-        others = {_TRENDS[name]: (other, aic[name] - aic[taken]) for name, (other, _) in fits.items()}
+        in_time = self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE
+        selected = TREND_IN_TIME if in_time else own
+        if selected and not needed(fits[selected][0].best, fits[""][1]):
+            selected = ""
+        better, _ = fits.pop(selected)
+        others = {_TRENDS[name]: (other, aic[name] - aic[selected]) for name, (other, _) in fits.items()}
         return better if better is fitted else _again(better), others
 
     def _assessed(self, result: Identification, others: Mapping[str, tuple[_Fitted, float]]) -> Assessment:
-        """Tests of what was taken for granted, and what the record leaves open."""
+        """Tests of the assumptions, and quantities that the record does not determine."""
         values = result.fit.experiment.outward(result.fit.fitted)
         checks, factor = checks_of(result.fit, self.raw, self.record, result.used, self.loading, values)
         shift, doubted = self._late_trend(result), {}
@@ -417,18 +417,18 @@ class _Choice:
             if result.difference is not None and in_doubt(excess, shift):
                 try:
                     doubted[trend] = _difference(other.best, jointly=False), excess
-                except BetterFit:  # whose valley leads elsewhere: its sign is open
+                except BetterFit:  # the profile leads to another minimum: the sign is undetermined
                     doubted[trend] = replace(result.difference, low=-math.inf, high=math.inf), excess
-        off = unsteady_beginning(result.difference, values, self.loading) if self.loading is not None else ""
-        sign = sign_check(result.difference, doubted, shift, off)
+        unsteady = unsteady_beginning(result.difference, values, self.loading) if self.loading is not None else ""
+        sign = sign_check(result.difference, doubted, shift, unsteady)
         checks = checks if sign is None else (*checks, sign)
-        untold = (*result.untold(), *([sign.sentence] if sign is not None and not sign.passed else []))
-        return Assessment(checks=checks, factor=factor, open=untold, experiments=tuple(result.experiments(sign)))
+        undetermined = (*result.untold(), *([sign.sentence] if sign is not None and not sign.passed else []))
+        return Assessment(checks=checks, factor=factor, open=undetermined, experiments=tuple(result.experiments(sign)))
 
     def _late_trend(self, result: Identification) -> float | None:
-        """By how much a - b changes if the trend begins with the first change of rate; None if it does not.
+        """Change of a - b if the trend begins at the first change of rate; None if that fits decisively worse.
 
-        A slow evolution of friction after a change of rate looks like a trend that the beginning does not have.
+        A slow evolution of friction after a change of rate looks like a trend, which is absent before.
         """
         fit, loading, load = result.fit, self.loading, self.record.load_point
         values = fit.experiment.outward(fit.fitted)
@@ -448,7 +448,7 @@ class _Choice:
     def _fitted(
         self, kind: type[FrictionLaw], nuisance: Collection[str], near: Fit | None, start: bool = True
     ) -> _Fitted:
-        """Best fit of a law, sought near that of a similar one; there alone, or by starts too."""
+        """Best fit of a law, searched near that of a similar law, and with `start` from random points too."""
         setup = set_up(self.record, kind, self.stiffness, self.loading, nuisance)
         measured = self.record.friction[setup.used]
         counts = None if self.record.counts is None else self.record.counts[setup.used]
@@ -470,10 +470,10 @@ class _Choice:
         return replace(noise or none, common=moved / best.noise) if moved.size else noise
 
     def _moved_by_rates(self, fitted: _Fitted) -> ndarray:
-        """By how much friction moves with one deviation of each rate of the load point, where that is felt.
+        """Change of friction per standard deviation of each load-point rate, where it is not negligible.
 
-        Rates that are taken from noisy displacements are unknowns with a known spread. As part of the covariance of
-        the samples they widen the regions of a and b by as much as they would if they were fitted with that spread.
+        Rates computed from noisy displacements are unknowns with a known spread. As part of the covariance of the
+        samples they widen the regions of a and b as much as if they were fitted with that spread.
         """
         best, loading = fitted.best, self.loading
         columns: list[ndarray] = []
@@ -481,10 +481,10 @@ class _Choice:
             values = best.experiment.outward(best.fitted)
             effects = [values.get(name, 0.0) for name in _EFFECTS_OF]
             size, strengthens = max(map(abs, effects)), effects[0] - sum(effects[1:])
-            felt = best.noise * _UNFELT / float(np.sqrt(np.sum(best.counts)))
+            negligible = best.noise * _UNFELT / float(np.sqrt(np.sum(best.counts)))
             before = best.experiment.friction(best.fitted)
             for place, error in enumerate(loading.pieces.errors.tolist()):
-                if not felt < size * error < size:
+                if not negligible < size * error < size:
                     continue
                 rates = loading.pieces.rates.copy()
                 rates[place] *= 1 + error
@@ -492,20 +492,20 @@ class _Choice:
                 setup = set_up(self.record, fitted.kind, self.stiffness, other, _nuisance(fitted))
                 if len(setup.experiment.coordinates) == len(best.fitted):
                     moved = setup.experiment.resolved(best.fitted, best.accuracy).friction(best.fitted) - before
-                    moved += strengthens * np.log1p(error) * (place == 0)  # at the reference rate that stays
+                    moved += strengthens * np.log1p(error) * (place == 0)  # at an unchanged reference rate
                     columns += [moved] * bool(np.all(np.isfinite(moved)))
         columns = [each for each in columns if np.linalg.norm(each * np.sqrt(best.counts)) > _UNFELT * best.noise]
         return np.array(columns).T.reshape(len(best.measured), len(columns))
 
     def _extended(self, fitted: _Fitted) -> _Fitted:
-        """With a beginning off steady sliding, where that is likelier."""
+        """Fit with an unsteady beginning, where it improves the fit significantly."""
         if not fitted.setup.starts:
             return fitted
         wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
         return _again(wider) if needed(wider.best, fitted.best.squares, len(_START)) else fitted
 
     def _without_start(self, fitted: _Fitted) -> _Fitted:
-        """Without an unsteady beginning, where a region of 95 % holds a steady one."""
+        """Fit without an unsteady beginning, unless it improves the fit significantly."""
         if START_STATE not in _nuisance(fitted):
             return fitted
         narrower, squares = self._among(fitted, _nuisance(fitted) - {START_STATE})
@@ -521,7 +521,7 @@ class _Choice:
 def profiled(
     best: Fit, record: Record, setup: Setup, seed: int, names: Collection[str] | None = None
 ) -> Identification:
-    """Profiles about the best fit, of parameters by name or all; about a better fit if a profile comes upon it."""
+    """Profiles about the best fit, of parameters by name or all; restarted if a profile finds a better fit."""
     for _ in range(_MOST_BETTER):
         try:
             estimates = _estimates(best, names)
@@ -531,12 +531,12 @@ def profiled(
             best = settled(replace(best, fitted=better.fitted, agreeing=1))
     else:
         raise RecordError(
-            "a record must have one best fit. Received one whose fit gets better wherever it is followed. Give the "
+            "a record must have one best fit. Received one whose profiles keep finding better fits. Give the "
             "stiffness, or a record with more steps."
         )
     pair = [name for name in _EFFECTS_OF if name in estimates]
     if difference is not None and difference.identified and not any(estimates[name].identified for name in pair):
-        # along a valley of equal fits, ends that a search comes upon mean nothing
+        # along a valley of equal fits, the ends found by a search are meaningless
         ends: dict[str, Any] = {"low": -math.inf, "high": math.inf, "least": -math.inf, "most": math.inf}
         estimates |= {name: replace(estimates[name], **ends) for name in pair}
     law, notes = best.experiment.best_law(best.fitted), best.experiment.remarks(best.fitted, best.noise)
@@ -545,13 +545,13 @@ def profiled(
 
 
 def needed(best: Fit, squares: float, fewer: int = 1) -> bool:
-    """Whether noise leaves so much better a fit than with so many parameters fewer in 1 record of 100, or none at all.
+    """Whether `fewer` further parameters improve a fit significantly, at a level of 1 %.
 
-    By Fisher's F with the pieces of the noise; what no machine measures does not count.
+    Fisher's F test with the pieces of the noise; an improvement below the resolution of machines does not count.
     """
-    floor = _UNSEEN * float(np.ptp(best.measured))
-    seen = squares - best.squares > floor**2 * best.freedom
-    return seen and best.excess(squares) > best.threshold(fewer, _CHANCE)
+    resolution = _UNSEEN * float(np.ptp(best.measured))
+    measurable = squares - best.squares > resolution**2 * best.freedom
+    return measurable and best.excess(squares) > best.threshold(fewer, _CHANCE)
 
 
 def _nuisance(fitted: _Fitted) -> set[str]:
@@ -570,8 +570,8 @@ def _with_noise(fitted: _Fitted, noise: CorrelatedNoise | None) -> _Fitted:
 def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, ParameterEstimate]:
     """Estimates of coordinates by name or all, those of the law first.
 
-    Where a law has both effects, profiles are followed in coordinates that hold their difference: where a record tells
-    only that, the valley of equal fits is straight in them.
+    For a law with both effects, their difference is a coordinate of the profiles: if the record determines only the
+    difference, the valley of equal fits is straight.
     """
     names, effects = [c.name for c in best.experiment.coordinates], _effects(best)
     estimates = {}
@@ -584,7 +584,7 @@ def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, Pa
 
 
 def _effects(best: Fit) -> list[int]:
-    """Places of the direct effect and all evolution effects."""
+    """Indices of the direct effect and all evolution effects."""
     names = [c.name for c in best.experiment.coordinates]
     return [names.index(name) for name in _EFFECTS_OF if name in names]
 
@@ -596,7 +596,7 @@ def _difference(best: Fit, jointly: bool = True) -> ParameterEstimate | None:
 
 
 def _turned(best: Fit, place: int, effects: Sequence[int], jointly: bool = True) -> ParameterEstimate:
-    """Estimate in coordinates with the difference of some in place of the first of them."""
+    """Estimate in coordinates with the difference of the effects in place of the first effect."""
     turned = Difference(whole=best.experiment, first=effects[0], seconds=tuple(effects[1:]))
     try:
         return _estimate(replace(best, experiment=turned, fitted=turned.difference(best.fitted)), place, jointly)
@@ -605,7 +605,7 @@ def _turned(best: Fit, place: int, effects: Sequence[int], jointly: bool = True)
 
 
 def _estimate(best: Fit, place: int, jointly: bool = True) -> ParameterEstimate:
-    """Estimate of one coordinate, alone and of all at once where that is wanted too."""
+    """Estimate of one coordinate, with its own interval and, if `jointly`, that of all coordinates at once."""
     profile = Profile(best, place)
     alone = profile.interval(best.threshold(1))
     of_all = profile.interval(best.threshold(len(best.fitted))) if jointly else alone

@@ -29,7 +29,7 @@ COLUMNS = {
     "slip": "m",
     "weight": "",
 }
-"""Every known column and its SI unit."""
+"""SI unit of every column that a record may have."""
 
 _NAMES = {
     "time": "t elapsedtime seconds",
@@ -45,23 +45,23 @@ _NAMES = {
 _MEANT = {name.replace("_", ""): name for name in COLUMNS} | {
     other: name for name, others in _NAMES.items() for other in others.split()
 }
-"""What names of laboratories mean, without capitals and signs."""
+"""Column of each name that laboratories use, in lower case without punctuation."""
 _UNITS = {"mic": "um", "micron": "um", "microns": "um", "sec": "s", "secs": "s", "seconds": "s"}
 _UNITS |= {"MPA": "MPa", "Mpa": "MPa", "mpa": "MPa", "KPa": "kPa", "kpa": "kPa", "Pascal": "Pa"}
 _COUNTS = {"bit", "bits", "volt", "volts", "V", "mV", "counts"}
 _SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
-_SAME = 0.01  # of friction, by which two columns of it may differ
-_PLAUSIBLE = 0.01, 3.0  # median friction [-]: another costs minutes of a fit
+_SAME = 0.01  # largest relative difference of two columns of friction
+_PLAUSIBLE = 0.01, 3.0  # range of the median friction [-]; outside it a fit takes minutes
 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Record:
-    """What was measured, in SI, one value a sample.
+    """Measured signals in SI units, one value per sample.
 
     Attributes
     ----------
     name : str
-        Of the file.
+        Name of the file.
     time : ndarray
         [s], ascending.
     friction : ndarray
@@ -75,11 +75,11 @@ class Record:
     normal_unit : str
         ``"Pa"``, ``"N"`` or nothing.
     counts : ndarray or None
-        Of how many measurements every sample is the mean, or its weight; one by default.
+        Number of measurements whose mean each sample is, or its weight; 1 by default.
     load_rates : ndarray or None
         Rates of the load point from each sample on [m/s], where these were recorded in place of its displacement.
     remarks : tuple of str
-        What was decided when it was read.
+        Decisions made when the file was read.
     origin : float
         Time of the first sample in its file [s].
     """
@@ -101,7 +101,7 @@ class Record:
 
     @property
     def largest(self) -> float:
-        """Friction of the largest size [-]."""
+        """Largest |friction| [-]."""
         return float(np.max(np.abs(self.friction)))
 
     @property
@@ -111,7 +111,7 @@ class Record:
 
     @property
     def stiffness_unit(self) -> str:
-        """Unit of a stiffness that goes with the normal stress or force."""
+        """Unit of a stiffness, by the unit of the normal stress or force."""
         return f"{self.normal_unit or '1'}/m"
 
 
@@ -125,9 +125,9 @@ def read_record(
 ) -> Record:
     """Record from a file whose headings name columns with units, as ``time [s], shear_stress [MPa]``.
 
-    Text with any sign between columns, decimal points or commas, xlook's text and binary, and numeric arrays of
-    MATLAB. ``Time (s)``, ``LP_Disp [mic]`` and ``mu`` name columns as well. What was decided on the way is among the
-    remarks of the record.
+    Formats: text with any column separator and decimal points or commas, text and binary files of xlook, and numeric
+    MATLAB arrays. ``Time (s)``, ``LP_Disp [mic]`` and ``mu`` name columns as well. The remarks of the record list the
+    decisions made when it is read.
 
     Parameters
     ----------
@@ -135,10 +135,10 @@ def read_record(
     normal_stress : float, optional
         Constant effective normal stress [Pa] where there is no such column.
     columns : str
-        Which heading is which column, as ``time=Time(s), friction=col 7``; a number stands for the heading of that
-        place, and ``=mu_corr [1]`` gives a unit.
+        Headings of the columns, as ``time=Time(s), friction=col 7``; a number is the position of a heading, and
+        ``=mu_corr [1]`` gives a unit.
     begin, end : str, optional
-        Window, as ``8110 s`` or ``1600 um`` by the file's own time or load-point displacement.
+        Window, as ``8110 s`` or ``1600 um`` in the file's own time or load-point displacement.
 
     Returns
     -------
@@ -147,7 +147,7 @@ def read_record(
     Raises
     ------
     RecordError
-        When the file cannot be read, or a column is missing, unknown, or holds something else than numbers.
+        When the file cannot be read, or a column is missing, unknown or not numeric.
     UnitError
         For a column whose unit is unknown or of another dimension.
     """
@@ -161,7 +161,7 @@ def read_windows(
     normal_stress: float | None = None,
     columns: str = "",
 ) -> list[Record]:
-    """A record of each window of a file, which is read once; as `read_record`."""
+    """Records of several windows of a file, which is read once; see `read_record`."""
     given, remarks = _given(read_columns(path), columns)
     given, repairs = _measured(given)
     records = []
@@ -188,7 +188,7 @@ def read_windows(
 
 
 def part(record: Record, inside: ndarray, name: str) -> Record:
-    """Samples of a record, with time and load point from the first of them on."""
+    """Record of some samples of a record; its time and load point start at 0."""
     values: dict[str, Any] = {n: column[inside] for n, column in vars(record).items() if isinstance(column, np.ndarray)}
     begun = float(values["time"][0]) if np.any(inside) else 0.0
     for along in values.keys() & {"time", "load_point"}:
@@ -197,13 +197,13 @@ def part(record: Record, inside: ndarray, name: str) -> Record:
 
 
 def _weighted(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]:
-    """Samples that have a weight, with a mean weight of 1, and how many have none."""
+    """Samples of positive weight, with a mean weight of 1, and a remark on the others."""
     if "weight" not in given:
         return given, []
     weight = given["weight"]
     if np.any(weight < 0) or np.sum(weight > 0) < 2:
         raise RecordError(
-            f"weight must be positive, or 0 for what is left out. Received {np.min(weight):.6g} to "
+            f"weight must be positive, or 0 for excluded samples. Received {np.min(weight):.6g} to "
             f"{np.max(weight):.6g}. Write 1/variance of friction, in any unit."
         )
     given = {name: column[weight > 0] for name, column in given.items()}
@@ -212,7 +212,7 @@ def _weighted(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
 
 
 def _given(columns: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], list[str]]:
-    """Columns in SI by name, and what their names were taken for."""
+    """Columns in SI units by name, and remarks on how their headings were read."""
     given: dict[str, np.ndarray] = {}
     headings: dict[str, str] = {}
     named = _wanted(columns, wanted)
@@ -224,7 +224,7 @@ def _given(columns: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], 
             unknown.append(column)
         elif name in given:
             raise RecordError(
-                f"a column must be there once. Received {name} twice: {headings[name]} and {column.heading}. Say which "
+                f"a column must occur once. Received {name} twice: {headings[name]} and {column.heading}. Choose one "
                 f"by --columns '{name}={column.heading}', or remove one."
             )
         else:
@@ -262,7 +262,7 @@ def _meant(name: str) -> str:
 
 
 def _wanted(columns: Sequence[Column], wanted: str) -> dict[str, tuple[str, Column]]:
-    """Names that a user gives to headings, with the unit that was given."""
+    """Names that the user assigns to headings, with the columns in the units given."""
     by_name = {place: column for i, column in enumerate(columns, start=1) for place in (str(i), column.name)}
     by_name |= {column.heading: column for column in columns}
     named: dict[str, tuple[str, Column]] = {}
@@ -316,30 +316,30 @@ def _factor(name: str, column: Column) -> float:
 
 
 def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]:
-    """Rows in which everything was measured, those at the same time as their mean, and what was done."""
+    """Complete rows, with the mean of rows at the same time, and remarks on both."""
     table, repairs = pd.DataFrame(given), []
     whole = table.dropna()
     if lost := len(table) - len(whole):
         repairs.append(f"{lost} of {len(table)} rows without a number left out")
     if whole.empty:
         raise RecordError(
-            f"a record must have rows with a number in every column. Received none in {len(table)} rows. Leave out the "
+            f"a record must have rows with a number in every column. Received none in {len(table)} rows. Remove the "
             "columns that were not measured."
         )
     time = whole["time"].to_numpy()
     if back := np.flatnonzero(np.diff(time) < 0).tolist():
         raise RecordError(
             f"time must ascend. Received {time[back[0] + 1]:.9g} s after {time[back[0]]:.9g} s. Sort the record, or "
-            "cut it where its clock starts anew."
+            "cut it where time restarts."
         )
     if (double := int(np.sum(np.diff(time) == 0))) and double < len(time) - 1:
         whole = whole.groupby("time", sort=False, as_index=False).mean()
-        repairs.append(f"{double} samples at the time of another: their mean is taken")
+        repairs.append(f"{double} samples at the time of another replaced by their mean")
     return {str(name): whole[name].to_numpy() for name in whole}, repairs
 
 
 def _window(given: dict[str, ndarray], begin: str | None, end: str | None) -> dict[str, ndarray]:
-    """Samples between two times or displacements of the load point, as the file counts them."""
+    """Samples between two times or load-point displacements, in the coordinates of the file."""
     inside = np.ones(len(given["time"]), dtype=bool)
     for name, text in (("from", begin), ("to", end)):
         if text is None:
@@ -366,7 +366,7 @@ _DURATION, _PERIOD = (1e-6, 1e12), (1e-9, 1e12)
 
 
 def _require_sizes(given: dict[str, ndarray]) -> None:
-    """Refuse sizes that no experiment has, as of a wrong unit: solvers of the fit fail on them."""
+    """Reject values outside the range of experiments, as from a wrong unit; the solvers of the fit fail on them."""
     time = given["time"]
     if len(time) < 2:
         return
@@ -387,12 +387,12 @@ def _require_sizes(given: dict[str, ndarray]) -> None:
 
 
 def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray, ndarray, str]:
-    """Friction coefficient, what is normal to it, and the unit of that."""
+    """Friction coefficient, normal stress or force, and the unit of the latter."""
     names = [name for name in ("friction", *_SHEAR) if name in given]
     for shear, across in _SHEAR.items():
         if {"friction", shear, across} <= given.keys():
-            off = np.median(np.abs(given["friction"] * given[across] - given[shear]))
-            if off <= _SAME * np.median(np.abs(given[shear])):  # the same twice
+            difference = np.median(np.abs(given["friction"] * given[across] - given[shear]))
+            if difference <= _SAME * np.median(np.abs(given[shear])):  # the same data twice
                 names = [name for name in names if name != "friction"]
     if len(names) != 1:
         raise RecordError(
@@ -402,7 +402,7 @@ def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray,
     measured = names[0]
     across = _SHEAR.get(measured) or next((n for n in _SHEAR.values() if n in given), "normal_stress")
     if across in given and stress is not None:
-        raise RecordError(f"the normal stress must be given once. Received it beside the column {across}.")
+        raise RecordError(f"the normal stress must be given once. Received it as a number and as column {across}.")
     if across in given:
         normal, unit = given[across], COLUMNS[across]
     elif stress is not None and across == "normal_stress":
@@ -412,15 +412,13 @@ def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray,
     else:
         remedy = " or a constant normal stress" if across == "normal_stress" else ""
         mixed = set(_SHEAR.values()) & set(given)
-        then = "Divide the force by the area that slides." if mixed else "Add it."
+        then = "Divide the force by the sliding area." if mixed else "Add it."
         raise RecordError(f"{measured} needs the column {across}{remedy}. Received {', '.join(given)}. {then}")
     if np.any(normal <= 0):
         raise RecordError(f"{across} must be positive. Received {np.min(normal):.6g} {unit}. Compression is positive.")
     friction = given[measured] / (1 if measured == "friction" else normal)
     if (middle := float(np.median(friction))) <= 0:
-        raise RecordError(
-            f"{measured} must be positive. Received a median of {middle:.3g} of friction. Change its sign."
-        )
+        raise RecordError(f"{measured} must be positive. Received a median friction of {middle:.3g}. Change its sign.")
     least, largest = _PLAUSIBLE
     if not least <= middle <= largest:
         by = "column" if measured == "friction" else f"units of {measured} and {across}, of --normal-stress too"
@@ -431,9 +429,9 @@ def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray,
 
 
 def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | None, list[str]]:
-    """Displacement [m] since the first sample, forward positive; rates [m/s] where they were recorded; what was turned.
+    """Displacement [m] since the first sample, forward positive; recorded rates [m/s] or None; remarks on signs.
 
-    A recorded rate is that which was commanded from its sample on, a staircase.
+    A recorded rate is the commanded rate from its sample on, a piecewise constant function.
     """
     for name in ("load_point_displacement", "load_point_rate"):
         if name in given:
@@ -443,56 +441,56 @@ def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | No
             moved = column - column[0]
             if not displaced:
                 moved = np.concatenate([[0.0], np.cumsum(np.diff(given["time"]) * column[:-1])])
-            return moved, None if displaced else column, [f"{name} falls: its sign is changed"] * backward
+            return moved, None if displaced else column, [f"{name} decreases: its sign is changed"] * backward
     return None, None, []
 
 
-FAR_OFF = 4.0  # deviations of a displacement that no noise explains
+FAR_OFF = 4.0  # standard deviations of a displacement that noise does not explain
 _FIRST = 20  # samples
-_BENDS = 2  # among the first samples, which a change of rate alone may have
-_MEDIAN, _NINETIETH = 0.6745, 1.645  # of the size of a normal deviate
-MOST_PLAIN = 500  # samples that are taken as they are
+_BENDS = 2  # bends among the first samples that a change of rate alone may cause
+_MEDIAN, _NINETIETH = 0.6745, 1.645  # median and 90th percentile of |normal deviate|
+MOST_PLAIN = 500  # samples up to which a record is not thinned
 MOST_MEANS = 300
 _MOST_CURVED = 8000  # means, where friction bends far beyond its noise
-_SHARE = 0.5  # of the time since the last change of rate, that a window reaches over
-_PARTS = 8  # of a piece in windows, at least, and of a window in means
-_CURVED = 5.0  # deviations of a mean from its neighbours that noise does not explain
+_SHARE = 0.5  # longest window over the time since the last change of rate
+_PARTS = 8  # least number of windows of a piece, and number of means of a window
+_CURVED = 5.0  # standard deviations of a bend that noise does not explain
 _FAR_CURVED = 100.0
 _SPIKE, _MOST_SPIKES = 8.0, 20  # deviations from both neighbours; more such samples are no outliers
 _BENT = np.array([[1.0, -1.0, -1.0, 1.0], [1.0, -3.0, 3.0, -1.0]]).T  # of quarters: a bend, and a step in the middle
-_FLOOR = 1e-4  # of the range of friction: what no machine measures
+_FLOOR = 1e-4  # of the range of friction: resolution that no machine reaches
 
 
 def scatter(time: ndarray, values: ndarray) -> float:
-    """Standard deviation of noise from sample to sample, of the distances from the line between both neighbours.
+    """Standard deviation of white noise, from the distances of samples to the line between both neighbours.
 
-    By their median or their ninetieth percentile, whichever is larger: the median of what is read in steps is small.
+    From their median or their 90th percentile, whichever is larger: the median is small for quantised readings.
     """
     if len(time) < 3:
         return 0.0
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
-    off = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
-    sizes = np.abs(off) / np.sqrt(1 + share**2 + (1 - share) ** 2)
+    distances = values[1:-1] - (1 - share) * values[:-2] - share * values[2:]
+    sizes = np.abs(distances) / np.sqrt(1 + share**2 + (1 - share) ** 2)
     return float(np.max(np.percentile(sizes, (50, 90)) / (_MEDIAN, _NINETIETH)))
 
 
 def reading_step(values: ndarray) -> float:
-    """Step in which values are read, if the first ones stay now and then, or bend often by it; else next to nothing."""
+    """Resolution of quantised values, whose first ones repeat or often bend by it; otherwise 1e-9 of their range."""
     levels, first = np.unique(values), np.diff(values[:_FIRST])
     step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
-    read_in_steps = np.any(first == 0) or np.sum(np.abs(np.diff(first)) > step / 2) > _BENDS
-    return step if read_in_steps else 1e-9 * float(np.ptp(values))
+    quantised = np.any(first == 0) or np.sum(np.abs(np.diff(first)) > step / 2) > _BENDS
+    return step if quantised else 1e-9 * float(np.ptp(values))
 
 
 def thinned(record: Record, begins: ndarray | None = None, *, follow: bool = False) -> Record:
-    """A record with means in place of samples, and how many samples each stands for; short ones as they are.
+    """Record of means of neighbouring samples, with the number of samples of each; a short record is unchanged.
 
     `begins` are times at which the rate of loading changes [s]; `follow` says whether it changes in between as well.
 
-    After every change of the rate of loading, windows reach over at most half of the time since then, and an eighth of
+    After every change of the rate of loading, a window lasts at most half of the time since then, and an eighth of
     the piece. A window over which friction, slip or normal load bends by more than its noise explains is halved, the
-    most curved first, until there are `MOST_MEANS`; eight means are then taken in every window, so that a bend which
-    its noise hides moves a mean by a twentieth of its own noise. Steps and what follows them keep their samples.
+    most curved first, until there are `MOST_MEANS`; eight means are then taken in every window, so that a bend hidden
+    by noise moves a mean by a twentieth of its noise. Samples at and just after a step are kept.
     """
     count = len(record.time)
     if count <= MOST_PLAIN:
@@ -539,7 +537,7 @@ def _halved(record: Record, edges: ndarray, follow: bool) -> ndarray:
             columns.append(np.concatenate([[0.0], np.cumsum((values - values[0]) / noise)]))
 
     def bend(begin: int, end: int) -> float:
-        """Bend, or step, of the means of quarters in deviations; of two or three samples their largest change."""
+        """Bend or step of the quarter means, in standard deviations; of two or three samples the largest change."""
         if end - begin < 2:
             return 0.0
         if end - begin < 4:

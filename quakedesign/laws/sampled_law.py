@@ -29,9 +29,9 @@ MOST_STATES = 12
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LinearLaw:
-    """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z from 0 by default.
+    """p = Cz + Dy and z⁺ = Fz + Gy at every sample, y = (e1, e2) measured, z(0) = 0 by default.
 
-    With an implicit root the law is linear in y = (e1, e2, w), where w solves an implicit step from e1 and e2.
+    With an implicit step the law is linear in y = (e1, e2, w), where w solves the equation of the step for e1 and e2.
 
     Attributes
     ----------
@@ -48,12 +48,12 @@ class LinearLaw:
     root : ImplicitRoot, optional
         Equation of w; None for a linear law.
     first : tuple of rows
-        S, two columns: z = S(e1, e2) at the first sample, as they are measured then; without rows 0.
+        S, two columns: z = S(e1, e2) with the errors measured at the first sample; z = 0 if empty.
     applied : tuple of Fraction
         Change of z⁺ per Pa of (applied pressure − p) under limits; empty if the law has no anti-windup.
     of_reference : tuple of rows
-        Two columns, for r [m] and r′ [m/s]: terms of z⁺, row by row, and in a last row of p [Pa]. A law that
-        measures the slip x1 = e1 + r has the same entries here as in `measured` and `feedback`. Without rows 0.
+        Two columns, for r [m] and r′ [m/s]: terms of z⁺, and in the last row of p [Pa]; 0 if empty. A law that
+        measures the slip x1 = e1 + r has the same entries here as in `measured` and `feedback`.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class LinearLaw:
             )
         if self.applied and len(self.applied) != len(self.states):
             raise ParameterError(
-                f"applied of a linear law must have {len(self.states)} entries, one a state, or be empty. "
+                f"applied of a linear law must have {len(self.states)} entries, one per state, or be empty. "
                 f"Received {len(self.applied)}."
             )
         if self.of_reference and [len(row) for row in self.of_reference] != [2] * (len(self.states) + 1):
@@ -192,7 +192,7 @@ def steady_states(own: Matrix, output: Row, rates: Row, pressure: Fraction) -> R
     Raises
     ------
     ParameterError
-        When there are none.
+        When there are no steady states.
     """
     rows = [*([*row, rate] for row, rate in zip(own, rates, strict=True)), [*output, pressure]]
     reduced, rank = _exact(rows).rref()
@@ -217,8 +217,8 @@ def compensator(
 ) -> LinearLaw:
     """Linear quadratic Gaussian (LQG) compensator of a sampled model x⁺ = Ax + Bp, y = Cx.
 
-    x̂ = π + L(y − Cπ), p = −Kx̂ and π⁺ = Ax̂ + Bp, so that π⁺ = (A − BK)((I − LC)π + Ly). The states of the law are π. A
-    prediction that the measurement replaces, which has a column of zeros in I − LC, is no state.
+    x̂ = π + L(y − Cπ), p = −Kx̂ and π⁺ = Ax̂ + Bp, so that π⁺ = (A − BK)((I − LC)π + Ly). The states of the law are π.
+    A prediction with a column of zeros in I − LC is replaced by the measurement and is no state of the law.
 
     Parameters
     ----------
@@ -261,10 +261,10 @@ def compensator(
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorModel:
-    """Sampled model of both errors and of the pressures on their way, under a constant disturbance d [m/s²].
+    """Sampled model of both errors and of the delayed pressures, under a constant disturbance d [m/s²].
 
     x⁺ = Ax + Bp + (As + B − s)d/b, x = (e1, e2, q), s = (0, 0, σ, …, σ). The constant pressure p = −d/b balances d: x =
-    sp is then a steady state. Any coefficients define a law, and its steady state without errors is the same.
+    sp is then a steady state. A law from any coefficients has the same steady state without errors.
 
     Attributes
     ----------
@@ -303,7 +303,7 @@ class ErrorModel:
 
     @classmethod
     def delayed(cls, of_errors: Matrix, of_commands: Matrix, gain: Fraction) -> "ErrorModel":
-        """Model e⁺ = Φe + Σ_j γ_j(b·p_j + d), p_j [Pa] being the pressure commanded j samples ago, from j = 0 on.
+        """Model e⁺ = Φe + Σ_j γ_j(b·p_j + d), where p_j [Pa] is the pressure commanded j ≥ 0 samples ago.
 
         Parameters
         ----------
@@ -406,9 +406,9 @@ class RestLimit:
     The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since. A
     loop whose pressure stays within P of p*, with dp*/dr at most `per_slip`, never reaches a limit with a width of 2P,
     so that the limit does not affect a guarantee. While friction holds the fault, measurements do not respond to the
-    pressure, and an integral ahead of the reference would lower the pressure without end. The limit then saturates the
-    pressure, with anti-windup of the law. It ends when the fault moves, for any cause. The proved range of pressure
-    limits the pressure too, at rest and after it, unless the fault moves faster than is proved.
+    pressure, and an integral ahead of the reference would lower the pressure without bound. The limit then saturates
+    the pressure, with anti-windup of the law. It ends when the fault moves, for any cause. The proved range of pressure
+    limits the pressure too, at rest and in motion, unless the fault moves faster than is proved.
 
     Attributes
     ----------
@@ -429,7 +429,7 @@ class RestLimit:
     Raises
     ------
     ParameterError
-        For a width that is not positive, or another number that is negative.
+        For a width that is not positive, another negative number, or an incomplete or invalid range.
     """
 
     STATES: ClassVar[tuple[str, ...]] = ("highest_pressure", "last_slip")
@@ -444,7 +444,7 @@ class RestLimit:
 
     @property
     def range(self) -> tuple[Fraction, Fraction, Fraction] | None:
-        """Least and largest pressure, and the slip between two samples up to which they hold, or None."""
+        """Least and largest pressure, and the slip between two samples up to which they apply, or None."""
         return None if self.least is None or self.largest is None else (self.least, self.largest, self.fastest)
 
     def __post_init__(self) -> None:

@@ -29,10 +29,10 @@ from quakedesign.loop.signals import Interconnection, Signal
 # Sampled linear law on a fault: sample, zero-order hold, delay, lag, and diffusion between well and fault.
 
 MOST_PERIODS = 8
-SHORTEST = 32  # parts of a step: faster modes of a layer decay within less than the resolution of the bounds
+SHORTEST = 32  # largest T_s/(L²/D): faster modes decay within less than the resolution of the bounds
 BENT = tuple(
     Fraction(v, 128) for v in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)
-)  # as a lag and the modes of a layer do
+)  # denser at first, where a lag and the diffusion modes change fastest
 HALVES = tuple(Fraction(v, 2) for v in (0, 1, 2))
 _ONE = Fraction(1)
 
@@ -51,27 +51,27 @@ def held_loop(
 ) -> PeriodicLoop:
     """Error loop of a fault about p*, the equilibrium pressure at the reference.
 
-    Order of events: at every multiple of T_s the law measures e1 and e2, finds p, and updates its states; p reaches the
-    valve after the delay and stays for T_s; the pressure in the well follows the valve with the lag, that in the fault
-    the well's through a layer. States, in this order: e1, e2, the law's, the pressures on their way, the valve's, with
-    a lag what the well's is more than the valve's, what those of the layer's modes are more than the well's, with a
-    layer and no lag the valve's last step; those of the law less what they are while p = p* holds the fault at rest,
-    pressures as b·(p − p*).
+    At every multiple of T_s the law measures e1 and e2, computes p and updates its states. p reaches the valve after
+    the delay and is held for T_s. The well follows the valve with the lag, and the fault the well by diffusion.
+
+    States, in this order: e1; e2; the law's states; delayed pressures; valve pressure; with a lag, well minus valve
+    pressure; with a diffusion path, mode minus well pressures, and without a lag the last step of the valve pressure.
+    The law's states are relative to those that command p* with the fault at rest; pressures are b·(p − p*).
 
     Inputs: ``acceleration`` a in e2' = s·e1 − w·e2 + βb(p − p*) + a [m/s²]; ``drift`` b·dp*/dt [m/s³]. Outputs:
-    ``slip_error`` [m], ``slip_rate_error`` [m/s], ``push`` b·(p − p*) [m/s²], with a layer but for what its modes leave
-    out, which ``left_out`` bounds [m/s²] and, where the well steps, an input of this name brings into e2' by its share;
-    where the fault's pressure is not the valve's, ``asked``, b·(p − p*) at the valve [m/s²].
-    With an implicit root the loop has w = −γe1/T_s with the middle of its slopes, and w + γe1/T_s [m/s] is the sampled
-    input ``root``. If asked for, what the measured e1 and e2 are more than the true ones are the sampled inputs
-    ``slip_noise`` [m] and ``rate_noise`` [m/s]: the law does with them what it does with e1 and e2, w included.
-    Of a law that is given r and r′ as well, r′ is an input twice: ``reference`` moves its states away from those that
-    ask for p* at r, and the sampled ``reference_rate`` is what it makes of r′ [m/s].
+    ``slip_error`` [m]; ``slip_rate_error`` [m/s]; ``push`` b·(p − p*) in the fault [m/s²]; with a lag or a diffusion
+    path ``asked``, b·(p − p*) at the valve [m/s²]. ``push`` excludes the truncation error of the diffusion modes. The
+    output ``left_out`` [m/s²] bounds this error, and without a lag an input of the same name acts on e2'.
 
-    Where instants may be off there is one state more, the valve's last step, which the output ``stepped`` is [m/s²].
-    The input ``late`` is b times what the valve's pressure is more than on schedule, at most its last step or the next
-    one, and there near the arrivals alone; in the meantime p* drifts, so that ``push`` (or ``asked``, where the fault's
-    pressure is not the valve's) gains ``drift`` times that time.
+    With an implicit step w = −γe1/T_s, γ the middle of its slopes, and w + γe1/T_s [m/s] is the sampled input ``root``.
+    The measurement errors in `noisy` are the sampled inputs ``slip_noise`` [m] and ``rate_noise`` [m/s]; they enter the
+    law, and w, as e1 and e2 do. For a law that uses r and r′ as well, r′ [m/s] is an input twice: ``reference`` moves
+    the law's states away from those that command p* at r; the sampled ``reference_rate`` is the law's term in r′.
+
+    With timing errors the last step of the valve pressure is a further state, and the output ``stepped`` [m/s²]. The
+    input ``late`` is b times the deviation of the valve pressure from its schedule. It is at most the last or the next
+    step, and acts near the arrivals only. Meanwhile p* drifts: ``push`` (or ``asked``, where the fault pressure is not
+    the valve pressure) changes by ``drift`` times this time.
 
     Parameters
     ----------
@@ -83,16 +83,16 @@ def held_loop(
     step, delay, lag : Fraction
         [s]; the delay at most 8 periods.
     diffusion : Fraction
-        L²/D of the layer between well and fault [s]; 0 for none.
+        L²/D of the diffusion path between well and fault [s]; 0 for none.
     noisy : collection of str
         Which of ``slip_noise`` and ``rate_noise`` are inputs.
     instants : Instants, optional
-        Timing errors; None for exact timing if the last step is not needed. Not with a layer.
+        Timing errors; None for exact timing if the last step is not needed. Not with a diffusion path.
 
     Raises
     ------
     ParameterError
-        For a law that leaves an error under a constant p*, or times that are negative or too long.
+        For a law with a steady-state error under a constant p*, or times that are negative or too long.
     """
     gain, outputs = model.gain / authority, {"slip_error": "e1", "slip_rate_error": "e2", "push": "push"}
     outputs |= ({"left_out": "left_out"} if diffusion else {}) | ({"asked": "valve"} if lag or diffusion else {})
@@ -109,12 +109,12 @@ def held_loop(
     )
     if instants is None:
         return loop
-    part, off, after = delay % step, instants.arrived, instants.arrived + instants.ramp
+    part, lead, after = delay % step, instants.arrived, instants.arrived + instants.ramp
     instants.require_within(step, part)
     if not after:
         return loop
     entry = system.column({"behind": 1 / lag} if lag else {"e2": gain})
-    late = Pulse(entry=entry, first=int(part > 0), early=off, late=after, before=off, after=off + instants.ramp / 2)
+    late = Pulse(entry=entry, first=int(part > 0), early=lead, late=after, before=lead, after=lead + instants.ramp / 2)
     return replace(loop, pulses={"late": late}, at_once={("asked" if lag else "push", "drift"): after})
 
 
@@ -123,13 +123,13 @@ def starts(
 ) -> tuple[Row, ...]:
     """Columns of the box of initial states of a sampled loop, see `PeriodicLoop.start`.
 
-    Its pressures are 0, the errors within their bounds [m], [m/s], and the law's states what it makes of them as they
-    are measured, within bounds of noise.
+    Pressures are 0, and errors are within their bounds [m], [m/s]. The law's states follow from the measured errors,
+    whose noise is within its bounds.
     """
-    made = list(zip(*law.first, strict=True)) or [(Fraction(0),) * len(law.states)] * 2
-    rest = [Fraction(0)] * (size - 2 - len(law.states))
-    columns = [(error, [Fraction(k == 0), Fraction(k == 1), *made[k], *rest]) for k, error in enumerate(errors)]
-    columns += [(off, [Fraction(0), Fraction(0), *made[k], *rest]) for k, off in enumerate(noise)]
+    initial = list(zip(*law.first, strict=True)) or [(Fraction(0),) * len(law.states)] * 2
+    zeros = [Fraction(0)] * (size - 2 - len(law.states))
+    columns = [(error, [Fraction(k == 0), Fraction(k == 1), *initial[k], *zeros]) for k, error in enumerate(errors)]
+    columns += [(bound, [Fraction(0), Fraction(0), *initial[k], *zeros]) for k, bound in enumerate(noise)]
     return tuple(tuple(bound * v for v in column) for bound, column in columns if bound and any(column))
 
 
@@ -182,17 +182,17 @@ def _connected(
 ) -> tuple[Interconnection, PeriodicLoop]:
     """Loop of a law, the path of its pressure, and a plant with the states e1 and e2 that ``push`` acts on.
 
-    `rates` and `signals` are those of the plant, `of_left_out` is the input of what the modes of a layer leave out; the
-    ``drift`` is added to the inputs.
+    `rates` and `signals` are those of the plant. `of_left_out` is the input column of the truncation error of the
+    diffusion modes. The ``drift`` is added to the inputs.
     """
     step, lag, layer, part = times.step, times.lag, Layer(time=times.diffusion), times.delay % times.step
     # the law
     own, measured = tuple(f"law {i}" for i in range(len(law.states))), ("slip", "slip_rate", "implicit")
-    made = zip((*law.measured, law.feedback), (*law.update, law.output), strict=True)
-    *updates, output = (dict(zip((*measured[: len(fed)], *own), (*fed, *now), strict=True)) for fed, now in made)
-    for signal, (_, moved) in zip((*updates, output), law.of_reference, strict=False):
-        signal["reference_rate"] = moved
-    # the path: delay line, valve, well, layer, and the last step of the valve
+    rows = zip((*law.measured, law.feedback), (*law.update, law.output), strict=True)
+    *updates, output = (dict(zip((*measured[: len(e)], *own), (*e, *z), strict=True)) for e, z in rows)
+    for signal, (_, by_rate) in zip((*updates, output), law.of_reference, strict=False):
+        signal["reference_rate"] = by_rate
+    # the path: delay line, valve, well, diffusion modes, and the last step of the valve
     line = tuple(f"waiting{i}" for i in range(int(times.delay // step) + (part > 0)))
     well: Signal = {"behind": 1 / lag} if lag else {}
     modes = {f"layer{i}": i for i in range(MODES if times.diffusion else 0)}
@@ -219,13 +219,13 @@ def _connected(
     flow = {**rates, "behind": {name: -v for name, v in well.items()}}
     flow |= {name: {name: -layer.rate(n), **well} for name, n in modes.items()}
     # states are relative to those at which the law commands p*, at the reference
-    still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
-    steady = steady_states(still, law.output, (Fraction(0),) * len(own), _ONE)
+    change = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
+    steady = steady_states(change, law.output, (Fraction(0),) * len(own), _ONE)
     drift = {name: -v / authority for name, v in zip(own, steady, strict=True)}
     inputs = {**inputs, "drift": drift | dict.fromkeys((*line, "valve"), -_ONE)}
     if law.of_reference:
-        *turned, fed = (-row[0] for row in law.of_reference)
-        steady = steady_states(still, law.output, tuple(turned), fed)
+        *rates_of_states, pressure = (-row[0] for row in law.of_reference)
+        steady = steady_states(change, law.output, tuple(rates_of_states), pressure)
         inputs.setdefault("reference", {name: -v for name, v in zip(own, steady, strict=True)})
     sampled = (*["root"] * (law.root is not None), *["reference_rate"] * bool(law.of_reference))
     left_out, fading = dict[str, Signal](), dict[str, Fading]()
@@ -259,7 +259,7 @@ def _connected(
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ContinuousLaw:
-    """p = Cz + Dy + R(r, r′) and z′ = Fz + Gy at every time, y = (e1, e2), z from 0, r the reference.
+    """p = Cz + Dy + R(r, r′) and z′ = Fz + Gy at every time, y = (e1, e2), z(0) = 0, r the reference.
 
     Attributes
     ----------
@@ -326,8 +326,8 @@ def exact_integrals(gains: tuple[Fraction, ...], *, of_state: bool = False) -> C
 def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction) -> PeriodicLoop:
     """The error loop about p*, with the inputs and outputs of `held_loop`; states e1, e2 and z − z*.
 
-    z* = ζ(p* − R(r, r′)) − ηR(r, r′)′ with Fζ = 0, Cζ = 1, Fη = ζ and Cη = 0, so that Cz* + R(r, r′) = p*. Where R is
-    not zero its entries give two inputs more, ``reference_acceleration`` r″ and ``reference_jerk`` r‴, through
+    z* = ζ(p* − R(r, r′)) − ηR(r, r′)′ with Fζ = 0, Cζ = 1, Fη = ζ and Cη = 0, so that Cz* + R(r, r′) = p*. The
+    entries of R that are not 0 add the inputs ``reference_acceleration`` r″ and ``reference_jerk`` r‴, through
     ηR(r, r′)″.
 
     Parameters
@@ -341,13 +341,13 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
     Raises
     ------
     ParameterError
-        For a law that leaves an error under a constant p*, or that feeds the reference forward without two integrals.
+        For a law with a steady-state error under a constant p*, or with R not 0 and fewer than two integrals.
     """
-    still = (Fraction(0),) * len(law.states)
-    steady = steady_states(law.rates, law.output, still, _ONE)
+    zeros = (Fraction(0),) * len(law.states)
+    steady = steady_states(law.rates, law.output, zeros, _ONE)
     own = tuple(f"law {i}" for i in range(len(law.states)))
-    made = (law.feedback, *law.measured), (law.output, *law.rates)
-    push, *moved = (dict(zip(("e1", "e2", *own), (*fed, *row), strict=True)) for fed, row in zip(*made, strict=True))
+    rows = zip((law.feedback, *law.measured), (law.output, *law.rates), strict=True)
+    push, *rates = (dict(zip(("e1", "e2", *own), (*fed, *row), strict=True)) for fed, row in rows)
     system = Interconnection(("e1", "e2", *own), {"push": {name: authority * v for name, v in push.items()}})
     plant = {"e1": model.slip, "e2": -model.rate, "push": model.gain / authority}
     inputs = {
@@ -361,7 +361,7 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
     outputs = {"slip_error": "e1", "slip_rate_error": "e2", "push": "push"}
     return PeriodicLoop(
         states=("e1", "e2", *law.states),
-        flow=system.flow({"e1": {"e2": _ONE}, "e2": plant, **dict(zip(own, moved, strict=True))}),
+        flow=system.flow({"e1": {"e2": _ONE}, "e2": plant, **dict(zip(own, rates, strict=True))}),
         segments=(),
         inputs={name: system.column(entries) for name, entries in inputs.items()},
         outputs={name: system.row({signal: _ONE}) for name, signal in outputs.items()},
@@ -388,11 +388,11 @@ class SlidingModel:
     state_rate : Fraction
         ρ [1/s].
     slope : Fraction
-        c [-], in place of e^y − 1 over y.
+        c [-], which replaces (e^y − 1)/y.
     state_slope : Fraction
-        c_z [-]: of ageing in place of 1 − e^{−z} over z; of the slip law in place of e^y.
+        c_z [-], which replaces (1 − e^{−z})/z in the ageing law, and e^y in the slip law.
     strength : Fraction
-        Stress per change of y: N·a and damping [Pa].
+        Stress per change of y: N·a plus damping [Pa].
     weakening : Fraction
         N·b [Pa].
     direct, evolution : Fraction
@@ -419,7 +419,7 @@ class SlidingModel:
 
     @property
     def evolution_slope(self) -> Fraction:
-        """c_y [-], which is c of ageing and c_z of the slip law, by which y + z evolves as a whole."""
+        """c_y [-]: c for the ageing law, and c_z for the slip law, which depends on y + z."""
         return self.slope if self.state_law == "ageing" else self.state_slope
 
 
@@ -436,16 +436,16 @@ def sliding_loop(
     """The error loop about sliding at V, with the order of events and the path of the pressure of `held_loop`.
 
     States: the slip error x [m] and z [-] in place of e1 and e2; pressures in Pa. Inputs: ``stress`` e [Pa], ``rate`` f
-    [-] in x′ = V(cy + f) and, of ageing, in z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, the ``drift``
-    dp*/dt [Pa/s], and ``reference``, by how much of V the reference is faster [-], in x′ = … − V·it.
+    [-] in x′ = V(cy + f) and, for ageing, in z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, the ``drift``
+    dp*/dt [Pa/s], and ``reference`` g [-], the relative excess of the reference rate over V, in x′ = … − Vg.
     Outputs: ``slip_error`` x [m], ``log_rate`` y, ``log_state`` z, ``ageing`` c_y·y + c_z·z, ``strength`` a·y + b·z,
-    ``push`` q [Pa], ``asked`` [Pa], pressure at the valve less that for p*, and with a layer ``left_out`` [Pa].
+    ``push`` q [Pa], ``asked`` [Pa], valve pressure minus p*, and with a diffusion path ``left_out`` [Pa].
     The outputs of y and q exclude the direct feedthrough of e and of the truncation error (`at_once`).
 
     Raises
     ------
     ParameterError
-        As `held_loop`.
+        As for `held_loop`.
     """
     moving, aged = model.rate * model.slope, model.state_rate * model.evolution_slope
     stress = {"e1": moving / model.strength, "e2": -aged / model.strength}
@@ -477,6 +477,6 @@ def sliding_loop(
 
 def at_once(model: SlidingModel) -> dict[tuple[str, str], Fraction]:
     """Direct feedthrough from each input to each output, by (output, input)."""
-    heard = {"log_rate": _ONE, "ageing": model.evolution_slope, "strength": model.direct}
+    shares = {"log_rate": _ONE, "ageing": model.evolution_slope, "strength": model.direct}
     sizes = {"stress": 1 / model.strength, "left_out": model.coefficient / model.strength}
-    return {(output, name): share * size for output, share in heard.items() for name, size in sizes.items()}
+    return {(output, name): share * size for output, share in shares.items() for name, size in sizes.items()}

@@ -97,7 +97,7 @@ class Pump:
         return {name: str(value) for name, value in values.items() if value is not None}
 
     def words(self) -> str:
-        """Sentence part for people."""
+        """Clause of a statement on the pump."""
         of = [] if self.limits is None else [self._range()]
         of += [] if self.rate is None else [LowerBound(self.rate).quantity("Pa/s")]
         return f"with a pump of {', '.join(of)}, whose limits are never reached"
@@ -110,7 +110,7 @@ class Pump:
 
 
 # ----------------------------------------------------------------------
-# The setup: one field a quantity.
+# The setup: one field per quantity.
 
 
 def quantity(unit: str, text: str, default: Fraction | None = Fraction(0)) -> Any:
@@ -123,7 +123,7 @@ class LoopSetup:
     """Loop setup: sampling, delay, actuator, diffusion path, noise, initial errors.
 
     Every field is given as a number in the SI unit, a decimal or p/q as text, or a text with a unit, such as
-    ``LoopSetup(step="184 ms", slip_noise="5 um")``, and is held as a `Fraction` in the SI unit. None means: not given.
+    ``LoopSetup(step="184 ms", slip_noise="5 um")``, and is stored as a `Fraction` in the SI unit; None if not given.
 
     Attributes
     ----------
@@ -142,12 +142,12 @@ class LoopSetup:
     saturation, withdrawal : Fraction or None
         Limits of the pressure at the valve [Pa].
     rate_limit : Fraction or None
-        [Pa/s].
+        Rate limit of the pressure at the valve [Pa/s].
 
     Raises
     ------
     ParameterError
-        For a negative quantity, a step that is not positive, another `measured`, or a withdrawal without a saturation.
+        For a negative quantity, a step that is not positive, an unknown `measured`, or withdrawal without saturation.
     UnitError
         For a unit that is unknown or of another dimension.
     """
@@ -161,12 +161,12 @@ class LoopSetup:
     delay: Fraction = quantity("s", "Delay from the measurement to the pressure at the valve.")
     lag: Fraction = quantity(
         "s",
-        "Time constant between the valve and the fault, or the well where there is a diffusion path; a designed "
-        "e-LQR has a model of it.",
+        "Time constant of the pressure between valve and fault, or well with a diffusion path; a designed e-LQR "
+        "models it.",
     )
     diffusion: Fraction = quantity(
         "s",
-        "L^2/D of the diffusion path between well and fault; a designed e-LQR has a model of it.",
+        "L^2/D of the diffusion path between well and fault; a designed e-LQR models it.",
     )
     slip_noise: Fraction = quantity(
         "m",
@@ -176,7 +176,7 @@ class LoopSetup:
     rate_noise: Fraction = quantity("m/s", "Bound of the measurement error of the slip rate at any time.")
     initial_slip: Fraction = quantity(
         "m",
-        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts in its state at rest.",
+        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts in its rest state.",
     )
     initial_slip_rate: Fraction = quantity(
         "m/s",
@@ -184,9 +184,9 @@ class LoopSetup:
     )
     jitter: Fraction = quantity(
         "s",
-        "Largest time by which a measurement and its pressure are early or late, such as '2 ms'.",
+        "Largest timing error of a measurement and its pressure, early or late, such as '2 ms'.",
     )
-    delay_jitter: Fraction = quantity("s", "Largest additional time by which the pressure is early or late.")
+    delay_jitter: Fraction = quantity("s", "Largest additional timing error of the pressure, early or late.")
     averaging_time: Fraction = quantity(
         "s",
         "The law measures means of slip and slip rate over this time before each sample; --delay counts from the "
@@ -237,7 +237,7 @@ class LoopSetup:
             raise ParameterError(
                 "withdrawal needs saturation, the largest pressure of the pump. Received withdrawal alone. Give both."
             )
-        _ = self.pump  # refuse limits that no pump has
+        _ = self.pump  # raises for invalid limits
 
     @property
     def pump(self) -> Pump | None:
@@ -262,12 +262,12 @@ class LoopSetup:
         return {part.name: value for part in fields(self) if (value := getattr(self, part.name)) != part.default}
 
     def with_given(self, **entered: Quantity | None) -> Self:
-        """The setup with those fields that are not None.
+        """The setup with these fields replaced; None leaves a field unchanged.
 
         Raises
         ------
         ParameterError
-            For another name, with the nearest valid one.
+            For an unknown field; the message suggests the nearest name.
         """
         for name in entered:
             require_known(name, [part.name for part in fields(self)], "quantity of the loop setup")
@@ -289,11 +289,8 @@ class LoopSetup:
         return f"LoopSetup({', '.join(parts)})"
 
 
-_NOT_OF_A_LOOP = ("step", "measured", "averaging_time", "saturation", "withdrawal", "rate_limit")
-
-
 def require_step(step: Fraction) -> None:
-    """Reject a sampling time [s] for which no loop is computed in floating point."""
+    """Reject a sampling time [s] outside the range of the floating-point computations."""
     if not Fraction(1, 10**9) <= step <= 10**9:
         raise ParameterError(f"step must be positive, between 1e-9 s and 1e9 s. Received {shortly(step)} s.")
 
@@ -312,4 +309,4 @@ def _shown(value: Any, unit: str | None) -> str:
 
 
 IDEAL = LoopSetup()
-"""Pressure that acts at once, exact measurements, from rest, at the sampling time of the fault."""
+"""Pressure without delay, exact measurements, start at rest, sampling time of the fault."""

@@ -26,7 +26,7 @@ class Segment:
     duration : Fraction
         [s], positive.
     ends, past_ends : tuple of Fraction
-        Ends of the pieces of the flow in bounds, of outputs and of past responses: shares of the duration, 0 to 1.
+        Ends of the pieces of the flow in bounds of outputs, and of past responses: fractions of the duration, 0 to 1.
     """
 
     jump: Matrix
@@ -35,7 +35,7 @@ class Segment:
     past_ends: Row = EVEN
 
     def pieces(self, *, past: bool = False) -> tuple[Fraction, ...]:
-        """Lengths [s]."""
+        """Lengths of the pieces [s]."""
         return tuple(self.duration * (b - a) for a, b in pairwise(self.past_ends if past else self.ends))
 
 
@@ -48,7 +48,7 @@ class Fading:
     entry : tuple of Fraction
         b.
     first : int
-        Number of the segment, from 0.
+        Index of the segment that begins with this jump, from 0.
     height, floor : Fraction
         [-], not negative.
     rate : Fraction
@@ -78,7 +78,7 @@ class Pulse:
     entry : tuple of Fraction
         b.
     first : int
-        Number of the segment, from 0.
+        Index of the segment, from 0.
     early, late : Fraction
         Durations before and after the jump [s], within the segments that meet there.
     before, after : Fraction
@@ -110,7 +110,7 @@ class PeriodicLoop:
     outputs : dict of str to tuple of Fraction
         Rows c with y = cx.
     sampled : dict of str to tuple of Fraction
-        j_i by the name of an input that adds j_i·w_i to the state once a period, with the jump of the first segment.
+        j_i by the name of an input that adds j_i·w_i to the state once per period, with the jump of the first segment.
     fading : dict of str to Fading
         Inputs that decay after a jump.
     pulses : dict of str to Pulse
@@ -138,7 +138,7 @@ class PeriodicLoop:
 
     @property
     def period(self) -> Fraction:
-        """[s]."""
+        """Period [s], the sum of the durations."""
         return sum((part.duration for part in self.segments), Fraction(0))
 
 
@@ -155,9 +155,9 @@ class Instants:
     measured : Fraction
         Largest timing error of a measurement [s]; the first one is exact.
     arrived : Fraction
-        Largest timing error of the begin of a change of the pressure at the valve [s].
+        Largest timing error of the start of a pressure change at the valve [s].
     ramp : Fraction
-        Longest duration of a change of the pressure at the valve [s]; its rate is at least |change|/ramp.
+        Longest duration of a pressure change at the valve [s]; its rate is at least |change|/ramp.
     """
 
     measured: Fraction = Fraction(0)
@@ -165,7 +165,7 @@ class Instants:
     ramp: Fraction = Fraction(0)
 
     def require_within(self, step: Fraction, part: Fraction) -> None:
-        """Reject timing errors that may reach another event; `part` [s] is the delay after a sample."""
+        """Reject timing errors that let events overlap; `part` [s] is the time of a pressure change after a sample."""
         if min(self.measured, self.arrived, self.ramp) < 0 or 2 * self.measured > step:
             raise ParameterError(
                 f"jitter must be from 0 to half a step of {float(step):.4g} s. Received {float(self.measured):.4g} s "

@@ -1,26 +1,26 @@
-"""Uncertain plants of several blocks of a fault under their wells.
+"""Uncertain plants of a fault of several blocks with wells.
 
-With as many independent wells as blocks, errors are those from the reference r(t). With fewer wells, only an average of
-the slips for each well can follow r: with weights C, of which each row adds up to 1, errors of the slips are those from
-their balance x*(t) under pressures p* of the wells with Cx* = r. Block i then has e1′ = e2 + (r′ − x*′) and
-e2′ = s·e1 + ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ − r″, where s, w and β are chords of its friction in their
-ranges and S are the shares of the wells.
+With as many independent wells as blocks, errors are relative to the reference r(t). With fewer wells, only one average
+of the slips per well can follow r. Let C be the weights of these averages; each row sums to 1. Slip errors are then
+relative to the balance x*(t) under well pressures p* with Cx* = r. Block i has e1′ = e2 + (r′ − x*′) and
+e2′ = s·e1 + ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ − r″, where s, w and β are chord slopes of its friction
+within their ranges and S are the shares of the wells.
 
-**Balance.** Let N = σ′ − Sp* of each block. Its forces are n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, n the area per
-mass. With μ = μ0 + δ, |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gδ, δ = nhN at most, with G from the
-inverse of a matrix of numbers: |N − N0| ≤ |G|nh|N| bounds N, and s and w with it.
+**Balance.** Let N = σ′ − Sp* for each block. Its forces are n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, with n the area
+per mass. With μ = μ0 + δ and |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gc, where c = nδN and G is from the
+inverse of a constant matrix. Then |N − N0| ≤ |G|nh|N|, which bounds N, and with it s and w.
 
 With x*′ = r′(1 + ξ) and p*′ = r′q the derivative of the forces is s(1 + ξ) + ΣK(ξ_j − ξ) + βb·Sq = 0, and Cξ = 0.
 With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The inverse of the matrix with s0 and β0 bounds
-|1 + ξ| and b|Sq| by A + B·F; with the half-widths F ≤ f + M·F. Where M·F + f < F for a positive F, the spectral radius
+|1 + ξ| and b|Sq| by A + B·F; with the half-widths F ≤ f + M·F. If M·F + f < F for a positive F, the spectral radius
 of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the balance is a Lipschitz function of r
 (Clarke), and |ξ| ≤ X and |q| ≤ Q follow from F.
 
-With one well, and blocks that are alike and pull each other with equal force, springs drop out of the mean of all
-forces, which is that of one block whose coefficient is the mean of μ at x*: N then lies in the range of one block whose
-friction weakens and strengthens 1 + X times as fast; where X > 1 weakening in backward motion strengthens, X − 1 times.
+With one well, identical blocks and symmetric springs, the springs drop out of the mean force. This is the force on one
+block whose coefficient is the mean of μ at x*. N then lies in the range of one block whose friction weakens and
+strengthens 1 + X times as fast. If X > 1, blocks may move backward, where weakening strengthens, X − 1 times as fast.
 
-Where no such F is found, nothing is proved: sectors then hold for no error at all.
+If no such F is found, nothing is proved: the bound of the sectors is then set to 1e-30.
 """
 
 from collections.abc import Iterable, Sequence
@@ -42,12 +42,12 @@ from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.plant_values import MOST, Matrix, Row, unit
 from quakedesign.text import counted
 
-_STEEP = Fraction(10**9)  # of friction that may have any coefficient at once
+_STEEP = Fraction(10**9)  # factor on friction slopes in the first pass: any coefficient at any slip
 _LOST = Fraction(10**9)  # X, Q and |σ′ − Sp*| where no balance is proved
-_NOWHERE = Fraction(1, 10**30)  # errors up to which sectors then hold, so that nothing is proved
+_NOWHERE = Fraction(1, 10**30)  # bound of the sectors in that case, so that nothing is proved
 _TURNS = 6
 _GRID = 10**4
-_DIGITS = 6  # of middles
+_DIGITS = 6  # of the middle of a range
 _WIDER = 1 + 1e-9
 
 Spring = tuple[int, int, Fraction]
@@ -58,7 +58,8 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
     if isinstance(fault, BlockChain):
         if blocks is not None or coupling is not None or wells != "each":
             raise ParameterError(
-                "blocks, wells and coupling of a fault of several blocks are its own. Received values. Omit these."
+                "a fault of several blocks has its own blocks, wells and coupling. Received a value for one of these. "
+                "Omit blocks, wells and coupling."
             )
         N, m = len(fault.blocks), len(fault.wells)
         tasks = [uncertain_plant(one) for one in fault.faults]
@@ -120,12 +121,12 @@ def _parts(
         moving = [rate * first for rate in balance.pressures]
         for i, moved in enumerate(balance.moves):
             disturbances[f"balance of block {i + 1}"] = (unit(size, i), moved * first)
-    else:  # pressures of the wells that hold block i against a pressure of 1
+    else:  # well pressures that balance a pressure of 1 on block i
         of_pressures = [tuple(row[i] for row in inverse) for i in range(N)]
         moving = [max(map(abs, s)) * first / task.authority for s, task in zip(slopes, tasks, strict=True)]
     forces = [tuple(task.authority * v for v in row) for task, row in zip(tasks, pressures, strict=True)]
     pulls = [[*row[: 2 * N], *force[:more]] for row, force in zip(pulls, forces, strict=True)]
-    seen = weights or ([unit(N, i) for i in range(N)] if more else None)
+    measured = weights or ([unit(N, i) for i in range(N)] if more else None)
     steady = [row for row, read in zip(shares, pressures, strict=True) if any(read[:more])]
     shifts = [[*[zero] * (2 * N), *(_dot(row, one) for row in steady)] if more else None for one in of_pressures]
     order = ("slope", "damping", "input")
@@ -133,8 +134,11 @@ def _parts(
     return {
         "A": [*rate, *pulls, *((*[zero] * (2 * N), *row[:more]) for row in flow)],
         "B": [(zero,) * m] * N + [row[more:] for row in (*forces, *flow)],
-        "C": seen
-        and [*((*row, *[zero] * (N + more)) for row in seen), *((*[zero] * N, *row, *[zero] * more) for row in seen)],
+        "C": measured
+        and [
+            *((*row, *[zero] * (N + more)) for row in measured),
+            *((*[zero] * N, *row, *[zero] * more) for row in measured),
+        ],
         "sectors": dict(sorted(sectors.items(), key=lambda item: order.index(item[0].split()[0]))),
         "disturbances": disturbances,
         "loads": {
@@ -161,7 +165,7 @@ def _parts(
 
 
 def measured_by(shares: Sequence[Row]) -> Matrix:
-    """Weights of the blocks [-] in what is measured: each block, or with fewer wells averages by shares of a well."""
+    """Weights of the blocks [-] in each measurement: single blocks, or with fewer wells averages by well shares."""
     N, columns = len(shares), list(zip(*shares, strict=True))
     if len(columns) == N:
         return tuple(unit(N, i) for i in range(N))
@@ -169,12 +173,7 @@ def measured_by(shares: Sequence[Row]) -> Matrix:
 
 
 def require_independent(shares: Sequence[Row]) -> None:
-    """Reject wells of which some act on the same blocks in the same proportion.
-
-    Raises
-    ------
-    ParameterError
-    """
+    """Reject wells of which some act on the same blocks in the same proportion."""
     N, m = len(shares), len(shares[0])
     weights = measured_by(shares)
     through = [[sum((c * shares[i][k] for i, c in enumerate(row)), Fraction(0)) for k in range(m)] for row in weights]
@@ -189,8 +188,8 @@ def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
     require_independent(shares)
     if any(any(task.spreads) for task in tasks):
         raise ParameterError(
-            f"fewer wells than blocks need blocks whose constants are known, box paper. Received {tasks[0].name} "
-            "with spreads. Use fault.with_box('paper'), or a well for each block."
+            f"fewer wells than blocks need exact constants, box paper. Received {tasks[0].name} with "
+            "uncertain constants. Use fault.with_box('paper'), or a well for each block."
         )
     return measured_by(shares)
 
@@ -208,9 +207,9 @@ class _Balance:
 def _balance(
     tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
 ) -> _Balance:
-    """The balance of blocks under fewer wells."""
-    both_ways = {(j, i, K) for i, j, K in springs} == set(springs)  # else they do not drop out of the mean
-    alike = len(weights) == 1 and both_ways and all(task == tasks[0] for task in tasks)
+    """Bounds of the balance with fewer wells than blocks."""
+    symmetric = {(j, i, K) for i, j, K in springs} == set(springs)  # others do not drop out of the mean force
+    alike = len(weights) == 1 and symmetric and all(task == tasks[0] for task in tasks)
     best: _Balance | None = None
     for _ in range(_TURNS if alike else 1):
         if alike:
@@ -233,7 +232,7 @@ def _balance(
 def _balancing(
     diagonal: Sequence[Fraction], springs: Sequence[Spring], acting: Sequence[Row], weights: Matrix
 ) -> "list[list[Fraction]] | None":
-    """Inverse of [[diagonal + springs, acting], [weights, 0]]; None of a singular matrix."""
+    """Inverse of [[diagonal + springs, acting], [weights, 0]]; None for a singular matrix."""
     N, m = len(diagonal), len(weights)
     rows = [[Fraction(0)] * N + list(acting[i]) for i in range(N)] + [[*row, *[Fraction(0)] * m] for row in weights]
     for i, value in enumerate(diagonal):
@@ -245,7 +244,7 @@ def _balancing(
 def _stresses(
     tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
 ) -> list[Range]:
-    """Ranges of σ′ − Sp* [Pa] of every block at balance; wide where none are found."""
+    """Ranges of σ′ − Sp* [Pa] of every block at balance; ±1e9 if none are proved."""
     N, m = len(tasks), len(weights)
     area = [task.area_per_mass[0] for task in tasks]
     middle = [(task.friction.least + task.friction.largest) / 2 for task in tasks]
@@ -255,21 +254,21 @@ def _stresses(
     inverse = _balancing(stiff, springs, acting, weights)
     if inverse is None:
         return [(-_LOST, _LOST)] * N
-    pushed = [
+    forces = [
         a * (mu - task.friction.static) * task.normal_stress for a, mu, task in zip(area, middle, tasks, strict=True)
     ]
     ends = []
     for slip in (Fraction(0), tasks[0].target_slip):
-        right = [*pushed, *[slip] * m]
-        p = [_dot(row, right) for row in inverse[N:]]
+        right_side = [*forces, *[slip] * m]
+        p = [_dot(row, right_side) for row in inverse[N:]]
         ends.append([task.normal_stress - _dot(row, p) for task, row in zip(tasks, shares, strict=True)])
     largest = [max(map(abs, pair)) for pair in zip(*ends, strict=True)]
-    reach = product(shares, inverse[N:], N)
-    gains = [[abs(v) * a * h for v, a, h in zip(row, area, half, strict=True)] for row in reach]
-    apart = _closed(gains, [_dot(row, largest) for row in gains])
-    if apart is None:
+    sensitivity = product(shares, inverse[N:], N)
+    gains = [[abs(v) * a * h for v, a, h in zip(row, area, half, strict=True)] for row in sensitivity]
+    deviations = _closed(gains, [_dot(row, largest) for row in gains])
+    if deviations is None:
         return [(-_LOST, _LOST)] * N
-    return [(min(pair) - d, max(pair) + d) for *pair, d in zip(*ends, apart, strict=True)]
+    return [(min(pair) - d, max(pair) + d) for *pair, d in zip(*ends, deviations, strict=True)]
 
 
 def _moving(
@@ -279,7 +278,7 @@ def _moving(
     weights: Matrix,
     stresses: Sequence[Range],
 ) -> _Balance:
-    """X and Q by ranges of σ′ − Sp* [Pa]."""
+    """X and Q from ranges of σ′ − Sp* [Pa]."""
     N, m = len(tasks), len(weights)
     slopes = [task.slip_slopes(stress) for task, stress in zip(tasks, stresses, strict=True)]
     dampings = [task.rate_slopes(stress) for task, stress in zip(tasks, stresses, strict=True)]
@@ -291,41 +290,41 @@ def _moving(
     inverse = _balancing(s, springs, acting, weights)
     if inverse is None or (-_LOST, _LOST) in stresses:
         return lost
-    right = [*(-v for v in s), *[Fraction(0)] * m]
-    still = [_dot(row, right) for row in inverse]  # ξ and q with δs = δβ = 0
+    right_side = [*(-v for v in s), *[Fraction(0)] * m]
+    nominal = [_dot(row, right_side) for row in inverse]  # ξ and q with δs = δβ = 0
     gain_slip = [[abs(v) for v in row[:N]] for row in inverse[:N]]
     gain_force = [[abs(v) for v in row] for row in product(force, inverse[N:], N)]
-    at_rest = [abs(1 + v) for v in still[:N]]
-    pushed = [abs(_dot(row, still[N:])) for row in force]
+    at_rest = [abs(1 + v) for v in nominal[:N]]
+    at_pressure = [abs(_dot(row, nominal[N:])) for row in force]
     gains = [
         [hs * a + hb * b for a, b in zip(rows[0], rows[1], strict=True)]
         for hs, hb, *rows in zip(half_s, half_beta, gain_slip, gain_force, strict=True)
     ]
-    first = [hs * a + hb * b for hs, hb, a, b in zip(half_s, half_beta, at_rest, pushed, strict=True)]
+    first = [hs * a + hb * b for hs, hb, a, b in zip(half_s, half_beta, at_rest, at_pressure, strict=True)]
     F = _closed(gains, first)
     if F is None:
         return lost
     moves = [
-        Fraction(ceil((abs(v) + _dot(row, F)) * _GRID), _GRID) for v, row in zip(still[:N], gain_slip, strict=True)
+        Fraction(ceil((abs(v) + _dot(row, F)) * _GRID), _GRID) for v, row in zip(nominal[:N], gain_slip, strict=True)
     ]
-    pressures = [abs(v) + _dot([abs(g) for g in row[:N]], F) for v, row in zip(still[N:], inverse[N:], strict=True)]
+    pressures = [abs(v) + _dot([abs(g) for g in row[:N]], F) for v, row in zip(nominal[N:], inverse[N:], strict=True)]
     return replace(lost, moves=moves, pressures=[Fraction(ceil(v)) for v in pressures])
 
 
 def _closed(gains: Sequence[Sequence[Fraction]], first: Sequence[Fraction]) -> list[Fraction] | None:
-    """F > 0 with first + gains·F < F, exactly; from floats, None where none is found."""
+    """F > 0 with first + gains·F < F, computed in floats and checked exactly; None if the check fails."""
     matrix = np.array(gains, dtype=float)
     if not np.isfinite(matrix).all() or max(abs(np.linalg.eigvals(matrix))) >= 1:
         return None
-    own = np.array(first, dtype=float)
-    own = own * _WIDER + 1e-9 * max(own.max(), 1e-100)
-    bounds = [rational(float(v)) for v in np.linalg.solve(np.eye(len(own)) - _WIDER * matrix, own)]
+    wider = np.array(first, dtype=float)
+    wider = wider * _WIDER + 1e-9 * max(wider.max(), 1e-100)
+    bounds = [rational(float(v)) for v in np.linalg.solve(np.eye(len(wider)) - _WIDER * matrix, wider)]
     holds = all(v > 0 and f + _dot(row, bounds) < v for v, f, row in zip(bounds, first, gains, strict=True))
     return bounds if holds else None
 
 
 def _middle(ends: Range) -> tuple[Fraction, Fraction]:
-    """About the middle, and how far the range goes from there."""
+    """Rounded middle of a range, and the largest distance of its ends from there."""
     middle = rational(f"{float(sum(ends)) / 2:.{_DIGITS}g}")
     return middle, max(ends[1] - middle, middle - ends[0])
 
@@ -337,12 +336,12 @@ def _dot(row: Iterable[Fraction], values: Iterable[Fraction]) -> Fraction:
 def product(
     rows: Sequence[Sequence[Fraction]], columns: Sequence[Sequence[Fraction]], count: int
 ) -> list[list[Fraction]]:
-    """Product of two matrices, its first columns."""
+    """First `count` columns of the product of two matrices."""
     return [[_dot(row, (line[j] for line in columns)) for j in range(count)] for row in rows]
 
 
 def inverse_of(rows: Sequence[Sequence[Fraction]]) -> "list[list[Fraction]] | None":
-    """Rows of the inverse; None of a singular matrix."""
+    """Rows of the inverse; None for a singular matrix."""
     matrix = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows])
     if matrix.det() == 0:
         return None

@@ -1,8 +1,8 @@
-"""Uncertain plants of users and of several blocks: linear part, sectors, loads and disturbances.
+"""Uncertain plants, user-defined or of several blocks: linear part, sectors, loads and disturbances.
 
 x′ = Ax + B(u − v) + Σ entry·φ(row·(x, u − v), t) + Σ entry·d(t). A sector φ lies between two slopes, for all values of
-its argument or for those within a bound; a load v(t) changes slowly; a disturbance d is any measurable function of a
-bounded size. The law measures Cx at every sample, and noise.
+its argument or for those within a bound; a load v(t) changes slowly; a disturbance d is any bounded measurable
+function. The law measures Cx plus noise at every sample.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,10 +32,11 @@ class Sector:
     row : sequence of numbers
         Its argument y: one number for every state, and for every control too where it depends on these.
     slopes : (number, number) or callable
-        Low and high. A callable gives them for a bound of |y|, such as ``lambda y: (-5 * y**2 / 2, 0)``, and the
-        bound is found; y is a `Fraction`, and floats are taken as the decimals that they print as.
+        Low and high. A callable returns them for a bound of |y|, such as ``lambda y: (-5 * y**2 / 2, 0)``, and a
+        search finds the bound; y is a `Fraction`, and returned floats are read as the decimals that they print.
     within : number, optional
-        Bound of |y| up to which it is so; the proof shows that it is not passed. Of the states alone.
+        Bound of |y| for which the slopes are valid; the proof shows that |y| stays within it. y then depends on
+        states alone.
     """
 
     entry: Any
@@ -44,7 +45,7 @@ class Sector:
     within: Any = None
 
     def at(self, bound: Fraction | None, sizes: tuple[int, int], name: str) -> "ExactSector":
-        """The sector in exact numbers; one with callable slopes up to a bound of its argument."""
+        """The sector in exact numbers; callable slopes are evaluated at a bound of the argument."""
         n, m = sizes
         row = vector(self.row, f"row of sector {name}")
         if len(row) == n:
@@ -64,8 +65,8 @@ class Sector:
         ends = vector(slopes, f"slopes of sector {name}", 2)
         if ends[0] > ends[1] or (within is not None and (within <= 0 or any(row[n:]))):
             raise ParameterError(
-                f"sector {name} must have slopes in order, and a positive bound of an argument of states alone where "
-                f"it has one. Received slopes {shortly(ends[0])} and {shortly(ends[1])}, within "
+                f"sector {name} must have slopes low <= high; within must be positive, with a row of states alone. "
+                f"Received slopes {shortly(ends[0])} and {shortly(ends[1])}, within "
                 f"{'None' if within is None else shortly(within)}."
             )
         return ExactSector(entry=entry, row=row, slopes=(ends[0], ends[1]), within=within)
@@ -85,7 +86,7 @@ class UncertainPlant:
         What is measured; all states unless given.
     sectors : mapping of str to Sector
     gains : mapping of str to (number, number)
-        Least and largest factor of a control less its loads, by its name: any course of it between.
+        Range of the gain on a control minus its loads, by its name; it may vary between them at any rate.
     disturbances : mapping of str to (sequence, number)
         How it enters x′, and its largest size.
     loads : mapping of str to (sequence, sequence or None, number)
@@ -97,12 +98,12 @@ class UncertainPlant:
     noise : mapping of str to number
         Largest measurement error by the name of a measurement.
     start : sequence of numbers, optional
-        |x_i(0)| ≤ start_i; from rest unless given.
+        |x_i(0)| ≤ start_i; 0 unless given.
     units : mapping of str to str
-        Units of outputs, controls and disturbances by their names, for what is printed: SI units, or MPa.
+        Units of outputs, controls and disturbances by their names, for printed text: SI units, or MPa.
     name : str
     remarks : mapping of str to str
-        Words that a statement has behind ``plant`` and ``disturbances``.
+        Text that follows the words ``plant`` and ``disturbances`` in a statement.
 
     Raises
     ------
@@ -127,7 +128,7 @@ class UncertainPlant:
     remarks: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        keep: Any = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
+        put: Any = lambda name, value: object.__setattr__(self, name, value)  # noqa: E731
         A, B = matrix(self.A, "A"), matrix(self.B, "B")
         n, m = len(A), len(B[0]) if B else 0
         C = matrix(self.C, "C") if self.C is not None else tuple(unit(n, i) for i in range(n))
@@ -141,15 +142,15 @@ class UncertainPlant:
                     f"matrix {name} of a plant must be {height} x {width}. Received {len(part)} rows of "
                     f"{', '.join(map(str, sorted({len(row) for row in part})))} entries."
                 )
-        keep("A", A)
-        keep("B", B)
-        keep("C", C)
-        keep("controls", _names(self.controls, "u", m, "controls"))
-        keep("measurements", _names(self.measurements, "y", len(C), "measurements"))
+        put("A", A)
+        put("B", B)
+        put("C", C)
+        put("controls", _names(self.controls, "u", m, "controls"))
+        put("measurements", _names(self.measurements, "y", len(C), "measurements"))
         outputs = dict(zip(self.measurements, C, strict=True)) if self.outputs is None else self.outputs
-        keep("outputs", _frozen({name: vector(row, f"output {name}", n) for name, row in outputs.items()}))
-        keep("disturbances", _frozen({name: _disturbance(name, one, n) for name, one in self.disturbances.items()}))
-        keep("loads", _frozen({name: _load(name, one, (n, m), C) for name, one in self.loads.items()}))
+        put("outputs", _frozen({name: vector(row, f"output {name}", n) for name, row in outputs.items()}))
+        put("disturbances", _frozen({name: _disturbance(name, one, n) for name, one in self.disturbances.items()}))
+        put("loads", _frozen({name: _load(name, one, (n, m), C) for name, one in self.loads.items()}))
         for given, names, what in ((self.gains, self.controls, "gains"), (self.noise, self.measurements, "noise")):
             if unknown := set(given) - set(names):
                 raise ParameterError(
@@ -158,20 +159,20 @@ class UncertainPlant:
         ends = {name: vector(pair, f"gains of {name}", 2) for name, pair in self.gains.items()}
         if any(low > high for low, high in ends.values()):
             raise ParameterError("gains of a control must be the least, then the largest. Received them reversed.")
-        keep("gains", _frozen(ends))
+        put("gains", _frozen(ends))
         sizes = {name: rational(size, f"noise of {name}") for name, size in self.noise.items()}
         start = (Fraction(0),) * n if self.start is None else vector(self.start, "start", n)
         if min([*sizes.values(), *start, Fraction(0)]) < 0:
             raise ParameterError("noise and start must be 0 or more. Received a negative number. Give absolute values.")
-        keep("noise", _frozen(sizes))
-        keep("start", start)
-        keep("sectors", _frozen(dict(self.sectors)))
+        put("noise", _frozen(sizes))
+        put("start", start)
+        put("sectors", _frozen(dict(self.sectors)))
         if unknown := set(self.units) - {*(self.outputs or ()), *self.controls, *self.disturbances}:
             raise ParameterError(
                 "units of a plant must be of outputs, controls and disturbances. Received "
                 f"{', '.join(sorted(unknown))}. Use their names."
             )
-        keep("units", _frozen(dict(self.units)))
+        put("units", _frozen(dict(self.units)))
         if len(self.sectors) + len(ends) > MOST or not 1 <= len(self.outputs or ()) <= MOST:
             raise ParameterError(f"a plant must have at most {MOST} sectors and gains, and 1 to {MOST} outputs.")
         if double := set(self.sectors) & set(ends):
@@ -180,16 +181,16 @@ class UncertainPlant:
 
     @classmethod
     def from_statespace(cls, system: Any, **more: Any) -> Self:
-        """Plant of a `control.StateSpace` in continuous time, with the names of its signals and other fields.
+        """Plant of a `control.StateSpace` in continuous time, with its signal names; `more` gives further fields.
 
         Raises
         ------
         ParameterError
-            For a system in discrete time, or whose outputs depend on its inputs at once.
+            For a system in discrete time, or with direct feedthrough.
         """
         if getattr(system, "dt", 0) or any(v for row in system.D.tolist() for v in row):
             raise ParameterError(
-                "a plant must be in continuous time, with D = 0. Received a system of another kind. "
+                "a plant must be in continuous time, with D = 0. Received a system in discrete time or with D not 0. "
                 "Use control.ss(A, B, C, 0)."
             )
         labels = {"controls": tuple(system.input_labels), "measurements": tuple(system.output_labels)}
@@ -199,24 +200,23 @@ class UncertainPlant:
     def from_blocks(
         cls, fault: Fault | BlockChain, blocks: int | None = None, *, wells: str = "each", coupling: Any = None
     ) -> Self:
-        """Strips of a fault with springs between neighbours, each with its own friction of the box and disturbance.
+        """Plant of the strips of a fault, coupled by springs, each with its own friction of the box and disturbance.
 
         States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa].
-        With an independent well for each block the errors are those from the reference, and all are measured. With
-        fewer wells the slip error of a block is that from its balance under the pressures that hold an average of the
-        slips for each well at the reference; these averages of slip and slip rate are measured.
+        With an independent well for each block, errors are relative to the reference, and all are measured. With
+        fewer wells, one average of the slips per well follows the reference. Slip errors are then relative to the
+        balance of the blocks at these averages, and the averages of slip and slip rate are measured.
 
         Parameters
         ----------
         fault : Fault or BlockChain
-            Of the second the blocks, springs and wells are its own, and no other argument is given.
+            A `BlockChain` has its own blocks, springs and wells; no other argument is given with it.
         blocks : int
             2 to 20.
         wells : str
             ``"each"`` or ``"one"``.
         coupling : number, optional
-            Stiffness of a spring over the mass of a block [1/s²]; that of elastic strips, G·blocks²/(ρL²), unless
-            given.
+            Stiffness of a spring over the mass of a block [1/s²]; by default that of elastic strips, G·blocks²/(ρL²).
 
         Raises
         ------
@@ -232,7 +232,7 @@ class UncertainPlant:
         return len(self.A), len(self.controls)
 
     def exact_sectors(self, bound: Callable[[str], Fraction]) -> dict[str, ExactSector]:
-        """Sectors and gains, those with callable slopes up to a bound of the argument by their name."""
+        """Sectors, also those of the gains; `bound` returns the bound of the argument by name for callable slopes."""
         n, m = self.sizes
         sectors = {name: sector.at(bound(name), (n, m), name) for name, sector in self.sectors.items()}
         for name, (low, high) in self.gains.items():
@@ -242,30 +242,30 @@ class UncertainPlant:
         return sectors
 
     def behind(self, lag: Any) -> "UncertainPlant":
-        """The plant behind actuators with a time constant [s] each, q′ = (u − q)/lag, which are further states."""
+        """The plant with an actuator for each control, q′ = (u − q)/lag [s], where q are further states."""
         time = rational(lag, "lag")
         if time <= 0:
             raise ParameterError(f"lag must be positive. Received {shortly(time)} s. Omit lag.")
         (n, m), zero = self.sizes, Fraction(0)
-        still = (zero,) * m
+        zeros = (zero,) * m
 
         def behind(name: str, one: ExactSector) -> Sector:
             given = self.sectors.get(name, one)
-            return Sector(entry=(*one.entry, *still), row=(*one.row, *still), slopes=given.slopes, within=given.within)
+            return Sector(entry=(*one.entry, *zeros), row=(*one.row, *zeros), slopes=given.slopes, within=given.within)
 
         exact = self.exact_sectors(lambda _: Fraction(1))
         return replace(
             self,
             A=[[*a, *b] for a, b in zip(self.A, self.B, strict=True)]
             + [[zero] * n + [-(i == j) / time for j in range(m)] for i in range(m)],
-            B=[still] * n + [[(i == j) / time for j in range(m)] for i in range(m)],
-            C=[(*row, *still) for row in self.C],
+            B=[zeros] * n + [[(i == j) / time for j in range(m)] for i in range(m)],
+            C=[(*row, *zeros) for row in self.C],
             sectors={name: behind(name, one) for name, one in exact.items()},
             gains={},
-            disturbances={name: ((*entry, *still), size) for name, (entry, size) in self.disturbances.items()},
+            disturbances={name: ((*entry, *zeros), size) for name, (entry, size) in self.disturbances.items()},
             loads={name: (one.control, (*one.shift, *one.control), one.rate) for name, one in self.loads.items()},
-            outputs={name: (*row, *still) for name, row in (self.outputs or {}).items()},
-            start=(*self.start, *still),
+            outputs={name: (*row, *zeros) for name, row in (self.outputs or {}).items()},
+            start=(*self.start, *zeros),
         )
 
 
@@ -321,10 +321,10 @@ def _load(name: str, given: Any, sizes: tuple[int, int], C: Matrix) -> SlowLoad:
         shift=(Fraction(0),) * n if shift is None else vector(shift, f"shift of load {name}", n),
         rate=rational(rate, f"rate of load {name}"),
     )
-    seen = any(sum(c * s for c, s in zip(row, load.shift, strict=True)) for row in C)
-    if load.rate < 0 or seen:
+    measured = any(sum(c * s for c, s in zip(row, load.shift, strict=True)) for row in C)
+    if load.rate < 0 or measured:
         raise ParameterError(
             f"load {name} must have a rate of 0 or more and a shift that is not measured, C·shift = 0. Received the "
-            f"rate {shortly(load.rate)}{' and a shift that is measured' * seen}."
+            f"rate {shortly(load.rate)}{' and a shift that is measured' * measured}."
         )
     return load

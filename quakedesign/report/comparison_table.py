@@ -18,7 +18,7 @@ class Comparison(Compared):
     """Uncontrolled, published and designed on one fault, see `Compared`."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of the command ``design`` in DESIGN.md."""
+        """Keys of ``design --json``, see docs/reference/json.md."""
         by_origin = {
             o: {e.design.name: e.to_dict() | {"headline": headline(e), "remarks": remarks(e)} for e in self.of(o)}
             for o in ("designed", "published")

@@ -37,7 +37,7 @@ def prepare(out: Path, *, force: bool) -> None:
 
 
 def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
-    """Everything of a comparison that JSON can hold, with the keys of DESIGN.md and the versions of all libraries.
+    """Everything of a comparison that JSON can hold, with the keys of ``--json`` and the versions of all libraries.
 
     Parameters
     ----------

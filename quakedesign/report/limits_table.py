@@ -23,7 +23,7 @@ def limits_lines(limits: Limits) -> list[str]:
     """For people, within 80 columns."""
     task = limits.fault
     head = [
-        f"{task.name}: performance limits, and what designs are proved to reach",
+        f"{task.name}: performance limits, and proved bounds of designs",
         f"({_box(limits)}{limits.against}, T_s = {task.sampling_time:g} s{_delay(limits)})",
         "",
         f"{'':24}{'infeasible':>20}{'proved':>16}",
@@ -55,7 +55,7 @@ def _meaning(limits: Limits) -> list[str]:
     lines = [
         "infeasible: every controller, linear or not, fails for some friction of the box and some disturbance of the "
         "stated size, which may jump",
-        f"slip-rate error: for controllers that keep the slip error {within}, on the plant without stick; it holds "
+        f"slip-rate error: for controllers that keep the slip error {within}, on the plant without stick, "
         f"even for one that {signals} up to each sample",
         "proved, slip-rate error: the smaller of the designs for the objectives tracking and peak, on the plant "
         "without stick",
@@ -75,8 +75,8 @@ def _meaning(limits: Limits) -> list[str]:
     return [
         *lines,
         "other rows: a constant disturbance begins just after a sample; before the next pressure acts, the fault has "
-        f"slipped so far that a withdrawal of {UpperBound(limits.withdrawal).quantity('Pa', 4)} (last row: the stated "
-        f"one) no longer stops it; D = {float(limits.diffusivity):g} m^2/s",
+        f"slipped so far that a withdrawal of {UpperBound(limits.withdrawal).quantity('Pa', 4)} (last row: the "
+        f"withdrawal in that row) no longer stops it; D = {float(limits.diffusivity):g} m^2/s",
     ]
 
 

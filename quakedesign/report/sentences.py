@@ -483,7 +483,7 @@ def state_run_lines(result: dict[str, Any]) -> list[str]:
     lines += [_event_line(number, event) for number, event in enumerate(events[:_MOST_EVENTS], start=1)]
     if len(events) > _MOST_EVENTS:
         lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json has them all)")
-    lines.append(f"energy that the integration loses: {result['energy']['relative_residual']:.2g} of the largest share")
+    lines.append(f"energy error of the integration: {result['energy']['relative_residual']:.2g} of the largest energy")
     return lines
 
 

@@ -121,12 +121,12 @@ def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", 
         console.print(f"  {sentence}")
     if "longest_interval" in run.provenance:
         soonest, latest = (run.provenance[f"{end}_interval"] for end in ("shortest", "longest"))
-        console.print(f"  aperiodic sampling: each sample {soonest:.4g} s to {latest:.4g} s after the last, drawn anew")
+        console.print(f"  aperiodic sampling: intervals of {soonest:.4g} s to {latest:.4g} s, drawn at random")
     elif run.provenance["controller"] != "none" and run.provenance["step"] != fault.sampling_time:
         console.print(f"  steps of {run.provenance['step']:.4g} s, not the fault's T_s = {fault.sampling_time:g} s")
     numbers = run.metrics.to_dict()
     if numbers["settled_from"] is not None:
-        console.print(f"  errors count from {numbers['settled_from']:.6g} s on")
+        console.print(f"  errors evaluated from {numbers['settled_from']:.6g} s on")
     for name, number in numbers.items():
         if number is not None:
             console.print(f"  {name} = {number + 0.0:.6g} {run.metrics.unit(name)}".rstrip())

@@ -1,4 +1,4 @@
-"""Simulation of one closed loop from rest over the whole task."""
+"""Simulation of one closed loop, by default from rest over the whole task."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -61,86 +61,86 @@ def simulate(
 ) -> Trajectory:
     """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
 
-    A fault whose friction has a state starts in steady sliding at the mean rate of its task and is held there by a law
-    of samples that is told the slip alone, as `design` gives it, in its own scheme and step; of what stands below it
-    takes the parameters up to `progress`, plant, variation, actuator, measurement (a transducer) and tide.
+    A fault with a friction state starts in steady sliding at the mean rate of its task. It needs a sampled law that
+    measures the slip alone, as from `design`, with its own scheme and step. Of the parameters below, those up to
+    `progress` apply, and plant, variation, actuator, measurement (a `Transducer`) and tide.
 
     Parameters
     ----------
     fault : Fault
     controller : Controller, optional
-        None: no fluid is injected. Friction with a state is then loaded at its operating rate from near steady sliding,
-        and takes `duration`, `samples`, `method` and `plant` alone; `simulate_state` has other loading and pressures.
+        None: no fluid is injected. A fault with a friction state is then loaded at its operating rate from near steady
+        sliding, and only `duration`, `samples`, `method` and `plant` apply; for others see `simulate_state`.
     step : float, optional
-        Length of one step [s]; that of a law of samples, or the fault's sampling time, unless given.
+        Length of one step [s]; by default T_s of a sampled law, else of the fault.
     scheme : str or Scheme, optional
-        How the law is carried out over a step, by name, or set as wanted; see `quakedesign.loop.schemes`. All but
-        ``"continuous"`` measure and decide once per step and hold the pressure in between. Unless given, that of a law
-        of samples, which has no other, and ``"continuous"`` for others.
+        Discretisation of the law, by name or as an instance, see `quakedesign.loop.schemes`. All but ``"continuous"``
+        sample once per step, with a zero-order hold of the pressure. By default that of a sampled law, which has no
+        other, else ``"continuous"``.
     method : str
         Integrator with a fixed step, or, for the printed plant, ``"cvodes"`` or ``"idas"`` with an adaptive step;
-        see `quakedesign.simulation.integrators`. The latter answer at every multiple of `step`, where the run is
-        watched. Friction with a state is stiff between samples: ``"cvodes"`` unless ``"idas"``.
+        see `quakedesign.simulation.integrators`. The latter return the state at every multiple of `step`, where the
+        run is recorded. Friction with a state is stiff between samples: ``"cvodes"`` (default) or ``"idas"``.
     duration : float, optional
-        [s]; the operation time unless given. Whole steps are taken, as many as fit.
+        [s]; the operation time unless given, rounded down to whole steps.
     samples : int
-        The trajectory keeps about this many instants; metrics are taken from every step.
+        Approximate number of stored instants; metrics are computed from every step.
     settled_from : float, optional
-        Time [s] from which errors count; a quarter of the operation time, or of a shorter run.
+        Time [s] from which errors are evaluated; by default a quarter of the operation time, or of a shorter run.
     progress : callable, optional
         Called with the fraction done [-].
     compiled : bool, optional
-        True: machine code or an error. False: CasADi's virtual machine. None: machine code if the run
-        is long enough to be worth it and a C compiler works. The digits are the same.
+        True: machine code or an error. False: CasADi's virtual machine. None: machine code for a long run if a C
+        compiler works. Results are bitwise the same.
     plant : str, optional
-        ``"stick-slip"``: friction holds the fault at rest, and it never slips backward (ERRATA 14). ``"printed"``: eq.
-        shift, continued to negative slip rates as in the paper. Of friction with a state, which never rests,
-        ``"smooth"`` or ``"quasi-dynamic"``, without inertia. The first of each unless given.
+        ``"stick-slip"``: friction holds the fault at rest, and it never slips backward (ERRATA 14). ``"printed"``: the
+        paper's plant without stick, eq. shift continued to negative slip rates. With a friction state, which never
+        rests: ``"smooth"`` or ``"quasi-dynamic"`` (without inertia). By default the first of each.
     load : Load, optional
-        Drift of the far end and a perturbation, beside the fault's own disturbance.
+        Drift of the far end and a perturbation, in addition to the fault's own disturbance.
     variation : Variation or SlidingVariation, optional
-        True parameters other than the nominal ones, within the fault's box. One machine code serves all variations.
-        The latter of friction with a state.
+        True parameters other than the nominal ones, within the fault's box; `SlidingVariation` for friction with a
+        state. The compiled code is the same for all.
     rtol : float
-        Tolerance of ``"cvodes"`` and ``"idas"``, 1e-13 … 1e-3; a fixed step has none.
+        Tolerance of ``"cvodes"`` and ``"idas"``, 1e-13 … 1e-3; not used with a fixed step.
     checkpoint : str or Path, optional
-        File that keeps the progress of a long run with a fixed step: an interrupted run goes on from it and ends with
-        the digits of an uninterrupted one, which removes it.
+        File for the state of a long run with a fixed step. An interrupted run continues from it, with bitwise the same
+        result; a finished run removes it.
     substeps : int
-        Steps of the integrator per `step`, for a named scheme that samples.
+        Steps of the integrator per `step`, for a named sampled scheme.
     actuator : Actuator, optional
-        What lies between the pressure that is asked for and that in the fault, for a named scheme that samples. Unless
-        given, the delay, lag and rock for which a law of samples is designed, with the substeps that they need; an
-        `Actuator` without stages brings the pressure to the fault at once. Of friction with a state stages that act
-        once a sample, then a lag, rock, or both; those two which the law is designed for unless given.
+        Path from commanded pressure to fault pressure, for a named sampled scheme. By default the delay, lag and
+        diffusion path for which a sampled law is designed, with the substeps that they need; with an `Actuator` without
+        stages the pressure acts at once. With a friction state: stages that act once per sample, then a lag, a
+        diffusion path or both; by default the lag and the diffusion path of the design.
     measurement : Measurement, Sensor or Transducer, optional
-        Noise of what the controller sees, or a sensor that tells it estimates from the slip alone, for a named scheme
-        that samples. Of friction with a state the transducer that the slip is read with.
+        Measurement noise, or a sensor that gives the law estimates from the slip alone, for a named sampled scheme.
+        With a friction state: the transducer of the slip.
     initial_slip, initial_slip_rate : float
-        x1 [m] and x2 [m/s] at the start, zero or positive. The reference starts at zero all the same.
+        x1 [m] and x2 [m/s] at the start, zero or positive. The reference starts at zero in any case.
     tide : Tide, optional
         Shear stress on a fault whose friction has a state; none unless given.
 
     Returns
     -------
     Trajectory
-        A `LoopTrajectory`; a `SlidingRun` of friction with a state, and a `StateTrajectory` without a controller.
-        One that diverges ends there, says so in `events`, and has no metrics.
+        A `LoopTrajectory`; with a friction state a `SlidingRun`, or a `StateTrajectory` without a controller.
+        A run that diverges ends there, with the time in `events` and without metrics.
 
     Raises
     ------
     ParameterError
         For a step, duration or number of samples that is not positive and finite, an unknown scheme, method or plant,
-        an initial state that is negative, a variation outside the box, a sensor made for another step, or a loop that
-        is not smooth with a method that needs one.
+        an initial state that is negative, a variation outside the box, a sensor made for another step, or a
+        loop that is not smooth with a method that needs a smooth one.
     SimulationError
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
-        cannot go on, or when the checkpoint is that of another run.
+        fails, or when the checkpoint is that of another run.
     """
 
     def slid(fault: Fault) -> Trajectory:
-        moved = plant or next(iter(PLANTS))
-        require_known(moved, PLANTS, "plant of a fault with a state", UnknownNameError)
+        plant_name = plant or next(iter(PLANTS))
+        require_known(plant_name, PLANTS, "plant of a fault with a state", UnknownNameError)
         wrong = {
             "compiled": compiled is not None,
             "load": load is not None,
@@ -162,10 +162,10 @@ def simulate(
                 "measurement": measurement is not None,
                 "tide": tide is not None,
             }
-        refused = [name for name, given in wrong.items() if given]
+        inapplicable = [name for name, given in wrong.items() if given]
         if controller is None:
-            return _uncontrolled(fault, moved, method, duration, samples, refused)
-        law, path = _sampled_law(fault, controller, actuator, refused)
+            return _uncontrolled(fault, plant_name, method, duration, samples, inapplicable)
+        law, path = _sampled_law(fault, controller, actuator, inapplicable)
         own_way(controller, scheme, step)
         return simulate_sliding(
             fault,
@@ -177,7 +177,7 @@ def simulate(
             transducer=measurement if isinstance(measurement, Transducer) else None,
             variation=variation if isinstance(variation, SlidingVariation) else None,
             tide=tide,
-            inertia=PLANTS[moved],
+            inertia=PLANTS[plant_name],
             method="cvodes" if method == _METHOD else method,
             duration=duration,
             samples=samples,
@@ -215,13 +215,13 @@ def simulate(
 
 
 def _uncontrolled(
-    fault: Fault, plant: str, method: str, duration: float | None, samples: int, refused: list[str]
+    fault: Fault, plant: str, method: str, duration: float | None, samples: int, inapplicable: list[str]
 ) -> Trajectory:
-    """Loaded at the operating rate of its friction, near steady sliding at first, under no pressure."""
-    if refused:
+    """Run without pressure, loaded at the operating rate of the friction, from near steady sliding."""
+    if inapplicable:
         raise ParameterError(
-            f"an uncontrolled fault whose friction has a state has a duration, samples, a method and a plant. Received "
-            f"{', '.join(refused)}. Omit them, or use simulate_state for other loading, pressure and starting states."
+            f"an uncontrolled fault with a friction state takes only duration, samples, method and plant. Received "
+            f"{', '.join(inapplicable)}. Omit them, or use simulate_state for other loading, pressures and states."
         )
     whole = fault.reference.operation_time if duration is None else duration
     rate = fault.friction.operating_rate
@@ -240,13 +240,13 @@ _OF_SLIDING = ("duration", "samples", "settled_from", "progress", "variation", "
 
 
 def _sampled_law(
-    fault: Fault, controller: Controller, actuator: Actuator | None, refused: list[str]
+    fault: Fault, controller: Controller, actuator: Actuator | None, inapplicable: list[str]
 ) -> tuple[Any, PressurePath]:
-    """Law of samples that measures the slip alone, with its path; refuses arguments that slow sliding does not have."""
-    if controller.of_slip is None or controller.sampling is None or refused:
+    """Sampled law of the slip alone, with its path; rejects arguments that do not apply to slow sliding."""
+    if controller.of_slip is None or controller.sampling is None or inapplicable:
         raise ParameterError(
-            f"friction with a state is held by a law of samples, as design gives it, with {', '.join(_OF_SLIDING)} (a "
-            f"SlidingVariation), method, plant, actuator and a Transducer as measurement. Received "
-            f"{', '.join(refused) or repr(controller)} with {fault.friction.name}."
+            "a fault with a friction state takes a sampled law of the slip, as from design, with "
+            f"{', '.join(_OF_SLIDING)} (a SlidingVariation), method, plant, actuator and a Transducer as measurement. "
+            f"Received {', '.join(inapplicable) or repr(controller)} with {fault.friction.name}."
         )
     return controller, PressurePath.of(controller.sampling, actuator)

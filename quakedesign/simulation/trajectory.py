@@ -1,6 +1,6 @@
 """Trajectories of runs with export to xarray, pandas and NetCDF, their outcome and figure.
 
-Every run is a `Trajectory`; here also those of a closed loop, with and without an actuator.
+Every run is a `Trajectory`; `LoopTrajectory` is that of a closed loop, with or without an actuator.
 The outcome is tracked, slow slip, earthquake, diverged or opened.
 """
 
@@ -63,7 +63,7 @@ class Trajectory(ABC):
     provenance : mapping
         Method, settings and versions.
     failed : str
-        Why the run is but its first instants, where it is for a reason other than divergence.
+        Reason why the run ended early, other than divergence; empty if it did not.
     """
 
     name: str
@@ -108,8 +108,8 @@ class Trajectory(ABC):
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
         """Values, long name and SI unit of every signal that this run has, by name."""
-        known = ((each.name, getattr(self, each.name), each.metadata) for each in fields(self))
-        return {name: (v, told["title"], told["unit"]) for name, v, told in known if told and v is not None}
+        every = ((each.name, getattr(self, each.name), each.metadata) for each in fields(self))
+        return {name: (v, part["title"], part["unit"]) for name, v, part in every if part and v is not None}
 
     def attributes(self) -> Mapping[str, Any]:
         """Texts and numbers about the run as a whole."""
@@ -130,13 +130,13 @@ class Trajectory(ABC):
         time = ("time", self.time, {"long_name": "time since the start of the run", "units": "s"})
         source = f"quakedesign {self.attributes().get('version_quakedesign', '')}".strip()
         head = {"Conventions": CONVENTIONS, "title": self.name, "source": source, "history": f"simulated by {source}"}
-        found = xr.Dataset(variables, coords={"time": time}, attrs=head | dict(self.attributes()))
-        for variable in found.variables.values():
+        dataset = xr.Dataset(variables, coords={"time": time}, attrs=head | dict(self.attributes()))
+        for variable in dataset.variables.values():
             variable.encoding["_FillValue"] = None
-        return found
+        return dataset
 
     def resample(self, dt: float) -> "xr.Dataset":
-        """Return an xarray Dataset at uniform instants, as filters and spectra need them, interpolated linearly.
+        """Return an xarray Dataset at uniform instants, as for filters and spectra, interpolated linearly.
 
         Parameters
         ----------
@@ -148,11 +148,11 @@ class Trajectory(ABC):
         ParameterError
             For a shorter interval, or one longer than the run.
         """
-        duration, kept = float(self.time[-1] - self.time[0]), max(len(self.time) - 1, 1)
-        if not 0 < duration / kept * (1 - 1e-9) <= dt <= duration:
+        duration, intervals = float(self.time[-1] - self.time[0]), max(len(self.time) - 1, 1)
+        if not 0 < duration / intervals * (1 - 1e-9) <= dt <= duration:
             raise ParameterError(
-                f"dt must be between {duration / kept:.4g} s, the mean distance of the instants that are kept, and "
-                f"{duration:.4g} s, the run. Received {dt!r}. Ask simulate for more samples."
+                f"dt must be between {duration / intervals:.4g} s, the mean interval of the stored instants, and "
+                f"{duration:.4g} s, the run. Received {dt!r}. Increase samples in simulate."
             )
         count = int(duration / dt * (1 + 1e-12)) + 1
         return self.to_xarray().interp(time=self.time[0] + dt * np.arange(count))
@@ -165,7 +165,7 @@ class Trajectory(ABC):
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time [s]"))
 
     def save(self, path: str | Path) -> Path:
-        """Write the run as NetCDF, wholly or not at all.
+        """Write the run as NetCDF; a failure leaves no partial file.
 
         Raises
         ------
@@ -215,7 +215,7 @@ class Outcome:
         return self.kind in HARMLESS
 
     def to_dict(self) -> Json:
-        """Keys of DESIGN.md."""
+        """Plain values with the keys of docs/reference/json.md."""
         return asdict(self)
 
 
@@ -225,7 +225,7 @@ class OutcomeCriterion:
 
     In this order, a run is
 
-    - ``diverged``, if the motion of the plant overflows; ``opened``, if that event happened;
+    - ``diverged``, if the motion of the plant overflows; ``opened``, if the event ``opening`` occurred;
     - ``tracked``, if it has a controller, its slip error never exceeds 2 % of the target slip (over the time in which
       errors count), and its slip rate never exceeds the largest of the reference by more than 1 % of the natural peak
       (over the whole run);
@@ -302,7 +302,7 @@ class OutcomeCriterion:
 
 Array = np.ndarray
 Panel = tuple[str, str, Array, tuple[str, Array | None]]
-"""Name, SI unit and values of a signal, and name and values of one that is drawn beside it."""
+"""Name, SI unit and values of a signal, and name and values of another in the same panel."""
 Signal = tuple["np.ndarray", str, str]
 NOTHING = ("", None)
 _TIMES = ((2 * 86400.0, 86400.0, "d"), (2 * 3600.0, 3600.0, "h"), (2 * 60.0, 60.0, "min"), (0.0, 1.0, "s"))
@@ -344,7 +344,7 @@ def stress_figure(title: str, time: Array, slip: Array, shear_stress: Array, mom
 def _panel(axis: "Axes", time: Array, title: str, unit: str, values: Array, beside: tuple[str, Array | None]) -> None:
     name, others = beside
     largest = max(float(abs(curve).max()) for curve in (values, others) if curve is not None)
-    # No prefix where the unit is a power, which would belong to what is inside of it.
+    # No prefix for a unit with a power, which would apply to the prefix too.
     size, prefix = (1.0, "") if "^" in unit else _prefix(largest)
     if others is not None:
         axis.plot(time, others / size, "--", color="black", linewidth=1, label=name)
@@ -367,7 +367,7 @@ def _prefix(largest: float) -> tuple[float, str]:
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class LoopTrajectory(Trajectory):
-    """One run, at some of its instants, with metrics from all of them; see `Trajectory`.
+    """Run of a closed loop: signals at stored instants, metrics from every step; see `Trajectory`.
 
     Attributes
     ----------
@@ -379,9 +379,8 @@ class LoopTrajectory(Trajectory):
         The law's own states ξ, shape (number of them, n), in `integral_units`.
     integral_units : tuple of str
     actuation : mapping of str to tuple
-        Behind an actuator, where `pressure` is that in the fault: values, shape (n,), long name and SI unit of
-        ``well_pressure`` [Pa], and where the actuator stores fluid of ``injected_volume`` [m³] and ``flow_rate``
-        [m³/s].
+        Signals of an actuator, where `pressure` is that in the fault: values, shape (n,), long name and SI unit of
+        ``well_pressure`` [Pa]; if the actuator stores fluid, also ``injected_volume`` [m³] and ``flow_rate`` [m³/s].
     events : mapping of str to float
         Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
         (friction holds the fault at rest after the start), ``load_reversed`` (the load at rest exceeds friction
@@ -417,10 +416,10 @@ class LoopTrajectory(Trajectory):
 
     def signals(self) -> dict[str, Signal]:
         """Values, long name and SI unit of every signal that this run has, by name."""
-        found = super().signals() | {"moment_rate": (self.moment_rate, "seismic moment rate", "N m/s")}
+        entries = super().signals() | {"moment_rate": (self.moment_rate, "seismic moment rate", "N m/s")}
         for number, (values, unit) in enumerate(zip(self.integrals, self.integral_units, strict=True), 1):
-            found[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
-        return found | dict(self.actuation)
+            entries[f"xi_{number}"] = (values, f"integral state xi{number}", unit)
+        return entries | dict(self.actuation)
 
     def attributes(self) -> Json:
         """Provenance, and outcome, metrics, events and energy as JSON text."""
@@ -454,26 +453,26 @@ class LoopTrajectory(Trajectory):
 
     @property
     def heading(self) -> str:
-        """Name, and number of instants that are drawn; metrics are of all steps."""
-        kept = len(self.time) - 1
-        return self.name + (f"\n{kept} of {self.metrics.steps} steps drawn" if kept < self.metrics.steps else "")
+        """Name, and number of drawn steps if some are omitted; metrics are of all steps."""
+        drawn = len(self.time) - 1
+        return self.name + (f"\n{drawn} of {self.metrics.steps} steps drawn" if drawn < self.metrics.steps else "")
 
     def panels(self) -> list[Panel]:
         """Slip, slip rate, pressures in the fault and at the well, errors, and other signals of an actuator."""
         further = dict(self.actuation)
         well, *_ = further.pop("well_pressure", (None,))
-        found: list[Panel] = [
+        panels: list[Panel] = [
             ("slip", "m", self.slip, ("reference", self.reference)),
             ("slip rate", "m/s", self.slip_rate, ("reference", self.reference_rate)),
             ("pressure", "Pa", self.pressure, ("at the well", well)),
         ]
         if self.slip_error is not None:
             errors: Any = ("slip error", "m", self.slip_error), ("slip-rate error", "m/s", self.slip_rate_error)
-            found += ((*error, NOTHING) for error in errors)
-        return [*found, *((title, unit, values, NOTHING) for values, title, unit in further.values())]
+            panels += ((*error, NOTHING) for error in errors)
+        return [*panels, *((title, unit, values, NOTHING) for values, title, unit in further.values())]
 
     def plot(self) -> "Figure":
-        """Return a matplotlib Figure of slip, slip rate, pressure, errors, and what an actuator adds."""
+        """Return a matplotlib Figure of slip, slip rate, pressure, errors, and signals of an actuator."""
         return figure(self.heading, self.time, self.panels())
 
     def plot_stress(self) -> "Figure":

@@ -171,7 +171,7 @@ def compared(
 ) -> Compared:
     """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin.
 
-    Each design says whether it is a verdict on a given law. Runs go on in the background while further designs are
+    The flag of a design is True for a verdict on a given law. Runs go on in the background while further designs are
     made, if these come from a generator.
     """
     require_fault(fault)
@@ -201,10 +201,10 @@ def compared(
 
 
 def behind_path(fault: Fault) -> dict[str, str]:
-    """Reasons why laws designed for a pressure without delay do not apply behind a delay, lag or diffusion path."""
+    """Reasons why laws designed for a pressure without delay do not apply with a delay, lag or diffusion path."""
     why = (
-        "sliding modes and published gains are for a pressure that acts at once and are not compared behind a delay, a "
-        "lag or rock; guarantee says what is proved of a sliding mode behind them"
+        "sliding modes and published gains are for a pressure without delay and are not compared with a delay, a lag "
+        "or a diffusion path; the command guarantee gives proved bounds of a sliding mode with them"
     )
     return {name: why for name in designable(fault) if name != "elqr"}
 
@@ -220,7 +220,7 @@ def _guarantee_of(fault: Fault, design: Design, *, given: bool) -> Guarantee | N
         return replace(given_law_with_worst_case(fault, proof, notes), compensation=design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
     result = replace(with_worst_case(fault, proof), compensation=design.compensation, not_at_rest=tried)
-    return result if proof.proved or design.runs else replace(result, given=True)  # no T_s but the fault's was tried
+    return result if proof.proved or design.runs else replace(result, given=True)  # only T_s of the fault was tried
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:
@@ -266,23 +266,23 @@ def _begun(
 
 
 def _ended(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
-    """Entry with its run, and what the run decides."""
+    """Entry with its run, and the results that depend on the run."""
     law = entry.design.controller
     assert law is not None
     entry = replace(entry, run=run)
     if law.lipschitz_limit is not None:
-        return _with_rate(entry, law, float(law.lipschitz_limit), run, tell)
+        return _sliding_mode(entry, law, float(law.lipschitz_limit), run, tell)
     return entry if law.sampling else _linear(entry, run, tell)
 
 
 def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
-    """A linear law in continuous time: held, and its peaks."""
+    """Entry of a linear law in continuous time, with its stability under zero-order hold and its peaks."""
     design = entry.design
     growth, sampled = None, design.held_loop()
     if sampled is not None and run.provenance["scheme"] == AS_IN_THE_PAPER:
         poles = vertex_poles(sectors(design.fault), list(design.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
-    tell(f"{entry.label}: held pressure and peaks", 0.0)
+    tell(f"{entry.label}: zero-order hold and peaks", 0.0)
     wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
@@ -290,21 +290,21 @@ def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
     return replace(entry, growth_per_step=growth, zero_order_hold=sampled, peaks=proved)
 
 
-def _with_rate(entry: Entry, law: Controller, limit: float, run: Trajectory, tell: Tell) -> Entry:
-    """A sliding mode: |h'| of its run, and in continuous time how often to sample and what a feed-forward would add."""
+def _sliding_mode(entry: Entry, law: Controller, limit: float, run: Trajectory, tell: Tell) -> Entry:
+    """Entry of a sliding mode, with |h'| of its run; in continuous time also largest T_s and feed-forward variants."""
     design, certified = entry.design, certified_bound(entry.design)
     bound = limit if certified is None else float(certified * (law.scale or 1))
     premise = on_trajectory(bound, run)
     if certified is None or premise is None:
         return entry
-    judged, step = design.with_premise(premise), None
+    assessed, step = design.with_premise(premise), None
     if entry.origin != "designed" or law.sampling is not None:
-        return replace(entry, design=judged)
+        return replace(entry, design=assessed)
     if run.provenance["scheme"] == AS_IN_THE_PAPER:
         tell(f"{entry.label}: largest sampling time", 0.0)
         step = largest_sampling_time(design.fault, law, bound)
     tell(f"{entry.label}: feed-forward", 0.0)
-    return replace(entry, design=judged, largest_step=step, variants=design.feedforward_variants())
+    return replace(entry, design=assessed, largest_step=step, variants=design.feedforward_variants())
 
 
 # ----------------------------------------------------------------------
@@ -331,15 +331,15 @@ def needed_pressure(fault: Fault, slip: float | None = None) -> Enclosure | None
 def ways(needed: Enclosure) -> tuple[str, ...]:
     """Fluid operations of a range of pressures: ``withdrawal`` below zero, ``injection`` above."""
     margin = _margin(needed)
-    taken = {"withdrawal": needed.low < -margin, "injection": needed.high > margin}
-    return tuple(way for way, needs in taken.items() if needs)
+    needs = {"withdrawal": needed.low < -margin, "injection": needed.high > margin}
+    return tuple(operation for operation, is_needed in needs.items() if is_needed)
 
 
 def need_sentence(needed: Enclosure) -> str:
     """Range of the equilibrium pressure of a task, and its fluid operations."""
-    taken = f"the task needs {' and '.join(ways(needed))} of fluid" if ways(needed) else "the task needs no fluid"
+    operations = f"the task needs {' and '.join(ways(needed))} of fluid" if ways(needed) else "the task needs no fluid"
     ends = f"{needed.low.quantity('Pa')} to {needed.high.quantity('Pa')}"
-    return f"pressure at equilibrium along the reference {ends} (p < 0 is withdrawal): {taken}"
+    return f"pressure at equilibrium along the reference {ends} (p < 0 is withdrawal): {operations}"
 
 
 def pressure_extremes(run: "Trajectory") -> tuple[float, float] | None:
@@ -358,15 +358,15 @@ def shortfall(run: "Trajectory", fault: Fault) -> str | None:
         return None
     (least, largest), margin = extremes, _margin(needed)
     if least > needed.low + margin:
-        end, had = needed.low.quantity("Pa"), f"has no less than {_mega(least)}" if least < 0 else "never withdraws"
+        end, lack = needed.low.quantity("Pa"), f"has no less than {_mega(least)}" if least < 0 else "never withdraws"
     elif largest < needed.high - margin:
-        end, had = (
+        end, lack = (
             needed.high.quantity("Pa"),
             "never injects" if largest <= 0 else f"has no more than {_mega(largest)}",
         )
     else:
         return None
-    return f"falls short of its task: the reference needs {end} at equilibrium, and this run {had}"
+    return f"falls short of its task: the reference needs {end} at equilibrium, and this run {lack}"
 
 
 def _mega(pressure: float) -> str:

@@ -260,7 +260,7 @@ class SamplingAdequacy:
         return LARGEST_PRODUCT / self.pole if self.pole else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of DESIGN.md, with the pole [1/s], the limit [-] and the largest adequate step [s]."""
+        """Keys of ``--json``, with the pole [1/s], the limit [-] and the largest adequate step [s]."""
         return {
             "step": self.step,
             "pole": self.pole,
@@ -314,7 +314,7 @@ IN_A_LABORATORY = 10.0  # m; below it what slides need not be rock
 
 
 def fault_dict(fault: Fault) -> dict[str, Any]:
-    """Keys of the command ``fault`` in DESIGN.md; SI, eigenvalues as [real, imaginary] in 1/s.
+    """Keys of ``fault --json``; SI, eigenvalues as [real, imaginary] in 1/s.
 
     ``equilibrium_pressure`` is the range [Pa] that the task needs, and ``needs`` says whether that is withdrawal,
     injection or both. ``assumed`` says what the file left open, ``scenario`` is all of it as a TOML file.
@@ -380,11 +380,11 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
     pole = f"at most {UpperBound(adequacy.pole):.4g}" if adequacy.over_box else f"{adequacy.pole:.4g}"
     where = "over the uncertainty box" if adequacy.over_box else "of the nominal fault"
     longest = LowerBound(Fraction(adequacy.adequate_step)).quantity("s")
-    judged = "is adequate" if adequacy.adequate else "is LONGER than a rule of thumb for the instability allows"
+    judged = "is adequate" if adequacy.adequate else "is TOO LONG by a rule of thumb for the unstable pole"
     return (
         f"T_s = {adequacy.step:.4g} s {judged}: T_s times the unstable pole, {pole} 1/s {where}, is "
-        f"{adequacy.pole_times_step:.3g}, and adequate up to {LARGEST_PRODUCT:g} (T_s = {longest})"
-        f"{'' if adequacy.adequate else '; guarantee says whether something is proved at this T_s all the same'}"
+        f"{adequacy.pole_times_step:.3g}; the limit is {LARGEST_PRODUCT:g} (T_s = {longest})"
+        f"{'' if adequacy.adequate else '; the command guarantee may still find a proof at this T_s'}"
     )
 
 

@@ -39,7 +39,7 @@ from quakedesign.plant import uncertain_plant
 from quakedesign.synthesis.method import GainProblem, SlowSlidingDesign, method_of
 
 # ----------------------------------------------------------------------
-# A controller for one fault with what is proved of it.
+# A controller for one fault with its proof.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -55,16 +55,16 @@ class Design:
     controller : Controller or None
         None only when no gains with a proof were found.
     certificate : Certificate or None
-        Proof in continuous time for the base gains (λ = 1), or the counterexample; None for a linear law of samples.
-        The verdict on a law of samples is that on its `guarantee`.
+        Proof in continuous time for the base gains (λ = 1), or the counterexample; None for a sampled linear law.
+        The verdict on a sampled law is that on its `guarantee`.
     premises : tuple of Premise
-        Of the guarantee of a law of samples (`reach`), and of the certificate.
+        Premises of the guarantee of a sampled law (`reach`), and of the certificate.
     domain : Domain or None
         Certified domain of the self-consistent premise on |h'|.
     details : mapping
         Results of the synthesis; exact numbers as texts.
     setup : LoopSetup
-        For which a sampled law is designed.
+        Loop setup for which a sampled law is designed.
     runs : FaultProof or NoProof, optional
         Proof of the sampled loop from the design; None if `guarantee` computes it on access.
     sliding : SlidingGuarantee, optional
@@ -127,11 +127,11 @@ class Design:
         return f"{own}; designed for T_s = {self.controller.sampling_time:.4g} s"
 
     def with_premise(self, premise: Premise) -> "Design":
-        """Return the design with one more premise, such as one read off a run."""
+        """Return the design with one more premise, such as one evaluated on a run."""
         return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
 
     def feedforward_variants(self) -> tuple[Variant, ...]:
-        """Premises and domain of the same gains with every named feed-forward, its own first.
+        """Premises and domain of the same gains with every named feed-forward, the design's first.
 
         Takes a few seconds.
         """
@@ -146,7 +146,7 @@ class Design:
         Parameters
         ----------
         disturbance_class : str
-            ``"amplitude"``: any disturbance as large as the fault's; ``"rate"``: and no faster.
+            ``"amplitude"``: any disturbance bounded by the fault's amplitude; ``"rate"``: its rate is bounded too.
 
         Raises
         ------
@@ -234,7 +234,7 @@ def design(
     estimate.
 
     With `continuous` the designs are those of the paper, without a guarantee of the sampled loop. 2-CTA, 2-DIA: λ grows
-    until L̄ is 1.1 times the requirement of reference and disturbance; so it does where no T_s has a guarantee. e-LQR:
+    until L̄ is 1.1 times the requirement of reference and disturbance, as it does where no T_s has a guarantee. e-LQR:
     Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
 
     Rate-and-state friction: an e-LQR of the slip alone controls slow sliding along the task, through the diffusion path
@@ -261,18 +261,18 @@ def design(
         ``printed`` for a guarantee on the plant without stick; unless given it is on the stick–slip plant where it can
         be proved.
     stress : str, float or Fraction, optional
-        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; the largest that the design withstands
-        unless given.
+        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; by default the largest that the design
+        withstands.
     spread : str, float or Fraction
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     disturbance_class : str
-        Of the guarantee: ``"amplitude"``, any disturbance as large as the fault's, or ``"rate"``, one that starts at 0
-        and is no faster either, such as a tide.
+        Of the guarantee: ``"amplitude"``, any disturbance bounded by the fault's amplitude, or ``"rate"``, whose rate
+        is bounded too and which starts at 0, such as a tide.
     progress : callable, optional
         Called with the present task of the search for slow sliding, and the completed fraction [-].
     accept_poor_fit : bool
-        Whether to go on for a fault whose friction its record does not support (`Fault.poor_fit`); the fault, and what
-        is said of it, is then named so.
+        Whether to continue for a fault whose friction its record does not support (`Fault.poor_fit`); its name then
+        ends with ``poor-fit``.
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
@@ -287,8 +287,8 @@ def design(
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
         For a feed-forward with a law that takes none or runs sampled, an unknown objective, or one of a design in
-        continuous time; for quantities of the setup that a design does not know; for stress or spread without a state
-        of friction, a delay or a lag with one.
+        continuous time; for quantities of the setup that a design does not take; for stress or spread without a
+        friction state, a delay or a lag with one.
     UnsupportedError
         For a law that does not apply to friction with a state.
     """
@@ -297,7 +297,7 @@ def design(
     law, setup = control_law(controller), setup.with_given(**entered)
     if unknown := setup.given().keys() - _DESIGNED_FOR:
         raise ParameterError(
-            f"a design knows {', '.join(_DESIGNED_FOR)} of the loop setup. Received {', '.join(sorted(unknown))}. "
+            f"a design takes {', '.join(_DESIGNED_FOR)} of the loop setup. Received {', '.join(sorted(unknown))}. "
             "Use guarantee, which designs for all of them."
         )
     fault, setup = setup.at_step(fault)
@@ -342,7 +342,7 @@ def _sliding(
 ) -> tuple[LoopSetup, SlowSlidingDesign | None]:
     """Request with the diffusion path, and the setup without it; rejects other laws."""
     if path and not setup.diffusion:
-        raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit it for a well near the fault.")
+        raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit diffusion for a well near the fault.")
     if setup.delay or setup.lag:
         raise ParameterError(
             f"a design for friction with a state has no delay or lag, only a diffusion path. Received a delay or lag "
@@ -368,7 +368,7 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **ent
     fault : Fault
     controller : Controller
     setup : LoopSetup
-        Of a sampled linear law.
+        Loop setup of a sampled linear law.
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
@@ -379,5 +379,5 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **ent
     setup = setup.with_given(**entered)
     fault.require_memoryless("a verdict on gains")
     if setup != IDEAL and controller.sampling is None:
-        raise ParameterError("a loop setup needs a law of samples. Received a law in continuous time. Omit setup.")
+        raise ParameterError("a loop setup needs a sampled law. Received a law in continuous time. Omit setup.")
     return GainProblem(fault=fault, result_type=Design, setup=setup).assessed(controller)

@@ -52,35 +52,35 @@ def answers(
     Parameters
     ----------
     questions : sequence of callable
-        Such as ``partial(guarantee, fault, step=Fraction(1, 20))``: without argument, importable by other processes.
+        Calls without arguments that other processes can import, as ``partial(guarantee, fault, step=Fraction(1, 20))``.
     workers : int
-        Number of processes; 1 computes in this one. No digit depends on who computes.
+        Number of processes; 1 computes in this one. Results do not depend on it.
     scheduler : str, optional
         Address of a dask.distributed scheduler that is used instead.
     executor : Executor, optional
         Any other executor of `concurrent.futures` that is used instead.
     tell : callable, optional
-        Called with what is being done and the fraction done [-].
+        Called with the current task and the completed fraction [-].
 
     Raises
     ------
     SimulationError
-        When the workers cannot be reached, or do not live.
+        When the workers cannot be reached, or terminate.
     """
     results: dict[int, Result | QuakedesignError] = {}
     with crew_or_here(workers, scheduler, executor) as crew:
         for place, one in crew.answers(_called, [(call,) for call in questions]):
             results[place] = one
             if tell is not None:
-                tell(f"{len(results)} of {len(questions)} answered", len(results) / len(questions))
+                tell(f"{len(results)} of {len(questions)} computed", len(results) / len(questions))
     return [results[place] for place in range(len(questions))]
 
 
 def _called(call: Callable[[], Result]) -> Result | QuakedesignError:
     try:
         return call()
-    except QuakedesignError as refused:
-        return refused
+    except QuakedesignError as error:
+        return error
 
 
 STICK_SLIP, PRINTED = PLANTS = StickSlipProof.plant, TrackingProof.plant
@@ -114,43 +114,43 @@ def guarantee(
     Parameters
     ----------
     fault : Fault, BlockChain or UncertainPlant
-        Of the second and third, peaks of its outputs for a law or gains; law, gains, step, delay and lag apply.
-        Several blocks (`UncertainPlant.from_blocks`, `load_chain`) have a law that is designed unless one is given;
-        with rate-and-state friction they slide slowly, and lag and stress are given.
+        For a `BlockChain` or an `UncertainPlant`, peaks of the outputs are proved for a law or gains; law, gains,
+        step, delay and lag apply. For several blocks (`UncertainPlant.from_blocks`, `load_chain`) the law is designed
+        unless given; with rate-and-state friction they slide slowly, and lag and stress are required.
     controller : str, type of Controller, or SampledLaw
-        ``elqr``, or a sliding mode, ``cta`` or ``dia``; or a user's law. Of several blocks ``centralised`` (default),
-        or ``decentralised``: the pressure of each well depends on its own measurements alone.
+        ``elqr``; a sliding mode, ``cta`` or ``dia``; or a user-defined law. Of several blocks ``centralised``
+        (default), or ``decentralised``: the pressure of each well depends on its own measurements alone.
     setup : LoopSetup
-        Sampling, delay, lag, diffusion path, noise, jitter, pump and initial errors. A user's law has its own T_s.
+        Sampling, delay, lag, diffusion path, noise, jitter, pump, initial errors. A user-defined law has its own T_s.
     law : SampledLaw or control.StateSpace, optional
-        The same as a user's law as `controller`. The second, in discrete time, for an `UncertainPlant`: from what it
-        measures to its controls.
+        User-defined law, as with `controller`. A ``StateSpace`` in discrete time is for an `UncertainPlant`, from its
+        measurements to its controls.
     objective : str
         Of a design: ``tracking``, or ``peak`` for the smallest proved slip-rate error.
     gains : sequence or array of str, float or Fraction, optional
         k1 to k4 of an e-LQR whose integrals are summed once per sample, run by the scheme ``explicit``; base gains of a
-        sliding mode. A matrix of one row, as the K of ``control.dlqr``, is its row.
+        sliding mode. A matrix of one row, as the K of ``control.dlqr``, is accepted.
     scheme : str, optional
         Of a sliding mode: ``stick-slip`` unless given, or ``compensated`` on the plant without stick; no other has a
         guarantee. Of the e-LQR ``explicit``.
     disturbance_class : str
-        ``amplitude``: any measurable disturbance as large as the fault's; ``rate``: no faster either.
+        ``amplitude``: any measurable disturbance bounded by the fault's amplitude; ``rate``: its rate is bounded too.
     stress : str, float or Fraction, optional
-        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; the largest that the design withstands
-        unless given.
+        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; by default the largest that the design
+        withstands.
     spread : str, float or Fraction
         Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
     plant : str
-        ``stick-slip``: friction holds the fault at rest and it never slips backward; an e-LQR or a sliding mode is
-        designed whose predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure
-        that acts at once.
-        ``printed``: the plant without stick, its friction continued to negative slip rates. Unless given the first
-        where it applies and has a proof, else the second.
+        ``stick-slip``: friction holds the fault at rest and it never slips backward. The design is an e-LQR or a
+        sliding mode whose predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure
+        without delay.
+        ``printed``: the plant without stick, its friction continued to negative slip rates. By default the first where
+        it applies and has a proof, else the second.
     progress : callable, optional
-        Called with what a search for rate-and-state friction or the stick–slip plant does, and the fraction done [-].
+        Called with the current task of a search (rate-and-state friction, stick–slip plant) and the completed fraction.
     accept_poor_fit : bool
-        Whether to go on for a fault whose friction its record does not support (`Fault.poor_fit`); the fault, and what
-        is said of it, is then named so.
+        Whether to continue for a fault whose friction its record does not support (`Fault.poor_fit`); its name then
+        ends with ``poor-fit``.
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
@@ -159,7 +159,7 @@ def guarantee(
     Guarantee
         With ``verdict``, ``bounds`` and ``worst_case`` (by name, SI units), ``reason``, ``sentence()``, ``check()``,
         ``controller`` for `simulate`, `loop_transfer` and `export_controller`, ``save(path)`` of the certificate and
-        ``to_dict()``; ``lines()`` are what the command prints, and ``proof`` is what is proved in exact numbers.
+        ``to_dict()``; ``lines()`` are the printed lines, and ``proof`` is the proof in exact numbers.
 
     Raises
     ------
@@ -230,7 +230,7 @@ def guarantee(
     assert not isinstance(controller, Controller)
     if STICK_SLIP in (plant, scheme) and plant != PRINTED:
         fault.friction.require(stick_slip=True)
-        require_known(disturbance_class, CLASSES, "class")  # what is proved for the first holds for the second
+        require_known(disturbance_class, CLASSES, "class")  # a proof for the class amplitude holds for the class rate
         family = control_law(controller)
         usual = (family.name, tuple(gains), scheme) == ("elqr", (), None)
         if method_of(family).takes_base_gains:
@@ -243,8 +243,8 @@ def guarantee(
         require_known(objective, OBJECTIVES, "objective")
         mode = method_of(family).base_law(uncertain_plant(fault), family, _exact_texts(gains))
         return guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
-    least = None if stress is None else exact_value(stress, "Pa", "stress")
-    off = exact_value(spread, "", "spread")
+    stress_bound = None if stress is None else exact_value(stress, "Pa", "stress")
+    uncertainty = exact_value(spread, "", "spread")
     if slides:
         usual = (tuple(gains), scheme, objective, disturbance_class) == ((), None, OBJECTIVES[0], CLASSES[0])
         if not usual or setup.given().keys() - set(_OF_SLOW_SLIDING):
@@ -258,40 +258,40 @@ def guarantee(
             fault,
             controller=control_law(controller).name,
             step=setup.step,
-            stress=least,
-            spread=off,
+            stress=stress_bound,
+            spread=uncertainty,
             setup=ExactSetup.of(setup),
             **tell,
         )
-    if stress is not None or off:
+    if stress is not None or uncertainty:
         raise ParameterError(
             f"stress and spread need friction with a state. Received {fault.friction.name}. Omit both."
         )
     require_known(disturbance_class, CLASSES, "class")
     task, family = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
     wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
-    without = ""
+    not_at_rest = ""
     usual = scheme is None and (method_of(family).takes_base_gains or not wanted.gains)
     if plant is None and usual and may_stick(family, setup, disturbance_class):
         mode = method_of(family).base_law(task, family, wanted.gains)
         sticking = guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
         if sticking.proof.proved:
             return sticking
-        without = sticking.proof.reason
+        not_at_rest = sticking.proof.reason
     result = _sampled(fault, task, family, wanted)
-    return replace(result, not_at_rest=without) if without else result
+    return replace(result, not_at_rest=not_at_rest) if not_at_rest else result
 
 
 def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> TrackingGuarantee:
-    """Guarantee on a moving reference; no design if infeasible within the pressure σ′."""
+    """Guarantee for a moving reference; no design if no pressure up to σ′ makes it feasible."""
     setup, most = wanted.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step
     exact = ExactSetup.of(setup)
     delay = exact.delay
-    beyond = hopeless(task, most, delay, setup.diffusion)
-    if beyond and not wanted.gains:
+    infeasible = hopeless(task, most, delay, setup.diffusion)
+    if infeasible and not wanted.gains:
         near = nearest_setup(task, step, measured=setup.measured, setup=exact) if law.name == "elqr" else None
-        return TrackingGuarantee(fault=fault, proof=NoProof(reason=beyond), nearest=near)
+        return TrackingGuarantee(fault=fault, proof=NoProof(reason=infeasible), nearest=near)
     result = method_of(law).sampled(fault, task, law, step, wanted)
     slow = "" if wanted.gains else too_slow(task, most, max(step, setup.longest_step), delay)
     if not slow or result.proved:

@@ -50,7 +50,7 @@ def test_a_start_and_a_target_are_told(run):
 def test_a_run_says_from_when_errors_count_and_that_its_step_is_not_the_fault_s(run):
     plain = ("simulate", "lab-fault", "--duration", "0.1", "--controller", "elqr")
     own, other = run(*plain)[1], run(*plain, "--step", "0.5 ms")[1]
-    assert "errors count from 0.025 s on" in own
+    assert "errors evaluated from 0.025 s on" in own
     assert "not the fault's T_s" not in own
     assert "steps of 0.0005 s, not the fault's T_s = 0.001 s" in other
 
@@ -117,7 +117,7 @@ def test_a_divergence_is_an_event_and_no_metric(run):
 def test_people_are_told_the_energy_that_is_lost(run):
     code, out, _ = run(*SHORT[:-1])
     assert code == 0
-    assert "energy that the integration loses" in out
+    assert "energy error of the integration" in out
 
 
 @pytest.mark.slow

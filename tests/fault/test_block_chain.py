@@ -212,11 +212,11 @@ def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
         (
             replace(CHAIN, wells=(2500.0,), fault=CHAIN.fault.with_box("ten-percent")),
             {},
-            "fewer wells than blocks need blocks whose constants are known, box paper",
+            "fewer wells than blocks need exact constants, box paper",
         ),
-        (CHAIN, {"blocks": 3}, "are its own"),
-        (CHAIN, {"wells": "one"}, "are its own"),
-        (CHAIN, {"coupling": 12}, "are its own"),
+        (CHAIN, {"blocks": 3}, "has its own blocks, wells and coupling"),
+        (CHAIN, {"wells": "one"}, "has its own blocks, wells and coupling"),
+        (CHAIN, {"coupling": 12}, "has its own blocks, wells and coupling"),
     ],
 )
 def test_wells_that_a_guarantee_does_not_cover_are_refused(chain, given, said):

@@ -1,4 +1,4 @@
-"""How far the real fault may be from the nominal one."""
+"""Uncertainty box: largest deviations of the real fault from the nominal one."""
 
 from fractions import Fraction as F
 

@@ -77,7 +77,7 @@ def test_a_constant_normal_stress_stands_in_for_a_column(tmp_path):
         ([HEAD.replace("[ms]", "[lightyearz]"), *ROWS], "unit is unknown"),
         ([HEAD + ", normal_stress [Pa]", *(row + ", 5" for row in ROWS)], "twice"),
         ([HEAD.replace(", normal_stress [kPa]", ""), "0, 5, 3"], "needs the column normal_stress"),
-        ([HEAD.replace("shear_stress [MPa]", "shear_force [kN]"), *ROWS], "Divide the force by the area that slides"),
+        ([HEAD.replace("shear_stress [MPa]", "shear_force [kN]"), *ROWS], "Divide the force by the sliding area"),
         ([HEAD.replace("shear_stress [MPa]", "slip [mm]"), *ROWS], "exactly one column friction"),
         ([HEAD + ", friction", "0, 5, 3, 5000, 1", "1, 5, 3, 5000, 1"], "exactly one column friction"),
         ([HEAD, ROWS[1], ROWS[0]], "time must ascend"),
@@ -105,7 +105,7 @@ def test_a_line_of_headings_alone_is_no_record(tmp_path):
 @pytest.mark.parametrize(
     ("shear", "normal", "said"),
     [
-        ("-15", "25 MPa", "shear_stress must be positive. Received a median of -0.6 of friction. Change its sign."),
+        ("-15", "25 MPa", "shear_stress must be positive. Received a median friction of -0.6. Change its sign."),
         ("15", "25 Pa", "median from 0.01 to 3. Received 6e+05. Check the units"),
         ("0.2", "25 MPa", "Received 0.008. Check the units of shear_stress and normal_stress, of --normal-stress too."),
     ],
@@ -163,7 +163,7 @@ def test_a_column_of_weights_counts_samples_and_leaves_out_those_of_weight_0(tmp
     assert "1 samples of weight 0 left out" in record.remarks
     for rows, ends in (([*lines[:3], "2, 2, 0.6, -1"], "-1 to 2"), ([*lines[:2], "1, 1, 0.6, 0"], "0 to 2")):
         path.write_text("\n".join(rows))
-        with pytest.raises(RecordError, match=rf"weight must be positive, or 0 for what is left out. Received {ends}"):
+        with pytest.raises(RecordError, match=rf"weight must be positive, or 0 for excluded samples. Received {ends}"):
             read_record(path)
 
 
@@ -181,7 +181,7 @@ def test_what_falls_is_turned_and_what_slows_down_is_not(tmp_path):
     """A displacement above zero that falls, and rates that are positive and fall."""
     record = read_record(written(tmp_path, "time [s], displ [um], mu", "0, 100, 0.6", "1, 80, 0.61", "2, 50, 0.6"))
     assert record.load_point.tolist() == pytest.approx([0, 20e-6, 50e-6])
-    assert "load_point_displacement falls: its sign is changed" in record.remarks
+    assert "load_point_displacement decreases: its sign is changed" in record.remarks
     record = read_record(written(tmp_path, "time [s], velocity [um/s], mu", "0, 10, 0.6", "1, 3, 0.61", "2, 1, 0.6"))
     assert record.load_point.tolist() == pytest.approx([0, 10e-6, 13e-6])
     assert not any("sign is changed" in remark for remark in record.remarks)
@@ -200,7 +200,7 @@ def test_what_falls_is_turned_and_what_slows_down_is_not(tmp_path):
         ),
         ("time [s], displ [um], tau [MPa]", r"needs the column normal_stress or a constant normal stress\. Received"),
         ("time [s], displ [um], shear_force [kN]", r"needs the column normal_force\. Received .*Add it\."),
-        ("time [s], tau [MPa], normal_force [kN]", r"Divide the force by the area that slides\."),
+        ("time [s], tau [MPa], normal_force [kN]", r"Divide the force by the sliding area\."),
     ],
 )
 def test_a_missing_column_is_named_with_its_remedy(head, remedy, tmp_path):

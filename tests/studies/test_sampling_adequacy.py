@@ -48,8 +48,8 @@ def test_the_fault_that_is_sampled_too_slowly_is_told_which_step_would_do():
     assert nominal < found.pole < 1.3 * nominal
     assert found.pole_times_step == found.pole * 0.1 > 1
     assert not found.adequate
-    assert "is LONGER than" in sampling_sentence(found)
-    assert sampling_sentence(found).endswith("; guarantee says whether something is proved at this T_s all the same")
+    assert "is TOO LONG by" in sampling_sentence(found)
+    assert sampling_sentence(found).endswith("; the command guarantee may still find a proof at this T_s")
     finer = sampling_adequacy(replace(UNDERSAMPLED, sampling_time=found.adequate_step * 0.999))
     assert finer.adequate
     assert not sampling_adequacy(replace(UNDERSAMPLED, sampling_time=found.adequate_step * 1.001)).adequate

@@ -108,7 +108,7 @@ def test_the_stick_slip_plant_is_searched_when_its_worst_case_is_read(stuck, fou
     assert told[3].startswith(
         "on the stick-slip plant nothing is proved for a given law, and its worst pressure is not"
     )
-    assert "a course was found that exceeds the bounds" in "".join(told)
+    assert "a run was found that exceeds the bounds" in "".join(told)
     assert replace(found).to_dict()["worst_found_with_stick"]["slip_error"] == 1e-3
 
 
@@ -358,7 +358,7 @@ def test_what_does_not_apply_is_refused(more, said):
 def test_a_law_in_continuous_time_is_refused():
     with pytest.raises(UnsupportedError, match="sampled linear law"):
         qd.guarantee(REAL, law=qd.published("real-fault")["elqr"])
-    with pytest.raises(ParameterError, match="needs a law of samples"):
+    with pytest.raises(ParameterError, match="needs a sampled law"):
         qd.assess(REAL, qd.published("real-fault")["elqr"], qd.LoopSetup(delay="10 ms"))
 
 

@@ -102,7 +102,7 @@ def entries(document: dict[str, Any]) -> list[str]:
     )
     canonical = json.dumps(parts, sort_keys=True, separators=(",", ":"))
     return [
-        "entries, in SI units of FORMAT.md; ~ is rounded to nearest, claims outward:",
+        "entries in SI units, see FORMAT.md; ~ marks rounding to nearest, claims are rounded outward:",
         *(f"{key}: {'; '.join(written(parts[key]))}" for key in sorted(parts)),
         f"claims: {', '.join(bounds)}",
         f"SHA-256 of the entries without claims: {sha256(canonical.encode()).hexdigest()}",

@@ -37,19 +37,19 @@ class ExactSetup:
     delay, lag : Fraction
         [s].
     diffusion : Fraction
-        L²/D of the layer between well and fault [s]; 0 for none.
+        L²/D of the diffusion path between well and fault [s]; 0 for none.
     slip_noise, rate_noise : Fraction
         Bounds of the measurement errors of slip [m] and slip rate [m/s], any functions of time.
     initial_slip, initial_slip_rate : Fraction
         Bounds of the absolute initial slip [m] and slip rate [m/s]; those of the reference are 0.
     jitter, delay_jitter : Fraction
-        Largest timing error of a measurement and its pressure [s], and an additional one of the pressure alone [s].
+        Largest timing errors of a measurement and its pressure [s], and additionally of the pressure alone [s].
     averaging : Fraction
-        Averaging time [s]: each measurement but the first is a mean over times within half of this of its instant.
+        Averaging time [s]: each measurement except the first is a mean over times within half of it from its instant.
     pump : Pump, optional
         Limits at the valve, which the loop must never reach.
     ramp : Fraction
-        Largest time of a change of the pressure by the pump [s].
+        Longest duration of a pressure change of the pump [s].
     longest_step : Fraction
         Aperiodic sampling: longest interval between samples [s], T_s the shortest; 0 for periodic sampling.
     """
@@ -144,14 +144,14 @@ class SampledLoop(ExactSetup):
                 "slip_rate_error, or omit it."
             )
         if self.longest_step:
-            self._require_no_clock()
+            self._require_aperiodic()
 
-    def _require_no_clock(self) -> None:
+    def _require_aperiodic(self) -> None:
         """Reject an empty range of intervals, and a setup that needs periodic sampling."""
         if self.longest_step <= self.step:
             raise ParameterError(
                 "the longest step must exceed the step, which is the shortest sampling interval. Received "
-                f"{shortly(self.longest_step)} s and the step {shortly(self.step)} s. Exchange both, or omit the "
+                f"{shortly(self.longest_step)} s and the step {shortly(self.step)} s. Swap both, or omit the "
                 "longest step."
             )
         first = (v for row in self.law.first for v in row)
@@ -197,17 +197,17 @@ class SampledLoop(ExactSetup):
 
     @property
     def longest_ramp(self) -> Fraction:
-        """Time after a pressure is due and before the next sample is [s]."""
-        off, part = self.jitter + self.delay_jitter, self.delay % self.step
-        return min(self.step - part - off, self.step - 2 * off)
+        """Longest duration of a pressure change that ends before the next sample and the next change [s]."""
+        error, part = self.jitter + self.delay_jitter, self.delay % self.step
+        return min(self.step - part - error, self.step - 2 * error)
 
     def measured_errors(self, task: FaultPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
         """Bounds of the measured errors from those of the true errors at any time [m], [m/s].
 
         A measurement with a timing error may be compared with the reference at its nominal instant.
         """
-        off = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
-        slip, rate = (error + noise + self.off * moves for error, noise, moves in off)
+        parts = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
+        slip, rate = (error + noise + self.off * motion for error, noise, motion in parts)
         return slip, rate
 
     @property
@@ -217,7 +217,7 @@ class SampledLoop(ExactSetup):
         Raises
         ------
         UnsupportedError
-            For a law with an implicit root, which is a controller of its own with a scheme.
+            For a law with an implicit step: a sliding mode runs with its own controller and scheme.
         """
         if self.law.root is not None:
             raise UnsupportedError(
@@ -228,7 +228,7 @@ class SampledLoop(ExactSetup):
         return laws.SampledController(law=self.law, step=self.step, **self.path, longest=self.longest_step)
 
     def loop(self, task: FaultPlant, model: NominalModel | None = None) -> PeriodicLoop:
-        """Nominal error loop on a task, of its model or another one."""
+        """Nominal error loop of a task, with the model of the task or another one."""
         loop = held_loop(
             self.law,
             model or task.model,
@@ -246,7 +246,7 @@ class SampledLoop(ExactSetup):
 
 
 # ----------------------------------------------------------------------
-# Inputs of a nominal loop and their bounds: acceleration, drift, root, noise, start, truncation error of a layer.
+# Inputs of a nominal loop and their bounds: acceleration, drift, implicit step, noise, start, truncation error.
 #
 # The bounds are derived in `quakedesign.guarantees.exact.small_gain`.
 
@@ -258,7 +258,7 @@ _ZERO = Fraction(0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """An input of the nominal loop and what bounds it: F + Σ c_y·|y|.
+    """An input of the nominal loop, and its bound F + Σ c_y·|y| over outputs y.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ class Channel:
     shares: Mapping[str, Fraction]
 
     def rounded(self) -> "Channel":
-        """The same in floats, for estimates: products of floats are twenty times as fast."""
+        """The channel in floats, for estimates: float products are twenty times as fast."""
         shares: Mapping[str, Any] = {output: float(share) for output, share in self.shares.items()}
         own: Any = float(self.own)
         return Channel(name=self.name, own=own, shares=shares)
@@ -306,7 +306,7 @@ def channels_of(
 ) -> tuple[Channel, ...]:
     """Inputs of the nominal loop of a task, with their bounds.
 
-    `noise` has the bounds of those inputs of the loop that are noise, `jitter` [s] is that of the measurements.
+    `noise` bounds the noise inputs of the loop; `jitter` [s] is the timing error of the measurements.
     """
     force, drift, coupling = _task_inputs(task)
     half, implicit, aged = task.half_ranges, [], []
@@ -337,12 +337,12 @@ def _measurement_errors(task: FaultPlant, noise: Mapping[str, Fraction], jitter:
     for name, rate in zip(NOISES, task.reference_rates, strict=True):
         if name in noise:
             force, shares = moves[name]
-            off = {output: jitter * share for output, share in shares.items()} if jitter else {}
-            yield Channel(name=name, own=noise[name] + jitter * (rate + force), shares=off)
+            motion = {output: jitter * share for output, share in shares.items()} if jitter else {}
+            yield Channel(name=name, own=noise[name] + jitter * (rate + force), shares=motion)
 
 
 def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of reference, initial state and late pressures, as far as the loop has them."""
+    """Inputs of reference, initial state and late pressures, those in `names`."""
     for name in ("reference", "reference_rate"):
         if name in names:
             yield Channel(name=name, own=task.reference_rates[0], shares={})
@@ -370,7 +370,7 @@ def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel
 
 
 def _task_inputs(task: FaultPlant) -> tuple[Fraction, Fraction, Fraction]:
-    """F of a [m/s²] and of d [m/s³], and κ [1/s²]."""
+    """Bounds F of the acceleration [m/s²] and the drift [m/s³], and share of the slip-rate error [1/s²]."""
     if task.change is None:
         return task.reference_force + task.amplitude, task.drift, _ZERO
     law = task.friction

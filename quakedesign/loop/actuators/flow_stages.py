@@ -101,7 +101,7 @@ class Diffusion(FlowStage):
         Option(
             name="diffusion",
             unit="s",
-            help="L^2/D of the diffusion path between well and fault, such as '100 s'; the smaller, the more substeps.",
+            help="L^2/D of the diffusion path between well and fault, such as '100 s'; if small, use more substeps.",
         ),
         Option(
             name="storage",

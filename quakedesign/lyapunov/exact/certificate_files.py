@@ -324,7 +324,7 @@ def entry_lines(document: Json) -> list[str]:
         bound = LowerBound if name.startswith("least") else UpperBound
         claims.append(f"{name} {bound(value):.{_DIGITS}g}")
     exact = json.dumps(stated, sort_keys=True, separators=(",", ":")).encode()
-    lines = ["entries, in SI units of FORMAT.md; ~ is rounded to nearest, claims outward:"]
+    lines = ["entries in SI units, see FORMAT.md; ~ marks rounding to nearest, claims are rounded outward:"]
     lines += [f"{key}: {_part(part)}" for key, part in sorted(stated.items())]
     lines.append("claims: " + ", ".join(claims))
     return [*lines, f"SHA-256 of the entries without claims: {sha256(exact).hexdigest()}"]

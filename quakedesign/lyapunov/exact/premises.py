@@ -87,7 +87,7 @@ class Premise:
         return f"{self.required:.4g}{unit}", "no less"
 
     def to_dict(self) -> Json:
-        """Keys of DESIGN.md and the unit; None for what is infinite."""
+        """Keys of ``--json`` and the unit; None for what is infinite."""
         return {
             "name": self.name,
             "required": _finite(self.required),

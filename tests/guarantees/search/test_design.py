@@ -128,7 +128,7 @@ def test_where_stick_leaves_the_bounds_the_answer_says_so():
     claim = designed("real peak")
     beyond = WorstCase(slip_error=1.01 * float(claim.claims.slip_error), slip_rate_error=0.0)
     found = TrackingGuarantee(fault=load_fault("real-fault"), proof=claim, stick_search=beyond)
-    assert found.lines()[-1].startswith("on the stick-slip plant a course was found that exceeds the bounds")
+    assert found.lines()[-1].startswith("on the stick-slip plant a run was found that exceeds the bounds")
     within = replace(found, stick_search=replace(beyond, slip_error=0.99 * float(claim.claims.slip_error)))
     assert not within.leaves_with_stick
 
