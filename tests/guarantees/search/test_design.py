@@ -262,7 +262,7 @@ BY_ASCENT = {
 def test_the_worst_found_with_stick_is_that_of_an_attacker_who_lets_the_fault_rest(fault_and_law):
     """Ahead of its reference the fault rests for 60 to 90 periods, and the law follows: in 64 periods 7 % less."""
     name, controller = fault_and_law
-    answer = qd.guarantee(load_fault(name), controller=controller)
+    answer = qd.guarantee(load_fault(name), controller=controller, plant="printed")
     claim = answer.compensation.proof if answer.compensation else answer.proof
     found, (slip, rate) = worst_tracking(claim, sticks=True), BY_ASCENT[fault_and_law]
     assert 0.99 * slip <= found.slip_error <= claim.claims.slip_error

@@ -168,7 +168,7 @@ def test_behind_a_lag_with_noise_what_was_proved_at_0_22_s_is_found():
 
 @pytest.mark.slow
 def test_the_rate_of_a_pump_that_would_do_is_named():
-    setup = {"measured": "slip", "lag": F("0.3"), "slip_noise": F(5, 10**6), "pump": Pump(rate=F(2 * 10**6))}
+    setup = {"measured": "slip", "lag": F("0.3"), "slip_noise": F(5, 10**6), "rate_limit": F(2 * 10**6)}
     found = qd.guarantee(load_fault(LAGGING), step=F("0.2"), **setup)
     name, near = found.nearest
     assert (found.proved, name) == (False, "rate_limit")
