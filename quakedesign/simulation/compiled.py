@@ -131,7 +131,7 @@ def rounded(x: ca.SX) -> ca.SX:
 
 
 def _polynomial(x: ca.SX, coefficients: list[float]) -> ca.SX:
-    """Value of a polynomial by recursive halves joined by a power of x: short chains of operations (Estrin 1960)."""
+    """Value of a polynomial, by pairs of terms joined by powers of x: short chains of operations (Estrin 1960)."""
     powers, parts = x, [ca.SX(c) for c in coefficients]
     while len(parts) > 1:
         pairs = [parts[i] + parts[i + 1] * powers for i in range(0, len(parts) - 1, 2)]
