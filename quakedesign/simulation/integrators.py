@@ -282,7 +282,7 @@ class Cvodes(AdaptiveIntegrator):
 
 
 class Idas(AdaptiveIntegrator):
-    """Backward differentiation formulas of orders 1 to 5 for 0 = f − y', in another form than `Cvodes`."""
+    """Backward differentiation formulas of orders 1 to 5 for 0 = f − y', of another family than in `Cvodes`."""
 
     name: ClassVar[str] = "idas"
     source: ClassVar[str] = "Hindmarsh et al. (2005), ACM TOMS 31, 363; Brenan, Campbell and Petzold (1996), SIAM"

@@ -69,7 +69,7 @@ class SampleResult:
     Attributes
     ----------
     figures : mapping of str to float
-        Metrics of the run, without number of steps and run time.
+        Metrics of the run, without `settled_from`, `steps` and `seconds`.
     events : mapping of str to float
         Time of first occurrence [s].
     """
