@@ -1,4 +1,4 @@
-"""Certificates for a proof assistant: files that Rocq's compiler, ``coqc``, verifies by itself."""
+"""Certificates for the proof assistant Rocq: files that its compiler, ``coqc``, verifies."""
 
 from quakedesign.arguments import attach
 

@@ -1,6 +1,6 @@
 """Certificates as Gallina terms for the checker in proofs/rocq.
 
-Chapters: identity of a witness with integer coefficients; the reason why a multiplier is non-negative
+Chapters: identity of a witness with integer coefficients; proof that a multiplier is non-negative
 (positivity.v); integers, rationals and polynomials as terms of Gallina, the language of Rocq.
 """
 
@@ -15,7 +15,7 @@ from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Square, as_polynomial, integer_gram, is_definite
 
 # ----------------------------------------------------------------------
-# The identity of a witness in integers, as the checker of ``proofs/rocq`` reads it.
+# The identity of a witness in integers, in the form of the checker in ``proofs/rocq``.
 
 Triangle = list[list[int]]
 """Upper triangle of a symmetric matrix, row by row."""
@@ -23,7 +23,7 @@ Triangle = list[list[int]]
 
 @dataclass(frozen=True, kw_only=True)
 class IntegerSquare:
-    """(Π g_i)·bᵀQb with integers."""
+    """(Π g_i)·bᵀQb with integer coefficients."""
 
     product: tuple[int, ...]
     basis: tuple[Polynomial, ...]
@@ -63,7 +63,7 @@ def in_integers(
     Parameters
     ----------
     constraints : int, optional
-        What the constraints are multiplied by; then the polynomial is taken as it is, with integers.
+        Factor of the constraints; if given, the polynomial must have integers and is not scaled.
     """
     common = clearing(statement) if constraints is None else constraints
     grams = [_over_wholes(square, common) for square in squares]
@@ -87,7 +87,7 @@ def scaled(polynomial: Polynomial, factor: int | Fraction) -> Polynomial:
 
 
 def _over_wholes(square: Square, common: int) -> list[list[Fraction]]:
-    """Gram matrix for constraints times a number and a basis times its denominators."""
+    """Gram matrix for constraints scaled by a number and a basis scaled by its denominators."""
     weight = common ** len(square.product)
     basis = [denominator(as_polynomial(b)) for b in square.basis]
     entries = iter(square.gram)
@@ -105,31 +105,31 @@ def _square(square: Square, rows: Iterable[Iterable[Fraction]], common: int) -> 
 
 
 # ----------------------------------------------------------------------
-# Why the multiplier of a polynomial's proof is enough, in the words of ``proofs/rocq/positivity.v``.
+# Proof that the multiplier of a polynomial's proof suffices, in terms of ``proofs/rocq/positivity.v``.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reason:
-    """Why a multiplier μ, times its common denominator, is nowhere negative on the set."""
+    """Proof that a multiplier μ, times its common denominator, is nowhere negative on the set."""
 
-    # numerator · μ − rest as a sum of squares; without it the terms of μ show its sign
+    # numerator · μ − rest as a sum of squares; None if the sign follows from the terms of μ
     sums: IntegerWitness | None = None
     numerator: int = 1
     rest: int = 0
 
 
 def multiplier_reason(statement: Statement, squares: Sequence[Square]) -> Reason:
-    """Reason for the sign of a statement's multiplier.
+    """Proof of the sign of a statement's multiplier.
 
     Parameters
     ----------
     squares : sequence of Square
-        The multiplier as a sum of squares; empty where its terms show its sign.
+        The multiplier as a sum of squares; empty if the sign follows from its terms.
 
     Raises
     ------
     CertificateError
-        When its Gram matrix is not positive definite.
+        If its Gram matrix is not positive definite.
     """
     if not squares:
         return Reason()
@@ -147,7 +147,7 @@ def multiplier_reason(statement: Statement, squares: Sequence[Square]) -> Reason
 
 
 def _less_one(square: Square, index: int) -> tuple[Fraction, Square]:
-    """A number δ > 0 and the square less δ, of a basis that holds 1."""
+    """A number δ > 0 and the square minus δ, for a basis that contains 1."""
     size = len(square.basis)
     place = index * size - index * (index - 1) // 2
     margin = square.gram[place]
@@ -176,19 +176,19 @@ def _sums(statement: Statement, squares: Sequence[Square], margin: Fraction) -> 
 
 
 def listed(entries: Iterable[str], joint: str = "; ") -> str:
-    """Terms as a list."""
+    """List of Gallina terms."""
     return f"[{joint.join(entries)}]"
 
 
 def integer(number: int) -> str:
-    """Integer as a literal; those of more than nine digits with sixteen digits, which coqc reads in half the time."""
+    """Integer as a literal; hexadecimal from ten digits on, which coqc reads in half the time."""
     short = abs(number) < 10**9
     text = str(abs(number)) if short else hex(abs(number))
     return f"-{text}" if number < 0 else text
 
 
 def rational(number: Fraction) -> str:
-    """Rational as a literal of Q, of which no other digit gives the same number."""
+    """Rational as a literal of Q in lowest terms."""
     return f"({number.numerator} # {number.denominator})" if number else "0%Q"
 
 
@@ -198,12 +198,12 @@ def exponents(powers: Exponents) -> str:
 
 
 def polynomial(given: Polynomial) -> str:
-    """Polynomial with rational coefficients: coefficient and exponents of every term."""
+    """Polynomial with rational coefficients as a list of terms with coefficient and exponents."""
     return listed(f"term {rational(c)} {exponents(e)}" for e, c in sorted(given.items(), reverse=True))
 
 
 def tree(given: Polynomial) -> str:
-    """Polynomial with integer coefficients."""
+    """Polynomial with integer coefficients as a tree of powers, monomials and sums."""
     if list(given.values()) == [1]:
         return f"power {exponents(next(iter(given)))}"
     return "sum " + listed(
@@ -212,7 +212,7 @@ def tree(given: Polynomial) -> str:
 
 
 def witness(given: IntegerWitness) -> str:
-    """Witness as a record of squares.v."""
+    """Witness as a record of ``squares.v``."""
     squares = listed(map(_square_term, given.squares), ";\n    ")
     parts = given.clearing, given.left, given.right, f"({tree(given.multiplier)})"
     return f"Witness {' '.join(map(str, parts))}\n   {squares}\n   {listed(map(tree, given.cofactors))}"
@@ -225,7 +225,7 @@ def _square_term(given: IntegerSquare) -> str:
 
 
 def question(statement: Statement) -> str:
-    """The polynomial, the inequalities and the equalities of a statement."""
+    """Polynomial, inequalities and equalities of a statement as a Gallina record."""
     inequalities, equalities = (
         listed(map(polynomial, given), ";\n   ") for given in (statement.inequalities, statement.equalities)
     )
@@ -233,7 +233,7 @@ def question(statement: Statement) -> str:
 
 
 def reason(given: Reason) -> str:
-    """Why the multiplier is nowhere negative."""
+    """Gallina term for the proof that the multiplier is nowhere negative."""
     if given.sums is None:
         return "Terms"
     if not given.rest:
@@ -242,5 +242,5 @@ def reason(given: Reason) -> str:
 
 
 def accepted(check: str, name: str = "accepted") -> str:
-    """Lemma that a check comes out as true, by running it."""
+    """Lemma that a check returns true, proved by computation."""
     return f"Lemma {name} : {check} = true.\nProof. vm_cast_no_check (eq_refl true). Qed."

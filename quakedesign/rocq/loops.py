@@ -1,4 +1,4 @@
-"""Closed loops in Gallina: field, V and claims, from which Rocq derives the obligations."""
+"""Closed loops in Gallina: field, V and claims, from which Rocq derives the proof obligations."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -15,18 +15,18 @@ _POINTS = "forall x, nowhere_zero x ->"
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """States, lifts with a variable, V where a decay is claimed, lifts of which only the sign occurs; in this order."""
+    """Columns, in order: states, lifts with a variable, V if a decay is claimed, lifts with only their sign used."""
 
     weights: Mapping[str, int]
     varying: tuple[str, ...]  # Parameters with a range of more than one point
-    values: Mapping[str, Fraction]  # All others
+    values: Mapping[str, Fraction]  # All other parameters
 
     def index(self, name: str) -> int:
         """Column of a state or lift."""
         return list(self.weights).index(name)
 
     def expression(self, terms: Iterable[Term]) -> str:
-        """Sum of terms, without those that a zero parameter removes."""
+        """Sum of terms, without those that vanish by a zero parameter."""
         return gallina.listed(filter(None, map(self._term, terms)), ";\n   ")
 
     def _term(self, term: Term) -> str:
@@ -53,7 +53,7 @@ def _power(exponent: Fraction, kind: str) -> str:
 def loop_theorems(evidence: Evidence) -> Iterator[str]:
     """Definitions of a loop on cells, and theorems about V and its derivative along the field.
 
-    They follow `questions` and `certificate`, which says that these hold.
+    They are placed after `questions` and `certificate`, the theorem that these hold.
     """
     loop, obligations = evidence.loop, Obligations(evidence.loop, evidence.lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")

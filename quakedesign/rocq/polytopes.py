@@ -26,10 +26,10 @@ from quakedesign.guarantees.exact.stick_slip_set import (
 )
 from quakedesign.rocq import gallina
 
-_BITS, _GRAIN = 80, 40  # of numbers and of multipliers in polytope.v
-_CLOSE = 2.0**-30  # what multipliers must leave below 1; else a facet is bounded by itself
+_BITS, _GRAIN = 80, 40  # bits of numbers and of multipliers in polytope.v
+_CLOSE = 2.0**-30  # least margin of a bound by multipliers below 1; with less a facet is bounded by itself
 _DIGITS = 12  # of ranges, rounded outward
-_OFF = 77  # bits to which polynomials give the impulse responses
+_OFF = 77  # bits of accuracy of the polynomials for the impulse responses
 _MOST_TERMS = 400
 _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (3, 0), 6: (3, 1)}
 """Least or largest r' of four polytopes, by the order of `resting_rows`."""
@@ -79,7 +79,7 @@ def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
 
 
 def _outward(low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
-    """A range around this one whose ends have few digits; 0 stays."""
+    """A range rounded outward to ends with few digits; 0 stays."""
     size = max(abs(low), abs(high))
     unit = Fraction(10) ** (ceil(log10(size)) - _DIGITS) if size else Fraction(1)
     return (floor(low / unit) - 1) * unit if low else low, (ceil(high / unit) + 1) * unit if high else high
@@ -111,18 +111,18 @@ def _responses(period: Period) -> str:
 
 
 def _near(value: arb) -> str:
-    """Middle and radius of a ball, in units."""
+    """Middle and radius of a ball, in units of 2^−`_BITS`."""
     middle, radius = (fraction_of(part.fmpq()) * (1 << _BITS) for part in (value.mid(), value.rad()))
     return f"Near ({gallina.integer(floor(middle))}) {gallina.integer(ceil(radius) + (2 << _BITS - _OFF) + 2)}"
 
 
 def _terms(period: Period) -> str:
-    """Terms of Taylor's polynomials of the impulse responses, and n with e^KT <= 3^n for their error's growth K.
+    """Number of terms of the impulse responses' Taylor polynomials, and n with e^KT <= 3^n for their error's growth K.
 
     Raises
     ------
     UnsupportedError
-        For a period that is too long against the plant.
+        For a period that is too long compared with the time scales of the plant.
     """
     step, (s, w) = period.held.step, (sum(pair, Fraction(0)) / 2 for pair in (period.plant.slope, period.plant.damping))
     n, terms = ceil((3 + abs(s) + 2 * abs(w)) * step), 1
@@ -139,33 +139,33 @@ def _terms(period: Period) -> str:
 
 @dataclass(frozen=True)
 class _Hint:
-    """How a facet is bounded: by itself or not, and multipliers of constraints."""
+    """Bound of a facet: whether by the facet itself, and multipliers of constraints."""
 
     own: bool
     shares: tuple[tuple[int, float], ...]
-    turn: int | None = None  # the constraint that the target rate is not negative
+    turn: int | None = None  # index of the constraint that the target rate is not negative
 
     @classmethod
     def of(cls, verifier: Verifier, basis: Iterable[int], shares: Iterable[float]) -> "_Hint":
-        """By a vertex."""
+        """Bound by a vertex."""
         return cls(False, tuple(zip(map(int, basis), shares, strict=True)))
 
     @classmethod
     def itself(cls, verifier: Verifier, left: Sequence[float]) -> "_Hint":
-        """By the facet itself, and what `Verifier.largest` uses besides."""
+        """Bound by the facet itself, and further constraints used in `Verifier.largest`."""
         more = [(len(verifier.rows) - 1, left[3])] if len(left) > 3 else []
         more += [(verifier.last, left[0])] if verifier.last is not None else []
         return cls(True, tuple((i, v * (1 + 2.0**-_GRAIN)) for i, v in more), verifier.last)
 
     def text(self, *, without: int | None = None) -> str:
-        """As a term, without a constraint."""
+        """Gallina term, without the constraint `without`."""
         whole = ((i, ceil(share * 2.0**_GRAIN)) for i, share in self.shares if share > 0 and i != without)
         listed = gallina.listed((f"Share {i} {gallina.integer(p)}" for i, p in whole), ";")
         return f"Hint {str(self.own).lower()} {listed}"
 
 
 def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Rows, dict[int, _Hint]]]:
-    """For every facet of a set of rows what bounds it there."""
+    """Bounds of the facets, for every set of rows."""
     for rows in given:
         verifier = deciding[rows.place]
         tops = verifier.largest(rows.factors, rows.constants)
@@ -185,13 +185,13 @@ def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Ro
 
 
 def _pair(least: _Hint, largest: _Hint, *, positive: bool = False) -> str:
-    """At both ends of r'; without a positive target rate where it is as large as the sum of all else."""
+    """Bounds at the least and the largest r'; with `positive` the second may omit the target rate, never negative."""
     bare = positive and largest.own and any(i == largest.turn and share > 0 for i, share in largest.shares)
     return f"Pair {str(bare).lower()} ({least.text()}) ({largest.text(without=largest.turn if bare else None)})"
 
 
 def _by_slide(given: Iterator[tuple[Rows, dict[int, _Hint]]], count: int) -> list[str]:
-    """Per facet: whether the innovation is cut off, chord, beta; end of r'."""
+    """Bounds per facet, ordered by cut-off of the innovation, chord, beta and end of r'."""
     by_facet: dict[int, list[str]] = {i: [] for i in range(count)}
     for many in zip(*[given] * len(COMBINATIONS), strict=True):
         for facet in many[0][1]:
@@ -200,7 +200,7 @@ def _by_slide(given: Iterator[tuple[Rows, dict[int, _Hint]]], count: int) -> lis
 
 
 def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) -> list[str]:
-    """Per facet: chord, share; polytope; least and largest r'."""
+    """Bounds per facet, ordered by chord, share, polytope, and least and largest r'."""
     raised, table = [i for i, fall in enumerate(falls) if not fall], {}
     groups = [2 if raised else 0, 1 if any(falls) else 0]
     for part, chord in product(range(len(_PAIRS)), range(2)):

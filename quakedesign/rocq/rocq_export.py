@@ -31,7 +31,7 @@ from quakedesign.sos.exact.polynomial_statement import Statement
 from quakedesign.sos.exact.proofs import Point, SumOfSquares
 
 _LIBRARY = ("squares.v", "positivity.v", "loops.v")
-_POLYTOPES = "polytope.v"  # of a fault that sticks or slides
+_POLYTOPES = "polytope.v"  # of the stick–slip plant
 _KINDS = (
     "a certificate for coqc must be sos, negative, stick_slip or a proof for a closed loop or a region of attraction."
 )
@@ -39,14 +39,14 @@ _DATA = "(* " + "=" * 16 + " the certificate *)\n\nLocal Open Scope nat_scope.\n
 
 
 def rocq_text(raw: object) -> str:
-    """Text of the file for ``coqc``, from a parsed certificate file; the same for the same certificate.
+    """Text of the file for ``coqc``, from a parsed certificate file alone.
 
     Raises
     ------
     CertificateError
-        When the certificate breaks a rule of FORMAT.md.
+        If the certificate violates a rule of FORMAT.md.
     UnsupportedError
-        For a kind that has no theorem in ``proofs/rocq``.
+        For a kind without a theorem in ``proofs/rocq``.
     """
     parts = (_POLYTOPES,) if kind_of(raw) == STICK_SLIP else _LIBRARY
     return "\n".join([*library(parts), _DATA, statement_text(raw)])
@@ -59,26 +59,26 @@ def statement_text(raw: object) -> str:
 
 
 def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> dict[Path, Path | str]:
-    """Write a file for ``coqc`` for every certificate file, whole or not at all.
+    """Write a file for ``coqc`` for every certificate file, each atomically.
 
     Parameters
     ----------
     paths : iterable of Path
         Certificate files that were checked.
     folder : Path
-        Where to write NAME.v, every character of the certificate's name that Rocq does not take an underscore.
+        Folder for NAME.v, with an underscore for every character of the certificate's name that Rocq rejects.
     force : bool
         Replace files that exist.
 
     Returns
     -------
     dict of Path to Path or str
-        The file, or why there is none.
+        The file, or the reason why there is none.
 
     Raises
     ------
     OutputError
-        When a file exists or cannot be written, or two certificates have one name.
+        If a file exists or cannot be written, or two certificates have the same name.
     """
     targets: dict[Path, Path] = {}
     for path in paths:
@@ -104,7 +104,7 @@ def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> d
 
 
 def module_name(stem: str) -> str:
-    """Name that Rocq takes for a file."""
+    """File name that Rocq accepts."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", stem)
     return name if name[:1].isalpha() else f"certificate_{name}"
 
@@ -115,7 +115,7 @@ def library(names: Sequence[str] = _LIBRARY) -> list[str]:
     Raises
     ------
     UnsupportedError
-        When they are missing.
+        If the library is missing.
     """
     package = Path(__file__).resolve().parents[1]
     places = [base / "proofs" / "rocq" for base in (package, package.parent)]
@@ -178,7 +178,7 @@ def _attraction(raw: object) -> Iterator[str]:
 
 
 def _everywhere(numbers: Sequence[int]) -> Iterator[str]:
-    """That all questions hold, each on its set."""
+    """Theorem that all questions hold, each on its set."""
     yield f"Definition questions : list question := {gallina.listed(f'asked_{n}' for n in numbers)}."
     holds = "Forall (fun q => forall x, within x q -> (0 <= at_point x (target q))%R)"
     yield f"Theorem certificate : {holds} questions.\nProof. exact ({_all(numbers)}). Qed."
@@ -190,7 +190,7 @@ def _all(numbers: Sequence[int]) -> str:
 
 
 def _part(statement: Statement, proof: SumOfSquares | Witness, check: str, tail: str = "") -> str:
-    """One question with its proof, with @ for its number."""
+    """One question with its proof, with @ as placeholder for its number."""
     data = in_integers(statement, proof.squares, proof.cofactors)
     return "\n".join(
         [
@@ -219,7 +219,7 @@ def _loop(raw: object) -> Iterator[str]:
 
 
 def _obligations(evidence: Evidence) -> Iterator[tuple[str, str]]:
-    """Name of every obligation, and its question and proof with @ for its number."""
+    """Name of every obligation, and its question and proof with @ as placeholder for its number."""
     domain = evidence.loop.domain
     for one in different(claimed(evidence.loop, evidence.lyapunov, evidence.claims)):
         given = evidence.witnesses[one.name]

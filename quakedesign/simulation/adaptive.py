@@ -22,7 +22,7 @@ _FEWER = 16
 
 
 def require_smooth(recorder: Recorder, method: str) -> None:
-    """Refuse a loop whose field jumps or has an infinite slope, where a tolerance means nothing."""
+    """Reject a loop whose field jumps or has an infinite slope, for which a tolerance has no meaning."""
     loop, remedy = recorder.loop, "Use a fixed step: method dormand-prince or rk4."
     text = f"method {method} follows smooth loops only. Received"
     if loop.sticks:
@@ -37,7 +37,7 @@ def require_smooth(recorder: Recorder, method: str) -> None:
 
 
 def _lipschitz(loop: ClosedLoop) -> bool:
-    """Whether pressure and integral rates of the law have bounded slopes: no sign, no power below one."""
+    """Whether pressure and integral rates of the law have bounded slopes: no sign function, no power below one."""
     assert loop.controller is not None
     pressure, rates = law_expressions(loop.controller)
     parts = [node for expression in (pressure, *rates) for node in sp.preorder_traversal(expression)]
@@ -47,7 +47,7 @@ def _lipschitz(loop: ClosedLoop) -> bool:
 
 
 def scales(loop: ClosedLoop) -> list[float]:
-    """Size of x1 [m], x2 [m/s] and ξ: target slip and natural period, and 1 s of those for integrals in other units."""
+    """Scales of x1 [m], x2 [m/s] and ξ, from target slip and natural frequency; 1 for integrals in other units."""
     fault = loop.fault
     slip, pace = fault.reference.target_slip, fault.natural_frequency
     known = {"m s": slip / pace, "m s^2": slip / pace**2}
@@ -63,18 +63,18 @@ def smooth_march(
     kept: list[int],
     progress: Callable[[float], None] | None = None,
 ) -> "np.ndarray":
-    """Vectors at the kept steps, one a column; ends early after the first instant that counts as diverged.
+    """Vectors at the steps `kept`, one a column, up to the first diverged instant.
 
     Raises
     ------
     SimulationError
-        When the solver stops although nothing has diverged.
+        If the solver stops without divergence.
     """
     pieces = cache(partial(_piece, recorder, method, rtol))
     wanted, vector, found, longest = set(kept), np.array(start), [np.array(start)], CHUNK
     while (now := recorder.parts(vector)).counter < kept[-1] and now.watched["diverged"] < 0:
         count, vectors = min(longest, kept[-1] - round(now.counter)), None
-        while vectors is None:  # where the solver stops, as many steps as it can take at once
+        while vectors is None:  # fewer steps at once if the solver stops
             try:
                 vectors = pieces(count)(vector)
             except StoppedError as error:
@@ -98,7 +98,7 @@ def smooth_march(
 def _piece(
     recorder: Recorder, method: type[AdaptiveIntegrator], rtol: float, count: int
 ) -> Callable[["np.ndarray"], "np.ndarray"]:
-    """Function that maps a vector onto those after each of the next steps, one a column; raises `StoppedError`."""
+    """Function from a vector to those after each of the next `count` steps, one a column; raises `StoppedError`."""
     shares, works = np.arange(1, count + 1) / count, len(WORKS)
     flow = method.flow(field(recorder), scales(recorder.loop), shares, rtol=rtol, quadratures=works)
     symbols = [ca.SX.sym(n, size) for n, size in (("z", recorder.size), ("y", recorder.state_size), ("w", works))]
@@ -114,7 +114,7 @@ def _piece(
 
 
 def field(recorder: Recorder) -> ca.Function:
-    """CasADi Function (t [s], state, factors) → its time derivative, works per unit mass and time."""
+    """CasADi Function (t [s], state, factors) → time derivative of the state, works per unit mass and time."""
     time, state = ca.SX.sym("t"), ca.SX.sym("state", recorder.state_size)
     factors = ca.SX.sym("factors", len(recorder.loop.factors))
     loop = recorder.loop.with_factors(tuple(ca.vertsplit(factors)) if recorder.loop.factors else ())

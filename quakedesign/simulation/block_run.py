@@ -26,22 +26,22 @@ _MOST_PERIODS = 5 * 10**7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockRun:
-    """A run of several blocks. Arrays of instants × blocks, or wells for the pressure.
+    """A run of several blocks. Arrays are instants × blocks, for the pressure instants × wells.
 
     Attributes
     ----------
     times : ndarray
         Ends of intervals [s].
     slip, slip_rate, pressure : ndarray
-        Slip [m] and pressure of the wells [Pa] at these, largest slip rate in the intervals [m/s].
+        Slip [m] and pressure of the wells [Pa] at these times, largest slip rate in the intervals [m/s].
     reference : ndarray
         r [m].
     slip_error, slip_rate_error : ndarray
         Largest |slip − r| [m] and |slip rate − r'| [m/s] of every block over the run.
     rest : ndarray
-        Share of the time that every block rests [-].
+        Fraction of time at rest of every block [-].
     reversed, opened : bool
-        Whether a block would have slipped backward, or lost its effective normal stress.
+        Whether a block would have slipped backward, or an effective normal stress became negative.
     """
 
     times: np.ndarray
@@ -56,7 +56,7 @@ class BlockRun:
     opened: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Figures of the run, SI."""
+        """Summary figures of the run, in SI units."""
         return {
             "max_slip_error": self.slip_error.tolist(),
             "max_slip_rate_error": self.slip_rate_error.tolist(),
@@ -79,18 +79,18 @@ def reference(chain: BlockChain, time: ca.SX | float) -> tuple[ca.SX, ca.SX]:
 
 
 def decided(chain: BlockChain, law: Any, count: ca.SX, x: ca.SX, v: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Pressures of the wells [Pa] that a law decides, and its states after that, in CasADi.
+    """Pressures of the wells [Pa] commanded by a law, and its next states, in CasADi.
 
-    In slow sliding the pressures are those beside the plan.
+    In slow sliding these are feedback pressures, without the planned pressure.
 
     Parameters
     ----------
     chain : BlockChain
     law : MatrixLaw
-        Of errors of all blocks, or of the averages of slip and slip rate that each well measures; in slow sliding of
-        the slip alone, to pressures in MPa.
+        From errors of all blocks, or of the averages of slip and slip rate that each well measures; in slow sliding
+        from the slip alone, to pressures in MPa.
     count : SX
-        Samples before this one [-].
+        Number of earlier samples [-].
     x, v : SX
         Slip [m] and slip rate [m/s] of every block.
     z : SX
@@ -110,14 +110,14 @@ def decided(chain: BlockChain, law: Any, count: ca.SX, x: ca.SX, v: ca.SX, z: ca
 
 @checked_dataclass(frozen=True, kw_only=True)
 class _Period:
-    """One period of a chain under a law as a CasADi function of what is carried."""
+    """One period of a chain under a law as a CasADi function of the state vector."""
 
     chain: BlockChain
     law: Any
     substeps: int
 
     def function(self) -> ca.Function:
-        """What is carried from period to period: see `sizes`."""
+        """CasADi Function that maps the state vector of `sizes` over one period."""
         slip, speed = sp.Symbol("slip", real=True), sp.Symbol("speed", real=True)
         chain, fault, law = self.chain, self.chain.fault, self.law
         N = len(chain.blocks)
@@ -144,7 +144,7 @@ class _Period:
         for k in range(self.substeps):
             time = began + k * h
             pushed = kicked.constant + kicked.amplitude * ca.sin(kicked.frequency * time + phases)
-            after = ca.mtimes(through[:slow], ca.vertcat(q, p))  # p is held
+            after = ca.mtimes(through[:slow], ca.vertcat(q, p))  # zero-order hold of p
             acting, q = ca.mtimes(pressures, ca.vertcat((q + after) / 2, p)), after
             strength = fault.authority * friction(x, v) * (stress - acting)
             drive = fault.authority * static * stress - fault.specific_stiffness * x + ca.mtimes(pulls, x)
@@ -160,7 +160,7 @@ class _Period:
 
     @property
     def sizes(self) -> tuple[tuple[str, int], ...]:
-        """What is carried from period to period."""
+        """Names and sizes of the parts of the state vector."""
         N, m, q = len(self.chain.blocks), len(self.chain.wells), len(self.law.update)
         of_blocks = tuple((name, N) for name in ("worst", "rate", "peak", "rest"))
         return (
@@ -176,7 +176,7 @@ class _Period:
 
 
 def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> int:
-    """Periods of a run [-] of a duration [s], of the operation time unless given."""
+    """Number of periods of a run [-] with a duration [s]; the operation time unless given."""
     whole = chain.fault.reference.operation_time if duration is None else duration
     if not step <= whole <= _MOST_PERIODS * step:
         raise ParameterError(
@@ -189,22 +189,22 @@ def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> 
 def simulate_blocks(
     chain: BlockChain, law: Any, *, duration: float | None = None, substeps: int = SUBSTEPS
 ) -> BlockRun:
-    """Run blocks under a sampled law from rest; each has the fault's disturbance, shifted by its share of a turn.
+    """Run blocks under a sampled law from rest; block i of N has the fault's disturbance, shifted by 2πi/N.
 
     Parameters
     ----------
     chain : BlockChain
     law : MatrixLaw
-        Of errors of all blocks, or of the averages of slip and slip rate that each well measures; without delay.
+        From errors of all blocks, or of the averages of slip and slip rate that each well measures; without delay.
     duration : float, optional
         [s]; the operation time unless given.
     substeps : int
-        Of a period, 1 to 1000: slip rates by a projected Euler step, v = max(v + h·a, 0), then slips.
+        Substeps of a period, 1 to 1000: slip rates by a projected Euler step, v = max(v + h·a, 0), then slips.
 
     Raises
     ------
     ParameterError
-        For friction that heals, for substeps outside of 1 to 1000, and for a run that overflows.
+        For friction with healing, for substeps outside 1 to 1000, and for a run that overflows.
     """
     if any(block.friction.rest_excess for block in chain.blocks):
         raise ParameterError("a run of several blocks has no healing. Received friction with it. Set healing to 0.")

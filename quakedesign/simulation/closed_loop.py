@@ -1,7 +1,7 @@
 """Closed loop of plant, control law and reference as CasADi functions.
 
 Chapters: far-field loading and user-defined perturbation; parameter variation within the uncertainty box
-without new derivation or compilation; energy budget of a run [J].
+without a new derivation or compilation; energy budget of a run [J].
 """
 
 import math
@@ -31,17 +31,17 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 Number = ca.SX | float
 
 # ----------------------------------------------------------------------
-# What acts on a run beside the fault's own disturbance: the far field, and a perturbation of the user's.
+# Loads in addition to the fault's own disturbance: the far field, and a user-defined perturbation.
 
 SYMBOLS = ("slip", "slip_rate", "time")
 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Load:
-    """Drift of the far end of the spring, and a perturbation φ_e(slip, slip rate, time).
+    """Drift of the far end of the spring, and a user-defined perturbation φ_e(slip, slip rate, time).
 
-    The far end is at rest until t = 0 in the sense that the fault is then on the verge of slip, moves at the drift rate
-    from then on, and so adds k̂·drift·t to x2' (ERRATA 24); a perturbation is added to that of the fault.
+    At t = 0 the fault is on the verge of slip. From then on the far end moves at the drift rate, which adds k̂·drift·t
+    to x2' (ERRATA 24). The perturbation is added to that of the fault.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Load:
 
     @cached_property
     def acceleration(self) -> "sp.Expr":
-        """φ̂_e [m/s²] of the user alone, in x1, x2 and t of `quakedesign.symbolic.plant`."""
+        """User-defined φ̂_e [m/s²] alone, in x1, x2 and t of `quakedesign.symbolic.plant`."""
         if self.perturbation is None:
             return sp.Integer(0)
         meant = dict(zip(SYMBOLS, (plant.x1, plant.x2, plant.t), strict=True))
@@ -85,7 +85,7 @@ class Load:
         return self.perturbation.subs(named, simultaneous=True)
 
     def push(self, fault: "Fault") -> "sp.Expr":
-        """k̂·drift·t [m/s²] of the far end on a fault, in t of `quakedesign.symbolic.plant`."""
+        """Acceleration k̂·drift·t [m/s²] by the far end, in t of `quakedesign.symbolic.plant`."""
         return plant.plant_values(fault)[plant.k_hat] * sp.Rational(str(rational(self.drift))) * plant.t
 
 
@@ -93,24 +93,24 @@ NOTHING = Load()
 
 
 # ----------------------------------------------------------------------
-# A fault that differs from the nominal one within its uncertainty box, without deriving or compiling anything anew.
+# Parameters that differ from the nominal ones within the uncertainty box, without a new derivation or compilation.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Variation:
-    """True parameters over nominal ones; the controller keeps what it was designed with.
+    """Ratios of true to nominal parameters; the controller keeps the nominal ones of its design.
 
     Attributes
     ----------
     stiffness, damping, authority : float
         Factors of k̂, η̂ and N̂ [-], each within the fault's box.
     weakening : float
-        Share of the friction drop that takes place [-], 0 … 1: μ = μ_res + weakening·(μ_law − μ_res). With the
-        authority it sets β; every value keeps μ and its slope within the bounds of every box.
+        Share of the friction drop that takes place [-], 0 … 1: μ = μ_res + weakening·(μ_law − μ_res). Together with
+        the authority it determines β. For every value μ and its slope are within the bounds of every box.
     amplitude : float
         Share of the amplitude of the fault's sinusoidal disturbance that acts [-], 0 … 1.
     phase : float
-        Of that sine at the start [rad], 0 … 2π.
+        Initial phase of that sine [rad], 0 … 2π.
     """
 
     stiffness: float = 1.0
@@ -121,7 +121,7 @@ class Variation:
     phase: float = 0.0
 
     def require_within(self, fault: Fault) -> None:
-        """Refuse what the fault's uncertainty box excludes."""
+        """Reject factors outside the fault's uncertainty box."""
         box = fault.box
         for name in ("stiffness", "damping", "authority"):
             width = getattr(box, name)
@@ -149,12 +149,12 @@ def names() -> tuple[str, ...]:
 
 
 def complete(factors: tuple[Number, ...]) -> tuple[Number, ...]:
-    """All factors, those left out at the end as in the nominal fault."""
+    """All factors; those omitted at the end are nominal."""
     return factors + astuple(Variation())[len(factors) :]
 
 
 def symbols() -> tuple[sp.Symbol, ...]:
-    """Symbols of the factors, none of which is negative."""
+    """Nonnegative symbols of the factors."""
     return tuple(map(symbol, names()))
 
 
@@ -165,7 +165,7 @@ def symbol(name: str) -> sp.Symbol:
 
 @dataclass(frozen=True)
 class WeakenedFriction:
-    """A friction law of which only a share of the drop takes place."""
+    """A friction law with only a share of its drop."""
 
     law: FrictionLaw
     share: sp.Expr
@@ -184,21 +184,21 @@ class WeakenedFriction:
 
 
 def varied_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
-    """Value of every hatted parameter, nominal number times symbol."""
+    """Value of every hatted parameter: nominal number times symbol of its factor."""
     stiffness, damping, authority, *_ = symbols()
     factors = {plant.k_hat: stiffness, plant.eta_hat: damping, plant.N_hat: authority}
     return {hatted: value * factors.get(hatted, 1) for hatted, value in plant.plant_values(fault).items()}
 
 
 # ----------------------------------------------------------------------
-# Where the energy of a run went: forces times rates on one side, stored energies on the other.
+# Energy budget of a run: works of forces against changes of stored energies.
 
 WORKS = ("work_weakening", "work_injection", "work_viscous", "work_disturbance", "sum_slip")
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class EnergyBudget:
-    """Energies between the start and the end of a run [J]; what was stored or dissipated came from some work.
+    """Energies between start and end of a run [J]: stored and dissipated energies balance the works.
 
     kinetic + elastic + frictional + viscous − far_field − disturbance − residual = 0.
 
@@ -207,12 +207,12 @@ class EnergyBudget:
     kinetic, elastic : float
         Change of ½m·x2² and of ½k·stretch² [J].
     frictional : float
-        Heat of friction under the pressure that acted, ∫μA(σ' − p)·x2 dt [J].
+        Frictional heat under the applied pressure, ∫μA(σ' − p)·x2 dt [J].
     injection : float
-        Share of the frictional work that the pressure relieved, ∫μAp·x2 dt [J]: without it friction would have taken
-        frictional + injection on the same way.
+        Reduction of the frictional work by the pressure, ∫μAp·x2 dt [J]: without pressure the work on the same slip
+        path would be frictional + injection.
     viscous : float
-        Heat of the dashpot (radiation damping, where that is the damping), ∫η(x2 − v_∞)² dt [J].
+        Heat of the dashpot (radiation damping if the damping is chosen so), ∫η(x2 − v_∞)² dt [J].
     far_field : float
         Work of the drifting far end on spring and dashpot [J]; 0 without drift.
     disturbance : float
@@ -229,12 +229,12 @@ class EnergyBudget:
 
     @property
     def residual(self) -> float:
-        """What is missing [J]: the error of the integration, since works are integrated along with the motion."""
+        """Residual of the balance [J]: the integration error, since works are integrated along with the motion."""
         return self.kinetic + self.elastic + self.frictional + self.viscous - self.far_field - self.disturbance
 
     @property
     def relative_residual(self) -> float:
-        """|Residual| over the largest other entry [-]; 0 where nothing happened."""
+        """|Residual| over the largest other entry [-]; 0 if all entries are 0."""
         entries = self.to_dict()
         return abs(entries.pop("residual")) / largest if (largest := max(map(abs, entries.values()))) else 0.0
 
@@ -249,12 +249,12 @@ class EnergyBudget:
 
 
 class Meter:
-    """A loop in its own place while steps of it are written down, which adds up the works of its forces.
+    """Wrapper of a loop that also accumulates the works of its forces while steps are expressed in CasADi.
 
     Attributes
     ----------
     works : SX
-        So far, in the order of `WORKS`.
+        Works so far, in the order of `WORKS`.
     """
 
     def __init__(self, loop: "ClosedLoop", works: ca.SX) -> None:
@@ -289,12 +289,12 @@ class Meter:
 
 
 class Metered(Stepped):
-    """A loop whose forces do work that can be integrated along with its motion; functions on CasADi SX.
+    """A loop with works of forces that are integrated along with its motion; functions on CasADi SX.
 
     Attributes
     ----------
     factors : tuple of float or SX
-        True over nominal parameters; empty for the nominal fault.
+        Ratios of true to nominal parameters; empty for the nominal fault.
     """
 
     load: Load
@@ -318,7 +318,7 @@ class Metered(Stepped):
     def powers(self, time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
         """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
 
-        Friction counts relative to its static value under the whole normal stress, whose work is exact in the slip.
+        Friction enters relative to its static value at p = 0, whose work follows exactly from the slip.
         """
         _, normal, damping, stress = self.hats()
         relief = ca.fmin(pressure, stress) if self.sticks else pressure
@@ -332,7 +332,7 @@ class Metered(Stepped):
         )
 
     def budget(self, integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
-        """Budget of a run from rest that has taken a time [s], from the integrals of `powers` and its last state."""
+        """Budget of a run from rest of a given time [s], from the integrals of `powers` and the last state."""
         mass, drift = self.fault.mass, self.load.drift
         stiffness, normal, damping, stress = map(float, self.hats())
         static = normal * stress * float(self.static_friction)
@@ -364,7 +364,7 @@ phi = sp.Symbol("phi", real=True)
 
 
 def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """r [m], r' [m/s] and r'' [m/s²] in the time t, held at rest after the operation time (ERRATA 26)."""
+    """r [m], r' [m/s] and r'' [m/s²] in the time t, at rest after the operation time (ERRATA 26)."""
     end = sp.Rational(str(rational(fault.reference.operation_time)))
     slip = fault.reference.slip(plant.t)
     moving = (sp.factor(sp.diff(slip, plant.t, order)) for order in (1, 2))
@@ -375,7 +375,7 @@ def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 def acceleration_expression(fault: Fault, varied: bool = False) -> sp.Expr:
     """x2' [m/s²] of eq. shift in x1, x2, p and the disturbance φ, with friction continued to slip < 0 (ERRATA 12).
 
-    With `varied` also in the factors of `quakedesign.simulation.closed_loop.symbols`, here and below.
+    With `varied`, here and below, also in the factors of `symbols`.
     """
     return _with_numbers(plant.shifted_acceleration(), fault, varied)
 
@@ -398,7 +398,7 @@ def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = Fals
 
 
 def acceleration_with_parameters(fault: Fault, names: Sequence[str]) -> tuple[sp.Expr, list[sp.Symbol]]:
-    """x2' [m/s²] as `acceleration_expression`, and the symbols in it of named parameters of plant and friction."""
+    """x2' [m/s²] of `acceleration_expression` with named parameters of plant and friction free, and their symbols."""
     law = fault.friction
     free = law.symbols() | {name: sp.Symbol(name, positive=True) for name in plant.PARAMETERS}
     known = {name: sp.Rational(str(rational(getattr(fault, name)))) for name in plant.PARAMETERS}
@@ -416,7 +416,7 @@ def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
 
 
 def _inserted(expression: sp.Expr, law: FrictionLaw, values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """Insert law and values; e^u becomes 1 + (e^u − 1), so that small slips do not drown in rounding."""
+    """Insert law and values; e^u becomes 1 + expm1(u), so that small slips are not lost in rounding."""
     lawful = plant.with_law(expression, law, extended=True)
     numbers = lawful.replace(plant.disturbance, lambda *_: phi).subs(values)
     return sp.expand_mul(numbers.replace(sp.exp, lambda u: 1 + expm1(u)))
@@ -431,13 +431,13 @@ class ClosedLoop(Metered):
 
     fault: Fault
     controller: Controller | None = None
-    constant_pressure: float = 0.0  # p [Pa] where there is no controller
-    load: Load = NOTHING  # What acts on the fault beside its own disturbance
-    # tuple of float or SX: True over nominal parameters as in `Variation.values`; empty for the nominal fault
+    constant_pressure: float = 0.0  # p [Pa] without a controller
+    load: Load = NOTHING  # In addition to the fault's own disturbance
+    # tuple of float or SX: Ratios of true to nominal parameters as in `Variation.values`; empty for the nominal fault
     factors: tuple[Number, ...] = ()
 
     def with_factors(self, factors: tuple[Number, ...]) -> Self:
-        """Return the same loop with other true parameters, which may be symbols of CasADi (SX)."""
+        """Return the same loop with other true parameters, which may be CasADi symbols (SX)."""
         return replace(self, factors=factors) if factors else self
 
     def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float, works: int = 0) -> ca.SX:
@@ -446,28 +446,28 @@ class ClosedLoop(Metered):
         Parameters
         ----------
         motion : callable
-            Time derivative of the state, given the plant as a function of t [s], x and p [Pa], how much of the step has
-            passed [-], and the state.
+            Time derivative of the state, from the plant as a function of t [s], x and p [Pa], the passed share of the
+            step [-], and the state.
         step : float
             [s].
         works : int
-            Number of entries at the end of the state that are works of forces, which nothing depends on.
+            Number of works of forces at the end of the state, on which no rate depends.
         """
         return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
     def advance_often(
         self, method: type[Integrator], motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int
     ) -> ca.SX:
-        """State (SX) after a number of steps; what happens in one is a function in generated C, called in a loop.
+        """State (SX) after a number of steps; generated C calls one step as a function in a loop.
 
         Parameters
         ----------
         method, state, step
             See `advance`.
         motion : callable
-            As there, with `passed` counting steps, and with `given`.
+            As in `advance`, with `passed` in steps since the start, and with `given` as last argument.
         given : SX
-            What else the motion depends on.
+            Further arguments of the motion, constant over the steps.
         """
         return self.metered_often(method, motion, given, (state, ca.SX(0, 1)), step, times)[0]
 
@@ -480,7 +480,7 @@ class ClosedLoop(Metered):
         step: float,
         times: int,
     ) -> tuple[ca.SX, ca.SX]:
-        """State and works so far (SX) after a number of steps, see `advance_often`; works without entries stay so."""
+        """State and works (SX) after a number of steps, see `advance_often`; without works at the start, none."""
 
         def once(loop: Self, moving: Motion, state: ca.SX, works: ca.SX) -> tuple[ca.SX, ca.SX]:
             if not works.shape[0]:
@@ -520,7 +520,7 @@ class ClosedLoop(Metered):
 
     @cached_property
     def printed(self) -> Motion:
-        """The same of the plant as the paper prints it, eq. shift, which holds for slip rates that are not negative."""
+        """`plant` as printed in the paper, eq. shift, which is valid for slip rates that are not negative."""
         rates = [plant.x2, acceleration_expression(self.fault, bool(self.factors))]
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]}
         return self.function("plant", inputs, {"dx": rates})
@@ -541,7 +541,7 @@ class ClosedLoop(Metered):
 
     @property
     def known(self) -> sp.Expr:
-        """What the law adds to ν, and so to h, from what is known of the plant [unit of ν]."""
+        """Feed-forward of the known plant terms, which the law adds to ν, and thus to h [unit of ν]."""
         known = self.controller.feedforward if self.controller is not None else NONE
         return known.acceleration(plant.x1, plant.x2, r_acceleration)
 
@@ -569,19 +569,19 @@ class ClosedLoop(Metered):
 
     @cached_property
     def shaken(self) -> Motion:
-        """CasADi Function (t [s], x [m, m/s]) → φ̂_e [m/s²], without the push of the far end."""
+        """CasADi Function (t [s], x [m, m/s]) → φ̂_e [m/s²], without the load of the far end."""
         return self.function("shaken", {"t": [plant.t], "x": [plant.x1, plant.x2]}, {"phi": [self.disturbance]})
 
     def reversing(self, time: ca.SX, state: ca.SX, pressure: ca.SX) -> ca.SX:
-        """Whether the load on a fault at rest exceeds friction backward (SX): never where nothing rests."""
+        """Whether the load on a fault at rest exceeds friction backward (SX): never on a plant without stick."""
         return ca.SX(0)
 
     def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
-        """Shear stress τ = μ(σ' − p) [Pa] that friction sets against slip (SX)."""
+        """Shear stress τ = μ(σ' − p) [Pa] with which friction resists slip (SX)."""
         return friction * (self.fault.effective_normal_stress - pressure)
 
     def function(self, name: str, inputs: dict[str, list[sp.Symbol]], outputs: dict[str, list[sp.Expr]]) -> Motion:
-        """CasADi Function with the disturbance inserted; with factors, a callable that has inserted those too."""
+        """CasADi Function with the disturbance inserted; with factors, a callable with these inserted too."""
         shaking = self.shaking if plant.t in inputs.get("t", ()) else None
         if not self.factors:
             return casadi_function(name, inputs, outputs, shaking)
@@ -590,20 +590,20 @@ class ClosedLoop(Metered):
 
     @property
     def shaking(self) -> dict[sp.Symbol, sp.Expr]:
-        """φ̂_e and the far end's push [m/s²] in x1, x2 and t; kept apart, since a tiny constant would drown in a sum."""
+        """φ̂_e and the far end's load [m/s²] in x1, x2 and t, inserted last: in a sum a tiny constant would be lost."""
         push = self.load.push(self.fault) * (symbol("stiffness") if self.factors else 1)
         return {phi: self.disturbance + push}
 
     @property
     def disturbance(self) -> sp.Expr:
-        """φ̂_e [m/s²] of the fault and of the user, in x1, x2 and t."""
+        """φ̂_e [m/s²] of the fault plus the user-defined one, in x1, x2 and t."""
         own = plant.with_disturbance(plant.disturbance(plant.x1, plant.x2, plant.t), self.fault)
         if self.factors:
             own = own.replace(sp.sin, lambda angle: symbol("amplitude") * sp.sin(angle + symbol("phase")))
         return own + self.load.acceleration
 
 
-def _column(values: tuple[Number, ...]) -> Any:  # SX, or DM where all are numbers
+def _column(values: tuple[Number, ...]) -> Any:  # SX, or DM if all are numbers
     return ca.vertcat(*values)
 
 
@@ -613,9 +613,9 @@ def casadi_function(
     outputs: dict[str, list[sp.Expr]],
     named: dict[sp.Symbol, sp.Expr] | None = None,
 ) -> ca.Function:
-    """CasADi Function with names; `named` are expressions in the inputs that the outputs refer to.
+    """CasADi Function with named inputs and outputs; `named` are expressions in the inputs that outputs contain.
 
-    Derivatives at a kink are those of the side on which x1 and x2 grow.
+    Derivatives at a kink are one-sided, for growing x1 and x2.
     """
     vectors = {key: ca.SX.sym(key, len(symbols)) for key, symbols in inputs.items()}
     values = {symbol: vectors[key][i] for key, symbols in inputs.items() for i, symbol in enumerate(symbols)}

@@ -32,21 +32,20 @@ from quakedesign.files import temporary_folder
 from quakedesign.loop.schemes.implicit import where_needed
 
 # ----------------------------------------------------------------------
-# Elementary functions of plain arithmetic: the same digits in every lane, on every processor, with any C library.
+# Elementary functions from IEEE 754 operations: bitwise equal in every lane, on every processor, with any C library.
 #
-# Each is a straight line of sums, products, quotients, comparisons and choices, which IEEE 754 rounds in one way only,
-# on exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`). They are
-# stated once, as CasADi expressions; `quakedesign.simulation.compiled` puts them into functions,
-# `quakedesign.simulation.compiled` into C. Errors are below one unit in the last place, those of cube roots below 0.65,
-# of other powers (exponents up to 2) below one and a half, of the hyperbolic tangent below two. Zeros have no sign. The
-# power ⅓ of floats is the cube root.
+# Each is a sequence of sums, products, quotients, comparisons and selections without branches, which IEEE 754 rounds
+# uniquely, with exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`).
+# They are defined once, as CasADi expressions; this module inserts them into CasADi functions and translates them into
+# C. Errors are below 1 unit in the last place; for cube roots below 0.65, for other powers (exponents up to 2) below
+# 1.5, for the hyperbolic tangent below 2. Zeros have no sign. The power with the float next to ⅓ is the cube root.
 
-_ROUNDER = 1.5 * 2.0**52  # sums with it have no digits behind the point
+_ROUNDER = 1.5 * 2.0**52  # sums with it are rounded to whole numbers
 _SPLITTER = 2.0**27 + 1
-_LEAST = 2.0**-1022  # with 53 digits
-THIRD = 1 / 3  # next to it
-_ROOT = float.fromhex("0x1.6a09e667f3bcdp+0")  # of 2
-_LN2 = Fraction(0xB17217F7D1CF79ABC9E3B39803F2F6AF40F343267298B62D8A0D175B8BAAFA2B, 2**256)  # of 77 digits
+_LEAST = 2.0**-1022  # smallest normal float, with 53 bits
+THIRD = 1 / 3  # the float next to ⅓
+_ROOT = float.fromhex("0x1.6a09e667f3bcdp+0")  # √2
+_LN2 = Fraction(0xB17217F7D1CF79ABC9E3B39803F2F6AF40F343267298B62D8A0D175B8BAAFA2B, 2**256)  # 77 decimal digits
 _HALF_PI = Fraction(0x1921FB54442D18469898CC51701B839A252049C1114CF98E804177D4C76273644, 2**256)
 
 
@@ -55,10 +54,10 @@ _in_bits = ContextVar("in_bits", default=False)
 
 @contextmanager
 def verbatim(*, bits: bool = False) -> Iterator[None]:
-    """While it lasts, CasADi keeps expressions as they are written: (x + y) − x stays, since it is not y.
+    """In this context CasADi does not simplify: (x + y) − x stays, since in floats it is not y.
 
-    With `bits`, expressions are for C, where `exponent_and_mantissa` and `near_cube_root` look at the bits: they are
-    log, log1p and sinh then.
+    With `bits`, expressions are for C, where `exponent_and_mantissa` and `near_cube_root` use the bits of a float;
+    log, log1p and sinh then stand for them.
     """
     before, token = ca.GlobalOptions.getSimplificationOnTheFly(), _in_bits.set(bits)
     ca.GlobalOptions.setSimplificationOnTheFly(False)
@@ -70,7 +69,7 @@ def verbatim(*, bits: bool = False) -> Iterator[None]:
 
 
 def _pieces(number: Fraction, bits: int, count: int) -> list[float]:
-    """Floats of a number of leading bits each, and a last one, whose sum is a number."""
+    """Floats with a given number of leading bits each, and a last one, whose sum is `number`."""
     leading = []
     for _ in range(count - 1):
         unit = Fraction(2) ** (math.frexp(float(number))[1] - bits)
@@ -80,9 +79,9 @@ def _pieces(number: Fraction, bits: int, count: int) -> list[float]:
 
 
 def _economised(coefficients: list[Fraction], low: Fraction, high: Fraction, count: int) -> list[float]:
-    """As many coefficients as wanted of a polynomial next to a longer one on an interval (Lanczos 1938).
+    """Coefficients of a shorter polynomial close to a given one on an interval (Lanczos 1938).
 
-    The highest power is taken off with the Chebyshev polynomial of its degree, which is nowhere large.
+    A multiple of the Chebyshev polynomial of equal degree, which is small on the interval, cancels the highest power.
     """
     line = [-(high + low) / (high - low), 2 / (high - low)]
     chebyshev = [[Fraction(1)], line]
@@ -106,8 +105,8 @@ _EXP = _economised([Fraction(1, math.factorial(n)) for n in range(2, 18)], -_R, 
 _SIN = _economised([Fraction((-1) ** n, math.factorial(2 * n + 1)) for n in range(1, 12)], Fraction(0), _Z, 7)
 _COS = _economised([Fraction((-1) ** n, math.factorial(2 * n)) for n in range(2, 12)], Fraction(0), _Z, 6)
 _ATANH = _economised([Fraction(2, 2 * n + 1) for n in range(1, 16)], Fraction(0), _S, 7)
-_LEFT = Fraction(955, 10000)  # of a number beside the cube of what is near its cube root
-_ROOT_BITS = 44693264  # two thirds of 1023·2¹⁶, less what makes `_LEFT` least
+_LEFT = Fraction(955, 10000)  # bound of |x − y³|/x for y = near_cube_root(x)
+_ROOT_BITS = 44693264  # ⅔·1023·2¹⁶ minus a correction that minimises `_LEFT`
 _CUBE_ROOT = _economised(
     [Fraction(math.prod(3 * k + 1 for k in range(n)), math.factorial(n) * 3**n) for n in range(1, 40)],
     -_LEFT,
@@ -122,17 +121,17 @@ def two_to(exponent: ca.SX) -> ca.SX:
 
 
 def choice(condition: ca.SX, yes: ca.SX, no: ca.SX) -> ca.SX:
-    """One of two values; the other may be no number."""
+    """One of two values; the other one may be NaN."""
     return ca.if_else(condition, yes, no)
 
 
 def rounded(x: ca.SX) -> ca.SX:
-    """Nearest whole number, the even one of two; for |x| < 2⁵¹."""
+    """Nearest whole number, ties to even, for |x| < 2⁵¹."""
     return (x + _ROUNDER) + -_ROUNDER
 
 
 def _polynomial(x: ca.SX, coefficients: list[float]) -> ca.SX:
-    """Values of lower and upper half, joined by a power of x, in turn: short chains (Estrin 1960)."""
+    """Value of a polynomial, by pairs of terms joined by powers of x: short chains of operations (Estrin 1960)."""
     powers, parts = x, [ca.SX(c) for c in coefficients]
     while len(parts) > 1:
         pairs = [parts[i] + parts[i + 1] * powers for i in range(0, len(parts) - 1, 2)]
@@ -141,14 +140,14 @@ def _polynomial(x: ca.SX, coefficients: list[float]) -> ca.SX:
 
 
 def _sum(a: ca.SX, b: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Rounded sum and what is missing (Knuth's two-sum)."""
+    """Rounded sum and its rounding error (Knuth's two-sum)."""
     total = a + b
     of_b = total - a
     return total, (a - (total - of_b)) + (b - of_b)
 
 
 def _halves(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """26 leading bits, and the others (Veltkamp's splitting)."""
+    """Leading 26 bits of a float and the remaining ones (Veltkamp's splitting)."""
     scaled = x * _SPLITTER
     first = scaled - (scaled - x)
     return first, x - first
@@ -201,9 +200,9 @@ def _parted(x: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def exponent_and_mantissa(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """As `_parted`, for x from 2⁻¹⁰²² on; exact, whatever the C library's logarithm has for last digits.
+    """As `_parted`, for x ≥ 2⁻¹⁰²²; exact for every rounding of the C library's logarithm.
 
-    Of it only a whole number counts, that of a power of two below x; where it changes, either serves.
+    The logarithm only selects a whole number, the exponent of a power of two below x; next to a change both are right.
     """
     if _in_bits.get():
         return ca.log(x), ca.log1p(x)
@@ -222,17 +221,17 @@ def _logarithm(mantissa: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
 
 
 def log(x: ca.SX) -> ca.SX:
-    """Natural logarithm; no number below zero."""
+    """Natural logarithm; NaN below zero."""
     whole, mantissa = _parted(x)
     f, half, product = _logarithm(mantissa)
     value = whole * _LN2_PIECES[0] - ((half - (product + whole * _LN2_PIECES[1])) - f)
-    # Value with that of zero and of infinity; no number where x is negative or none.
+    # Value with the limits at zero and infinity; NaN where x is negative or NaN.
     proper = choice(x == 0, ca.SX(-math.inf), choice(x < math.inf, value, ca.SX(math.inf)))
     return choice(x >= 0, proper, ca.SX(math.nan))
 
 
 def power(x: ca.SX, a: ca.SX) -> ca.SX:
-    """x^a, the cube root where a is the float next to ⅓; for negative x no number unless a is whole."""
+    """x^a, the cube root where a is the float next to ⅓; NaN for negative x unless a is whole."""
     if not a.is_constant():
         return choice(a == THIRD, cube_root(x), any_power(x, a))
     if float(a) == round(float(a)):
@@ -241,10 +240,10 @@ def power(x: ca.SX, a: ca.SX) -> ca.SX:
 
 
 def near_cube_root(x: ca.SX) -> ca.SX:
-    """A number of 17 bits whose cube is within a tenth of x, from 2⁻¹⁰²² on.
+    """Number of 17 bits whose cube is within a tenth of x, for x ≥ 2⁻¹⁰²².
 
-    The leading bits of a float, its exponent and 16 of its fraction as one whole number, are nearly its logarithm: a
-    third of them are nearly those of the cube root (Kahan 1991).
+    The leading bits of a float, its exponent and 16 bits of its fraction as one whole number, approximate its
+    logarithm: a third of this number approximates that of the cube root (Kahan 1991).
     """
     if _in_bits.get():
         return ca.sinh(x)
@@ -258,9 +257,9 @@ def near_cube_root(x: ca.SX) -> ca.SX:
 
 
 def cube_root(x: ca.SX) -> ca.SX:
-    """x^⅓; no number below zero.
+    """x^⅓; NaN below zero.
 
-    With y near it, whose cube is exact, and z = (x − y³)/x it is y(1 − z)^(−⅓).
+    With an approximation y, whose cube is exact, and z = (x − y³)/x, the root is y(1 − z)^(−⅓).
     """
     small = x < _LEAST
     scaled = x * choice(small, ca.SX(2.0**54), ca.SX(1.0))
@@ -272,7 +271,7 @@ def cube_root(x: ca.SX) -> ca.SX:
 
 
 def any_power(x: ca.SX, a: ca.SX) -> ca.SX:
-    """Power with an exponent that is not known yet, but for that of a cube root."""
+    """Power with a symbolic exponent other than that of a cube root."""
     size = ca.fabs(a)
     whole, even = (ca.logic_or(size >= 2.0**51, rounded(part) == part) for part in (a, 0.5 * a))
     value = _power(choice(ca.logic_and(whole, x < 0), -x, x), a)
@@ -281,7 +280,7 @@ def any_power(x: ca.SX, a: ca.SX) -> ca.SX:
 
 
 def _power(x: ca.SX, a: ca.SX) -> ca.SX:
-    """x^a for x that are not negative; a·log x in whole powers of two and a small rest."""
+    """x^a for x ≥ 0: a·log x is split into whole multiples of ln 2 and a small rest."""
     whole, mantissa = _parted(x)
     f, half, product = _logarithm(mantissa)
     small = a * (f - (half - product))
@@ -295,7 +294,7 @@ def _power(x: ca.SX, a: ca.SX) -> ca.SX:
 
 
 def _by_half_pi(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Turns beside whole ones, −½, −¼, 0, ¼ or ½, and r and rest: x = nπ/2 + r + rest."""
+    """Turns n/4 less whole turns (−½, −¼, 0, ¼ or ½), and r and rest: x = nπ/2 + r + rest."""
     x = x * (ca.fabs(x) < 2.0**52)
     whole = rounded(x * float(1 / _HALF_PI))
     first, second, third, fourth = (whole * piece for piece in _HALF_PI_PIECES)
@@ -314,7 +313,7 @@ def _sine_and_cosine(r: ca.SX, rest: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def sin(x: ca.SX) -> ca.SX:
-    """Sine; beyond |x| = 2³¹ that of an argument within one unit in the last place, beyond 2⁵² zero."""
+    """Sine; beyond |x| = 2³¹ of an argument within one unit in the last place of x, beyond 2⁵² of 0."""
     turns, r, rest = _by_half_pi(x)
     sine, cosine = _sine_and_cosine(r, rest)
     size = ca.fabs(turns)
@@ -322,7 +321,7 @@ def sin(x: ca.SX) -> ca.SX:
 
 
 def cos(x: ca.SX) -> ca.SX:
-    """Cosine; of large arguments see `sin`."""
+    """Cosine; for large arguments see `sin`."""
     turns, r, rest = _by_half_pi(x)
     sine, cosine = _sine_and_cosine(r, rest)
     size = ca.fabs(turns)
@@ -336,17 +335,17 @@ def tanh(x: ca.SX) -> ca.SX:
 
 
 def fmax(x: ca.SX, y: ca.SX) -> ca.SX:
-    """The larger of two numbers, or the one that is a number."""
+    """The larger of two numbers; if one is NaN, the other."""
     return choice(ca.logic_or(x > y, ca.logic_not(y <= math.inf)), x, y)
 
 
 def fmin(x: ca.SX, y: ca.SX) -> ca.SX:
-    """The smaller of two numbers, or the one that is a number."""
+    """The smaller of two numbers; if one is NaN, the other."""
     return choice(ca.logic_or(x < y, ca.logic_not(y <= math.inf)), x, y)
 
 
 def floor(x: ca.SX) -> ca.SX:
-    """Largest whole number that is not above x."""
+    """Largest whole number ≤ x."""
     size = ca.fabs(x)
     near = (size + 2.0**52) + -(2.0**52)
     near = choice(x < 0, -near, near)
@@ -370,28 +369,28 @@ FUNCTIONS: dict[int, Callable[..., ca.SX]] = {
 
 
 # ----------------------------------------------------------------------
-# The work of CasADi Functions of scalar operations, one instruction after the other, and what they call.
+# Instructions of CasADi Functions of scalar operations, and the functions that they call.
 
 _WRITTEN_OUT = 60
 """Instructions of an elementary function, on the average of a step."""
 
 
 class NotPortableError(ValueError):
-    """Work that has no text in C here."""
+    """An operation without a portable C text."""
 
 
 @dataclass(frozen=True)
 class Instruction:
-    """One step of a function's work."""
+    """One instruction of a CasADi Function."""
 
-    operation: int  # CasADi's code
+    operation: int  # CasADi's operation code
     taken: tuple[int, ...]  # Places of the arguments; for an input its number and the entry
-    given: tuple[int, ...]  # Places of the results, −1 where none is wanted; for an output its number and the entry
+    given: tuple[int, ...]  # Places of the results, −1 where unused; for an output its number and the entry
     constant: float
 
 
 def instructions(function: ca.Function) -> Iterator[Instruction]:
-    """The work of a CasADi Function of scalar operations, in order."""
+    """Instructions of a CasADi Function of scalar operations, in order."""
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
         value = function.instruction_constant(k) if operation == ca.OP_CONST else 0.0
@@ -400,33 +399,33 @@ def instructions(function: ca.Function) -> Iterator[Instruction]:
 
 @dataclass(frozen=True)
 class Called:
-    """What one instruction of a function calls."""
+    """Function that an instruction calls."""
 
     function: ca.Function  # casadi.Function: Of scalar operations, one vector in and one out
-    # How often, on its own result; 0: once if the first argument, which it does not take, is not zero, else its result
-    # is 0
+    # Number of calls, each on the last result; 0: a branch, one call with the arguments after the first if the first is
+    # not zero, else the result is 0
     times: int
 
     def __call__(self, function: ca.Function, arguments: list[ca.SX]) -> ca.SX:
-        """Result (SX) with another function in the place of this one."""
+        """Result (SX) with another function in place of this one."""
         if self.times:
             return function.fold(self.times, {"never_inline": True})(ca.vertcat(*arguments))
         return where_needed(function)(arguments[0], ca.vertcat(*arguments[1:]))
 
 
 def called(function: ca.Function, work: Instruction) -> Called:
-    """What an instruction of a function calls.
+    """Function that an instruction calls.
 
     Raises
     ------
     NotPortableError
-        When that is neither a repetition nor a branch, or cannot be told.
+        If the call is neither a repetition nor a branch, or is ambiguous.
     """
     found = [f for f in function.find_functions(0) if f.nnz_in() == len(work.taken) and f.nnz_out() == len(work.given)]
     name = found[0].name() if len(found) == 1 else ""
     if name.startswith("fold_"):
         inner = name.removeprefix("fold_")
-        (all_of_them,) = map(found[0].get_function, found[0].get_function())  # for 10, 100, … it has another name
+        (all_of_them,) = map(found[0].get_function, found[0].get_function())  # its name varies with the number of calls
         return Called(found[0].find_function(inner), int(all_of_them.size2_out(0)))
     if name == "where_needed":
         return Called(found[0].find_function("solved"), 0)
@@ -440,7 +439,7 @@ def expanded(function: ca.Function) -> ca.Function:
 
 
 def expanded_size(function: ca.Function) -> int:
-    """About how many instructions a function has when it is expanded."""
+    """Approximate number of instructions of the expanded function."""
     operations = [function.instruction_id(k) for k in range(function.n_instructions())]
     return len(operations) + _WRITTEN_OUT * sum(operation in FUNCTIONS for operation in operations)
 
@@ -472,7 +471,7 @@ def _operated(work: Instruction, arguments: list[ca.SX]) -> ca.SX:
 
 
 # ----------------------------------------------------------------------
-# The parts of generated C that never change stand in C files beside this one; their numbers are put in by name.
+# The fixed parts of generated C are C files in this folder; numbers are inserted by name.
 
 
 @cache
@@ -481,12 +480,12 @@ def _template(name: str) -> Template:
 
 
 def c_file(name: str, **numbers: object) -> str:
-    """Text of a C file with numbers in the place of ``${…}``."""
+    """Text of a C file with numbers in place of ``${…}``."""
     return _template(name).substitute(numbers)
 
 
 # ----------------------------------------------------------------------
-# Operations in C that have the same digits everywhere, the elementary functions among them.
+# Bitwise reproducible operations in C, including the elementary functions.
 
 _ATOMIC = {
     ca.OP_POW: "two_to",
@@ -529,17 +528,17 @@ class Value:
 
     @property
     def number(self) -> str:
-        """As a double."""
+        """Text of the value as a double."""
         return f"({self.text} ? 1.0 : 0.0)" if self.true_or_false else self.text
 
     @property
     def condition(self) -> str:
-        """As what is true or false."""
+        """Text of the value as a condition."""
         return self.text if self.true_or_false else f"({self.text} != 0)"
 
 
 def operation(code: int, arguments: Sequence[Value], named: Callable[[int], str | None]) -> Value:
-    """Result of an operation in C; `named` are the functions to call for operations, by code."""
+    """Result of an operation in C; `named` maps the code of an operation to the function to call, if any."""
     numbers = [argument.number for argument in arguments]
     if name := named(code):
         return Value(f"{name}({', '.join(numbers)})")
@@ -559,14 +558,14 @@ def operation(code: int, arguments: Sequence[Value], named: Callable[[int], str 
 
 
 def constant(value: float) -> str:
-    """A float in C, to its last bit."""
+    """A float in C, exact."""
     if math.isnan(value):
         return "NAN"
     return f"({'-' if value < 0 else ''}INFINITY)" if math.isinf(value) else f"({value.hex()})"
 
 
 def called_alone(code: int) -> str | None:
-    """Name in C of a function of the C library that is called for one number at a time."""
+    """Name of the C library's function for an operation, which is called for one number at a time."""
     return _OF_THE_LIBRARY.get(code)
 
 
@@ -603,7 +602,7 @@ def _function_c(function: Callable[..., ca.SX]) -> str:
 def declared(
     lines: list[str], number: int, work: Instruction, arguments: Sequence[Value], named: Callable[[int], str | None]
 ) -> Value:
-    """Value of an instruction, computed by a line that is added."""
+    """Value of an instruction; the line that computes it is appended to `lines`."""
     if work.operation == ca.OP_CONST:
         return Value(constant(work.constant))
     made = operation(work.operation, arguments, named)
@@ -614,7 +613,7 @@ def declared(
 
 @cache
 def in_place_of_the_library() -> str:
-    """Text before C of CasADi, which then calls the portable functions in place of those of the C library."""
+    """Text before CasADi's C that replaces calls of the C library by the portable functions."""
     names = {FUNCTIONS[code].__name__: code for code in FUNCTIONS if code != ca.OP_POW}
     called = {"power": "pow"}
     replaced = "".join(f"#define {called.get(name, name)} portable_{name}\n" for name in names)
@@ -622,11 +621,11 @@ def in_place_of_the_library() -> str:
 
 
 # ----------------------------------------------------------------------
-# The step function repeated, in machine code where a C compiler is at hand.
+# Repeated steps, in machine code where a C compiler is available.
 
 FLAGS = (
     *("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
-    *("-fPIC", "-fvisibility=hidden", "-shared"),  # what is not hidden is never inlined
+    *("-fPIC", "-fvisibility=hidden", "-shared"),  # only hidden functions are inlined
 )
 """None of them changes a digit."""
 RADIX = 64
@@ -644,32 +643,32 @@ MachineCode = Callable[[Any, int], int]
 
 @dataclass(frozen=True)
 class Backend:
-    """What advances a vector."""
+    """Backend that advances a vector."""
 
-    # tuple of casadi.Function: That advance it by 1, 64 and 4096 steps, one input and one output each; none beside
-    # machine code
+    # tuple of casadi.Function: Advance by 1, 64 and 4096 steps, one input and one output each; empty with machine
+    # code
     functions: tuple[ca.Function, ...]
     name: str  # ``"compiled"`` or ``"virtual-machine"``
-    reason: str  # The compiler, or why there is none
-    machine_code: MachineCode | None = None  # Advances the floats at a pointer by a number of steps; not 0 if it fails
+    reason: str  # The compiler, or the reason for using none
+    machine_code: MachineCode | None = None  # Advances floats at a pointer by a number of steps; not 0 on failure
 
 
 def prepare(step: ca.Function, compiled: bool | None, steps: int) -> Backend:
-    """Backend of a step function; both kinds give the same digits.
+    """Backend of a step function; both kinds give bitwise equal results.
 
     Parameters
     ----------
     step : casadi.Function
         One vector in, one vector of the same length out; called `STEP`.
     compiled : bool or None
-        Whether to compile; None: if the run is long enough to be worth it, and a compiler is found and works.
+        Whether to compile; None: if the run is long enough to save time and a working compiler exists.
     steps : int
         Number of steps of the run.
 
     Raises
     ------
     SimulationError
-        When compilation was asked for and is not possible.
+        If compilation is requested and not possible.
     """
     if compiled is False:
         return _virtual_machine(step, "asked for")
@@ -723,7 +722,7 @@ def compiler() -> tuple[str, ...]:
     Raises
     ------
     FileNotFoundError
-        When there is none, or CC cannot be read.
+        If there is none, or CC cannot be parsed.
     """
     try:
         wanted = shlex.split(os.environ.get("CC", ""))
@@ -738,7 +737,7 @@ def compiler() -> tuple[str, ...]:
 
 @lru_cache(maxsize=32)
 def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
-    """Load the loop of a C source; the library stays in memory when its file is gone."""
+    """Compile and load the loop of a C source; the library stays in memory after its file is deleted."""
     asked = text.encode(), repr((*command, *FLAGS, *_identity(command[0]))).encode()
     with temporary_folder() as folder:
         library = folder / "kept.so"
@@ -749,7 +748,7 @@ def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
 
 
 def compilation() -> str:
-    """How a compiled run is compiled: command and flags, and which compiler that is; empty without one."""
+    """Command, flags and identity of the compiler of compiled runs; empty without one."""
     try:
         command = compiler()
         return repr((*command, *FLAGS, *_identity(command[0])))
@@ -758,19 +757,19 @@ def compilation() -> str:
 
 
 def _identity(program: str) -> tuple[str, int, int]:
-    """Where a program lies, its size and when it changed last: another compiler has another one."""
+    """Path, size and modification time of a program, which differ between compilers."""
     path = Path(program).resolve()
     told = path.stat()
     return str(path), told.st_size, told.st_mtime_ns
 
 
 def shared_library(text: str, folder: Path, command: tuple[str, ...], flags: tuple[str, ...] = ()) -> Path:
-    """Compile a C source into a shared library in a folder, with more flags where there are some.
+    """Compile a C source into a shared library in a folder, with optional further flags.
 
     Raises
     ------
     OSError, SubprocessError
-        When the compiler does not work.
+        If the compiler fails.
     """
     written, library = folder / "steps.c", folder / "steps.so"
     written.write_text(text, encoding="utf-8")
@@ -804,7 +803,7 @@ def _reason(error: Exception) -> str:
 
 
 # ----------------------------------------------------------------------
-# Many vectors stepped at once: C whose innermost loops run over lanes, for the compiler to vectorise.
+# Steps of many vectors at once: C with innermost loops over lanes, which the compiler vectorises.
 
 LANES = 16
 LANE_FLAGS = ("-fno-tree-pre", "-fno-thread-jumps")
@@ -815,7 +814,7 @@ _LONGEST_QUESTION = 10
 
 @lru_cache(maxsize=4)
 def processor_flags(command: tuple[str, ...]) -> tuple[str, ...]:
-    """Flags of a compiler for the widest vectors of this processor; none where it cannot tell."""
+    """Compiler flags for the widest vectors of this processor; empty if the compiler does not report them."""
     question = [*command, "-march=native", "-dM", "-E", "-x", "c", "-"]
     try:
         told = subprocess.run(question, input="", capture_output=True, text=True, timeout=_LONGEST_QUESTION, check=True)
@@ -826,7 +825,7 @@ def processor_flags(command: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def lanes_c(step: ca.Function, diverged: int) -> str:
-    """C text with ``advance_samples``, which moves vectors that lie side by side on until they diverge.
+    """C text with ``advance_samples``, which advances vectors in adjacent lanes until they diverge.
 
     Parameters
     ----------
@@ -838,7 +837,7 @@ def lanes_c(step: ca.Function, diverged: int) -> str:
     Raises
     ------
     NotPortableError
-        For operations that have no text in C here.
+        For operations without a portable C text.
     """
     parts = [elementary_c()]
     _add_body(parts, step, "one_step")
@@ -847,7 +846,7 @@ def lanes_c(step: ca.Function, diverged: int) -> str:
 
 
 def _add_body(parts: list[str], function: ca.Function, name: str) -> None:
-    """Function in C that maps the vectors of all lanes in place, after those that it calls."""
+    """Append a C function that maps the vectors of all lanes in place, after the functions that it calls."""
     body = _Body(function, name)
     for number, call in body.called.items():
         _add_body(parts, call.function, f"{name}_{number}")
@@ -862,7 +861,7 @@ Place = tuple[int, int]
 
 @dataclass(frozen=True)
 class _Task:
-    """An instruction, and where its arguments come from."""
+    """An instruction and the sources of its arguments."""
 
     number: int
     work: Instruction
@@ -870,12 +869,12 @@ class _Task:
 
     @property
     def kind(self) -> int:
-        """Number of a loop that is over before what must not stand in it: a call, or a function of the C library."""
+        """Key of the task's loop: a call has its own loop, and functions of the C library have separate ones."""
         return self.number if self.work.operation == ca.OP_CALL else -1 - bool(called_alone(self.work.operation))
 
 
 def _tasks(work: Iterable[Instruction]) -> list[_Task]:
-    """What is done, in order, the results of all at the end."""
+    """Tasks in order, with the outputs last."""
     at: dict[int, Place] = {}
     tasks = list[_Task]()
     for number, one in enumerate(work):
@@ -887,7 +886,7 @@ def _tasks(work: Iterable[Instruction]) -> list[_Task]:
 
 
 class _Body:
-    """The work of a function as loops over lanes: one, but for what must not stand in a loop with others."""
+    """Body of a function as loops over lanes: one loop, split at calls and functions of the C library."""
 
     def __init__(self, function: ca.Function, name: str) -> None:
         self._name = name
@@ -950,7 +949,7 @@ class _Body:
         yield from _over_lanes([*lines, *ends])
 
     def _value(self, place: Place, values: dict[Place, Value], lines: list[str]) -> Value:
-        """A result of this loop, or one of another that is read once."""
+        """A result of this loop, or one of another loop, which is loaded once."""
         if place not in values:
             work = self._by_number[place[0]].work
             if work.operation == ca.OP_CONST:

@@ -1,11 +1,11 @@
-"""Coupled blocks with rate-and-state friction: seismic cycles, runs under a law, pressure diffusion.
+"""Coupled blocks with rate-and-state friction: seismic cycles, controlled runs, pressure diffusion.
 
-With ζ the slip less that of the far end, N = σ' − p and S the stress on a block per slip of every block, for each block
+With ζ the slip less that of the far end, N = σ' − p and S the stiffness matrix, for each block
 
     ζ' = v − v_∞,    mv' = τ_0 − Sζ + s − Nμ(v, θ) − Hv,    θ' of the law.
 
-Without mass the right-hand side is 0, and its derivative gives v' (quasi-dynamic). Rates and states are followed in
-their logarithms. Pressures of cells or wells obey h' = Fh + Gu, and p is a combination of them.
+Without mass the right-hand side is 0, and its derivative gives v' (quasi-dynamic). The logarithms of rates and states
+are integrated. Pressures h of cells or wells obey h' = Fh + Gu, and p is a linear combination of them.
 """
 
 import math
@@ -33,18 +33,18 @@ from quakedesign.simulation.stick_slip import direct_strength
 from quakedesign.symbolic.casadi_printer import to_casadi
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
 
-MOST_EXPANDED = 40  # blocks whose equations are written out; more are matrices
-_LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
+MOST_EXPANDED = 40  # with more blocks equations stay matrices, without a Jacobian
+_LONGEST = 1e9  # s of one time variable, whose resolution is then 1.2e-7 s
 _LONGEST_RUN = 1e5 * _LONGEST  # s
 _FARTHEST = 1e6  # critical slips that the far end travels: some thousand cycles
-_MOST_PERIODS = 10**5  # of a run under a law
+_MOST_PERIODS = 10**5  # of a controlled run
 _ONSET = 10.0  # times the loading rate
-_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # of a run that shows a cycle: events, and loads of aσ'
+_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # of a run for a cycle: events, and loads in units of aσ'
 _RTOL = 1e-9
-_SMALL = 1e3  # Pa, below which errors of a pressure count absolutely
-_TIGHT = 1e-11  # of runs under a law
-_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run under a law is recorded
-_WIDEST = 50.0  # change of the logarithm of a rate at the start
+_SMALL = 1e3  # Pa, below which the tolerance of a pressure is absolute
+_TIGHT = 1e-11  # of controlled runs
+_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a controlled run is recorded
+_WIDEST = 50.0  # largest change of the logarithm of a rate by the initial stress
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,7 +56,7 @@ class CoupledSliders:
     laws : tuple of FrictionLaw
         With one state each.
     stiffness : ndarray
-        S [Pa/m], blocks × blocks: what the stress on a block loses per slip of every block.
+        S [Pa/m], blocks × blocks: decrease of the stress on a block per slip of every block.
     normal_stress : tuple of float
         σ' [Pa] of every block.
     damping : float
@@ -64,11 +64,11 @@ class CoupledSliders:
     mass : float
         m [kg/m²]; 0: quasi-dynamic.
     flow : ndarray
-        F [1/s] of the pressures of cells or wells; without rows there are none.
+        F [1/s] of the pressures of cells or wells; empty without such pressures.
     source : ndarray
         G, rows for these pressures and columns for inputs u.
     shares : ndarray
-        Share of every such pressure (columns) in that of every block (rows) [-].
+        Share of each of these pressures (columns) in the pressure of every block (rows) [-].
     """
 
     laws: tuple[FrictionLaw, ...]
@@ -87,7 +87,7 @@ class CoupledSliders:
 
     @classmethod
     def of(cls, chain: BlockChain, *, inertia: bool = False, lag: float | None = None) -> "CoupledSliders":
-        """Blocks of a file; with a lag [s] pressures of its wells, beside what is planned, behind it."""
+        """Blocks of a chain; with a lag [s] also the lagged pressures of its wells, without the planned pressure."""
         N, m, fault = len(chain.blocks), len(chain.wells), chain.fault
         stiffness, mass = np.diag([fault.stiffness / fault.area] * N), fault.mass / fault.area
         add_springs(stiffness, chain.springs, -mass)
@@ -104,17 +104,17 @@ class CoupledSliders:
 
     @property
     def sizes(self) -> tuple[int, int]:
-        """Numbers of blocks, and of pressures of cells or wells."""
+        """Number of blocks, and number of pressures of cells or wells."""
         return len(self.laws), len(self.flow)
 
     def start(self, rates: Sequence[float], states: Sequence[float]) -> "np.ndarray":
-        """Vector y of slips [m], logarithms of rates [m/s] and states [s], and pressures [Pa], the first and last 0."""
+        """Vector y of slips (0) [m], logarithms of rates [m/s] and of states [s], and pressures (0) [Pa]."""
         require_positive("", slip_rate=min(rates), state=min(states))
         return np.concatenate([np.zeros(len(rates)), np.log(rates), np.log(states), np.zeros(len(self.flow))])
 
     @cached_property
     def _friction(self) -> list[ca.Function]:
-        """CasADi Functions (log v, log θ) → μ, ∂μ/∂log v, ∂μ/∂log θ, (log θ)', and its share of (log N)', per block."""
+        """Per block (log v, log θ) → μ, ∂μ/∂log v, ∂μ/∂log θ, (log θ)', and the factor of −(log N)' in (log θ)'."""
         known: dict[FrictionLaw, ca.Function] = {}
         for law in self.laws:
             if law not in known:
@@ -146,8 +146,8 @@ class CoupledSliders:
         ----------
         y : MX
         load : MX
-            v_∞ [m/s], pressure on all blocks beside that of cells or wells and its rate [Pa, Pa/s], τ_0 of every block
-            [Pa] where there is mass, and inputs u.
+            v_∞ [m/s], a further pressure on all blocks and its rate [Pa, Pa/s], τ_0 of every block [Pa] if there is
+            mass, and inputs u.
         stress, stress_rate : MX
             s [Pa] of every block and its rate [Pa/s].
         """
@@ -175,7 +175,7 @@ class CoupledSliders:
         return ca.vertcat(v - load[0], faster, aged, moved)
 
     def rates(self, inputs: int = 0) -> ca.Function:
-        """CasADi Function (y, load) → y', and the Jacobian where the equations are written out."""
+        """CasADi Function (y, load) → y', with the Jacobian up to `MOST_EXPANDED` blocks."""
         N, n = self.sizes
         y, load = ca.MX.sym("y", 3 * N + n), ca.MX.sym("load", 3 + N * (self.mass > 0) + inputs)
         found = ca.Function("rates", [y, load], [ca.densify(self.field(y, load))])
@@ -193,7 +193,7 @@ class CoupledSliders:
         return np.asarray(normal * mu + self.damping * np.exp(y[N : 2 * N]))
 
     def stressed(self, y: "np.ndarray", stress: "np.ndarray") -> "np.ndarray":
-        """Vector y after a step of the stress [Pa] on every block; with mass the same."""
+        """Vector y after a step of the stress [Pa] on every block; unchanged if blocks have mass."""
         from scipy.optimize import brentq
 
         if self.mass:
@@ -217,10 +217,10 @@ class CoupledSliders:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockEvent:
-    """One event of several blocks: from when the fastest passes the onset rate to when the fastest is below again."""
+    """One event of several blocks, during which the fastest block exceeds the onset rate."""
 
     onset: float  # [s]
-    arrest: float | None  # [s]; None where the run ends before
+    arrest: float | None  # [s]; None if the run ends earlier
     slip: tuple[float, ...] | None  # Of every block [m]
     peak_slip_rate: tuple[float, ...]  # Of every block [m/s]
     magnitude: float | None  # M_w [-]
@@ -228,16 +228,16 @@ class BlockEvent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlidersRun:
-    """A run of coupled blocks. Arrays of instants × blocks, or cells and wells for the pressure.
+    """A run of coupled blocks. Arrays are instants × blocks, for the pressure instants × cells or wells.
 
     Attributes
     ----------
     times, slip, slip_rate, state, pressure : ndarray
         [s], [m], [m/s], [s], [Pa].
     reference : ndarray
-        Displacement of the far end, or r of a run under a law [m].
+        Displacement of the far end, or r of a controlled run [m].
     onsets : ndarray
-        Times [s] at which the fastest block passes the onset rate.
+        Times [s] at which the fastest block rises through the onset rate.
     onset_rate, loading_rate : float
         [m/s].
     evaluations : int
@@ -290,7 +290,7 @@ class SlidersRun:
 
 
 def _run_of(sliders: CoupledSliders, times: np.ndarray, values: np.ndarray, far: Any = 0.0, *more: Any) -> SlidersRun:
-    """A run of vectors of `CoupledSliders.start`, whose far end has moved; rate of that, onsets and evaluations."""
+    """A run from vectors y and the far end's displacement; `more` are its rate, onsets, onset rate, evaluations."""
     N, (rate, onsets, onset, evaluations) = len(sliders.laws), more or (0.0, np.empty(0), math.inf, 0)
     return SlidersRun(
         times=times,
@@ -318,23 +318,23 @@ def simulate_sliders(
     method: str = "radau",
     rtol: float = _RTOL,
 ) -> SlidersRun:
-    """Follow coupled blocks that are loaded from afar.
+    """Simulate coupled blocks without control under remote loading.
 
     Parameters
     ----------
     sliders : CoupledSliders
     start : ndarray
-        Vector of `CoupledSliders.start`; the stresses at the start balance friction.
+        Vector of `CoupledSliders.start`; the initial stresses balance friction.
     duration : float
         [s].
     loading_rate : float
         v_∞ [m/s].
     inputs : sequence of (float, sequence of float)
-        Times [s] from 0 on at which inputs u change, and what they are from then on.
+        Times [s] from 0 on at which inputs u change, and their new values.
     onset_rate : float
-        [m/s], whose passing begins an event.
+        Slip rate [m/s] above which an event begins.
     times : sequence of float, optional
-        Ascending instants to return [s] beside the start, changes of inputs and the end; every step unless given.
+        Ascending instants to return [s] in addition to start, changes of inputs and end; every step unless given.
     method, rtol
         As of `simulate_state`.
     """
@@ -380,14 +380,14 @@ def natural_cycles(
     method: str = "radau",
     rtol: float = _RTOL,
 ) -> SlidersRun:
-    """Blocks loaded from afar; block i of N begins at the loading rate, with 1 + i/N times its steady state.
+    """Blocks under remote loading; block i of N starts at the loading rate with 1 + i/N times its steady state.
 
     Parameters
     ----------
     chain : BlockChain
         With rate-and-state friction.
     duration : float, optional
-        [s]; unless given as long as three events take, or a thousand times the load of the direct effect of block 1.
+        [s]; unless given, until three events are over or the load reaches 1000 times aσ' of block 1.
     loading_rate : float, optional
         v_∞ [m/s]; the reference rate of the friction of the first block unless given.
     inertia : bool
@@ -412,11 +412,11 @@ def natural_cycles(
 
 
 # ----------------------------------------------------------------------
-# Runs under a law of slow sliding.
+# Controlled runs in slow sliding.
 
 
 def planned_per_slip(chain: BlockChain) -> float:
-    """Pressure that steady sliding at the first rate of the reference needs, per slip of the reference [Pa/m]."""
+    """Pressure for steady sliding at the first rate of the reference, per slip of the reference [Pa/m]."""
     rate = float(SlidingReference(task=chain.fault.reference).first_rate)
     steady = float(chain.blocks[0].friction.steady_coefficient(rate))
     return float(chain.fault.stiffness / chain.fault.area / steady)
@@ -433,10 +433,10 @@ def simulate_held_blocks(
     inertia: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> SlidersRun:
-    """Blocks under a sampled law along the reference of slow sliding, from steady sliding at its first rate.
+    """Blocks under a sampled law that tracks the reference of slow sliding, from steady sliding at its first rate.
 
-    The planned pressure reaches the blocks as it is; what the law asks for beside it goes through the lag. The far end
-    rests. Each block has a sine of the stress, shifted by its share of a turn, which acts at once.
+    The planned pressure reaches the blocks directly; the feedback pressure passes the lag. The far end rests. A sine of
+    stress acts on block i of N from t = 0, with the phase 2πi/N, i from 0.
 
     Parameters
     ----------
@@ -455,7 +455,7 @@ def simulate_held_blocks(
     Returns
     -------
     SlidersRun
-        Four instants a period; its pressures are those of the wells beside the plan.
+        Four instants a period; its pressures are those of the wells without the planned pressure.
     """
     length, step = chain.fault.reference.operation_time if duration is None else duration, float(law.step)
     require_positive(duration=length, stress_period=period, lag=lag)

@@ -1,6 +1,6 @@
 """Natural earthquake of an uncontrolled fault, and runs that end before their event.
 
-For such a run, the time of onset is extrapolated with the growth rate of the unstable eigenvalue.
+For such a run the time of onset is extrapolated with the growth rate of the unstable eigenvalue.
 """
 
 from collections.abc import Callable
@@ -20,12 +20,12 @@ from quakedesign.symbolic import derive
 # ----------------------------------------------------------------------
 # Natural earthquake.
 
-NUDGE = 1e-9  # relative to the largest change of friction: far above rounding, without effect on the peak
+NUDGE = 1e-9  # relative to the largest change of friction: far above rounding, with no effect on the peak
 FOLDINGS = 90
 PERIODS = 100
 ENDING = 30, 10  # e-foldings and natural periods, for a growth rate far above the natural frequency
-FINENESS = 2e-3  # steps across a kink of friction have an error of second order
-STILL = 1e3  # factor above the slip rate due to the nudge alone; a smaller peak is no instability
+FINENESS = 2e-3  # of 1/ω_n; steps across a kink of friction have an error of second order
+STILL = 1e3  # factor over the slip rate due to the nudge alone; a smaller peak shows no instability
 
 _PEAKS: dict[Fault, float | None] = {}
 _MOST_PEAKS = 64
@@ -41,14 +41,13 @@ def natural_earthquake(
 ) -> LoopTrajectory:
     """Simulate an uncontrolled fault under a constant pressure and, if it is unstable, a tiny constant acceleration.
 
-    A fault with healing starts at its release. The acceleration is 1e-9 of the largest change of friction. It and the
-    step are so small that they do not change the first six digits of
-    the peak slip rate.
+    A fault with healing starts at its release. The acceleration is 1e-9 of the largest change of friction.
+    Acceleration and step are so small that the first six digits of the peak slip rate do not depend on them.
 
     Parameters
     ----------
     fault : Fault
-        Its own disturbance is replaced.
+        Its own disturbance is ignored.
     pressure : float
         Fluid pressure [Pa] from t = 0 on: 0 for a natural, positive for an induced earthquake.
     progress, compiled, plant
@@ -66,7 +65,7 @@ def natural_earthquake(
     ParameterError
         For a pressure that is not below the effective normal stress.
     SimulationError
-        When the fault is unstable but does not move.
+        If the fault is unstable but does not move.
     """
     fault.require_memoryless("the natural earthquake")
     if not abs(pressure) < fault.effective_normal_stress:
@@ -76,7 +75,7 @@ def natural_earthquake(
         )
     growth = derive(fault).eigenvalues[0].real
     nudge = event_nudge(fault) if growth > 0 else 0.0
-    law: Any = fault.friction  # without its healing, from which the nudge could not release it
+    law: Any = fault.friction  # without healing, since the nudge is too small for a release
     released = replace(fault, friction=replace(law, healing=0.0)) if law.rest_excess else fault
     nudged = released.with_disturbance(Disturbance(constant=nudge))
     step = min(fault.sampling_time, FINENESS / fault.natural_frequency)
@@ -97,8 +96,8 @@ def natural_earthquake(
 
 
 def _with_peak(earthquake: LoopTrajectory, fault: Fault, growth: float) -> LoopTrajectory:
-    """Reference event of an unstable fault, if it moves more than by the nudge alone."""
-    peak = earthquake.metrics.peak_slip_rate  # none where the run diverges
+    """Event of an unstable fault with its peak as criterion; an error if the nudge alone moves the fault."""
+    peak = earthquake.metrics.peak_slip_rate  # None if the run diverges
     if peak is not None and peak <= STILL * event_nudge(fault) / growth:
         raise SimulationError(
             f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but its simulation does not move: its peak is "
@@ -121,7 +120,7 @@ def _alone(fault: Fault) -> Fault:
 
 
 def event_nudge(fault: Fault) -> float:
-    """Acceleration [m/s²] that is small beside the forces of an event."""
+    """Acceleration [m/s²] that is small compared with that of an event."""
     low, high = fault.friction.bounds
     return NUDGE * (high - low) * fault.authority * fault.effective_normal_stress
 
@@ -138,17 +137,17 @@ class Waiting:
     """An event that has not begun."""
 
     growth: float  # Real part of the unstable eigenvalue [1/s]
-    # Time [s] at which the slip rate would reach 10 % of the natural peak, by growth at that rate from where the run
-    # ends; None for a fault that has not moved forward
+    # Time [s] at which the slip rate would reach 10 % of the natural peak, if it grows at this rate from the end of the
+    # run; None for a fault that has not moved forward
     onset: float | None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI."""
+        """Plain values in SI units."""
         return asdict(self)
 
 
 def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
-    """Event that has not begun in a run without control; None if it has begun, or if none will."""
+    """Event that has not begun in an uncontrolled run; None if it has begun, or if none is expected."""
     natural, reached = run.natural_peak, run.outcome.share_of_natural
     if run.provenance["controller"] != "none" or natural is None or reached is None or reached >= BEGUN_SHARE:
         return None

@@ -51,7 +51,7 @@ _USE_OF_ONE = {
     "limited": "Where pump or valve limit the pressure, tell it what was applied: the law does not wind up then, as in "
     "simulate --saturation; else give a null pointer.",
 }
-_PLAN = "planned pressure"  # by which laws of blocks in slow sliding are told from others
+_PLAN = "planned pressure"  # fact that only laws of blocks in slow sliding have
 _USE_OF_WELLS = {
     "told": "",
     "written": "the fluid pressure [Pa]{beside} of CONTROLLER_PRESSURES wells",
@@ -67,23 +67,23 @@ _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and
 
 @checked_dataclass(frozen=True, kw_only=True)
 class ControllerStep:
-    """What a controller does once per sample, as one function of its measurement and its memory.
+    """Sampled step of a controller as one function of its measurement and its memory.
 
     Attributes
     ----------
     function : casadi.Function
-        (measurement, applied pressure since the last sample [Pa], memory) → memory, pressure [Pa]. Of several blocks
+        (measurement, applied pressure since the last sample [Pa], memory) → memory, pressure [Pa]. For several blocks
         (measurement, memory) → memory, pressures of the wells [Pa].
     measurement : mapping of str to str
         Unit of every measured signal, in order.
     start : mapping of str to float
-        Memory before the first sample, in order, SI units.
+        Memory before the first sample, in order, in SI units.
     step : float
         Sampling period T_s [s].
     facts : mapping of str to str
-        Where it comes from: fault, law, gains, scheme, versions.
+        Provenance: fault, law, gains, scheme, versions.
     remarks : tuple of str
-        What is said first of it, a sentence each.
+        Sentences at the top of the header.
     """
 
     function: ca.Function
@@ -105,7 +105,7 @@ class ControllerStep:
         return ("pressure",) if self.limited else tuple(f"pressure_{i + 1}" for i in range(count))
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able facts."""
+        """Return the data of the step in JSON types."""
         return {
             "step": self.step,
             "measurement": dict(self.measurement),
@@ -116,7 +116,7 @@ class ControllerStep:
 
 
 def header_text(exported: ControllerStep) -> str:
-    """Header with the meaning of every number."""
+    """Text of the header with the meaning of every number."""
     measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(exported.measurement.items()))
     kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
     facts = (f"{name}: {value}" for name, value in exported.facts.items())
@@ -171,7 +171,7 @@ def _wrapped(text: str) -> list[str]:
 
 
 def _comment(lines: list[str]) -> str:
-    """Lines in one comment of C, which no text of the user can end."""
+    """Lines in one C comment, which no text of the user can terminate."""
     wrapped = [part for line in lines for part in (textwrap.wrap(" ".join(line.split()), _WIDTH) or [""])]
     safe = "\n".join(f" * {line}".rstrip() for line in wrapped).replace("*/", "* /")
     return "/*\n" + safe + "\n */\n"
@@ -182,18 +182,18 @@ def _comment(lines: list[str]) -> str:
 
 UNIT = "controller.fmu"
 _UNITS = {"m": {"m": "1"}, "m/s": {"m": "1", "s": "-1"}, "Pa": {"kg": "1", "m": "-1", "s": "-2"}}
-_BEFORE_ZIP = (1980, 1, 1, 0, 0, 0)  # the same bytes whenever it is written
+_BEFORE_ZIP = (1980, 1, 1, 0, 0, 0)  # fixed date, so that the bytes are reproducible
 _PLATFORMS = {"Linux": ("linux64", "so"), "Darwin": ("darwin64", "dylib")}
 
 
 def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
-    """Bytes of an FMU of a sampled step, and for which platform it holds a binary or why for none.
+    """Bytes of an FMU of a sampled step, and the platform of its binary or the reason why it has none.
 
-    Inputs are the measurement and, of one block, ``applied`` [Pa], what pump or valve let through of the pressure since
-    the last sample: all of it unless it is set after initialisation, and then again before every sample, since a law
-    winds up otherwise. The output ``pressure`` [Pa], of several wells ``pressure_1`` and so on, is the commanded
-    pressure since the last sample; the samples lie T_s apart from the start of the experiment. The sources lie inside,
-    so that any platform can compile them.
+    Inputs are the measurement and, for one block, ``applied`` [Pa], the pressure that pump or valve applied since the
+    last sample. It defaults to the commanded pressure; if set after initialisation, set it before every sample, since
+    the law winds up otherwise. The output ``pressure`` [Pa], for several wells ``pressure_1`` and so on, is the command
+    of the last sample. Samples are T_s apart, from the start of the experiment. The FMU contains the sources, so that
+    any platform can compile them.
 
     References
     ----------
@@ -210,7 +210,7 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
 
 
 def _binary(sources: dict[str, str]) -> tuple[dict[str, bytes], str]:
-    """Compiled interface of this platform, where a compiler works."""
+    """Compiled interface for this platform, if a compiler works."""
     if platform.system() not in _PLATFORMS or platform.machine() not in {"x86_64", "AMD64"}:
         return {}, "sources only: this platform has no name in FMI 2.0 that is built here"
     name, suffix = _PLATFORMS[platform.system()]
@@ -263,11 +263,11 @@ def _zipped(members: dict[str, bytes]) -> bytes:
 
 
 # ----------------------------------------------------------------------
-# A sampled controller as C, for the computer of a laboratory.
+# A sampled controller as C source for a laboratory computer.
 
 FILES = (HEADER, SOURCE, UNIT)
-HELD = "held_0"  # of the memory: the pressure of the sample before
-_TOLD = ("gains", "sampling")  # in other words
+HELD = "held_0"  # memory entry: the pressure of the last sample
+_TOLD = ("gains", "sampling")  # written in another form
 
 
 def controller_step(
@@ -283,22 +283,22 @@ def controller_step(
     Parameters
     ----------
     fault : Fault
-        For its reference, and its input gain where the scheme needs one.
+        Gives the reference, and the input gain if the scheme needs it.
     controller : Controller
     step : float, optional
-        T_s [s]; that of a law of samples, or the fault's sampling time, unless given.
+        T_s [s]; unless given, that of a sampled law, or else the fault's sampling time.
     scheme : str or Scheme, optional
-        One that samples; that of a law of samples, or ``explicit``, unless given. Of its measurement the part that runs
-        on the controller is kept: with a `Sensor` the slip is measured alone, else slip and slip rate, if the step uses
-        it.
+        A sampled scheme; unless given, that of a sampled law, or else ``explicit``. Only the software part of its
+        measurement is exported: with a `Sensor` the slip alone is measured, else the slip, and the slip rate if the
+        step uses it.
     remarks : tuple of str
-        Further sentences to be said first, after what is said of the T_s and of what stands behind the law.
+        Further sentences at the top of the header, after those on T_s and on the stages between controller and fault.
 
     Raises
     ------
     ParameterError
-        For a scheme that does not sample, an actuator with a motion of its own, or a step that is not positive or not
-        that of the sensor.
+        For a scheme without sampling, an actuator with dynamics between samples, or a step that is not positive or
+        differs from that of the sensor.
     """
     fault.require_memoryless("a controller in C")
     scheme, step, own = own_way(controller, scheme, step)
@@ -334,8 +334,8 @@ def export_controller(
 ) -> ControllerStep:
     """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder, all files or none.
 
-    The C has no dynamic memory and no state of its own, needs the standard mathematics library only, and gives the
-    digits of `ControllerStep.function` when compiled with ``-ffp-contract=off``.
+    The C code has no dynamic memory and no static state, needs the standard mathematics library only, and equals
+    `ControllerStep.function` bitwise when compiled with ``-ffp-contract=off``.
 
     Parameters
     ----------
@@ -346,10 +346,10 @@ def export_controller(
     step, scheme, remarks
         As in `controller_step`; step [s].
     fmu : bool
-        Write ``controller.fmu`` beside them: the same step for co-simulation with FMI 2.0, with a binary for this
-        platform where a C compiler works, and the sources.
+        Also write ``controller.fmu``: the same step for co-simulation with FMI 2.0, with the sources, and a binary for
+        this platform if a C compiler works.
     force : bool
-        Replace a folder that holds an earlier export and nothing else.
+        Replace a folder that contains an earlier export and nothing else.
 
     Returns
     -------
@@ -360,7 +360,7 @@ def export_controller(
     ParameterError
         As `controller_step`.
     OutputError
-        When the folder exists, or cannot be written.
+        If the folder exists, or cannot be written.
     """
     require_free(Path(folder), force)
     exported = controller_step(fault, controller, step=step, scheme=scheme, remarks=remarks)
@@ -384,16 +384,16 @@ def write_step(
 
 
 def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) -> ControllerStep:
-    """Sampled step of a law for several blocks, as `simulate_blocks` or `simulate_held_blocks` takes it.
+    """Sampled step of a law for several blocks, as in `simulate_blocks` or `simulate_held_blocks`.
 
     Parameters
     ----------
     chain : BlockChain
-        For its reference, and for the averages that wells measure.
+        Gives the reference, and the averages that wells measure.
     law : MatrixLaw
         Without delay, as that of a guarantee.
     remarks : tuple of str
-        Sentences to be said first.
+        Sentences at the top of the header.
 
     """
     N, states = len(chain.blocks), [f"state_{i + 1}" for i in range(len(law.update))]
@@ -418,7 +418,7 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
 
 
 def require_free(folder: Path, force: bool) -> None:
-    """Reject a folder that exists, or, where it may be replaced, holds something else than an export."""
+    """Reject an existing folder; with `force` only one that contains other files than an export."""
     if os.path.exists(folder) and not force:
         raise OutputError(
             f"the folder of an export must be new. Received {folder}, which exists. Give --force to replace it."
@@ -429,7 +429,7 @@ def require_free(folder: Path, force: bool) -> None:
 
 
 def _software(scheme: Scheme) -> Sampled:
-    """Scheme without noise, transducer and substeps; refuses what no controller can carry out."""
+    """Scheme without noise, transducer and substeps; rejects a scheme that a controller cannot execute."""
     if not isinstance(scheme, Sampled):
         raise ParameterError(f"a controller is exported with a scheme that samples. Received {scheme.name}.")
     if scheme.actuator.flowing:
@@ -442,7 +442,7 @@ def _software(scheme: Scheme) -> Sampled:
 
 
 def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> tuple[ca.Function, dict[str, float]]:
-    """CasADi Function of the step, and the memory at the start; what never changes is written into the function."""
+    """CasADi Function of the step, and its initial memory; constant entries are inserted as numbers."""
     numbers = scheme.memory(loop, step)
     names = [str(symbol) for symbol in loop.integrals] + list(numbers)
     values = [0.0] * len(loop.integrals) + list(numbers.values())
@@ -459,7 +459,7 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     own = [next(entries) if c else ca.SX(v) for v, c in zip(values, changing, strict=True)]
     push, *before = entries if count else (ca.SX(0),)
     asked, own[names.index(HELD)] = own[names.index(HELD)], applied
-    for i in range(count):  # as `Sampled` does at the sample itself, where it knows the limit
+    for i in range(count):  # anti-windup, which `Sampled` does within a sample, where it knows the limit
         own[i] = ca.if_else((asked - applied) * push > 0, before[i], own[i])
     state = ca.vertcat(measurement, ca.SX(2 - measured, 1), *own)
     moved = _after(loop, scheme, counter, state, step)
@@ -470,12 +470,12 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
 
 
 def _after(loop: ClosedLoop, scheme: Sampled, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
-    """Integral states and memory at the next sample; they do not depend on how the plant moves meanwhile."""
+    """Integral states and memory at the next sample; they do not depend on the plant's motion until then."""
     return scheme.advance(loop, integrator("rk4"), counter, state, step)[2:]
 
 
 def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
-    """Limits of use of a sampled law: another T_s, a fault that sticks, and what its pressure acts through."""
+    """Limits of use of a sampled law: another T_s, a fault at rest, and the stages between law and fault."""
     own = controller.sampling
     path = {"a delay of": own.delay, "a lag of": own.lag, "rock of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
@@ -499,7 +499,7 @@ def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, s
 
 
 def _text(value: object) -> str:
-    """Exact numbers as p/q, values by their fields that hold something."""
+    """Text of a value: exact numbers as p/q, dataclasses by their fields that are not empty."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(_text, value))}]"
     if not is_dataclass(value):

@@ -23,11 +23,11 @@ from quakedesign.simulation.closed_loop import SYMBOLS
 from quakedesign.text import shown
 
 # ----------------------------------------------------------------------
-# A perturbation φ_e of the user's, written as text.
+# User-defined perturbation φ_e as text.
 
 FUNCTIONS = ("sin", "cos", "tan", "exp", "log", "sqrt", "tanh", "atan", "Abs", "Min", "Max", "sign")
 MOST_NODES = 300
-MOST_BITS = 1024  # of an exact power
+MOST_BITS = 1024  # size limit of an exact power
 
 
 def perturbation(text: str) -> "sp.Expr":
@@ -43,12 +43,12 @@ def perturbation(text: str) -> "sp.Expr":
     Returns
     -------
     Expr
-        As `quakedesign.simulation.Load` takes it.
+        Argument of `quakedesign.simulation.Load`.
 
     Raises
     ------
     ParameterError
-        For anything else, or a value that is not a real number.
+        For other text, or a value that is not a real number.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval")
@@ -113,7 +113,7 @@ def _refusal(text: str, part: str) -> ParameterError:
 
 
 # ----------------------------------------------------------------------
-# A fluid pressure that is prescribed over time: straight lines between instants, and steps.
+# Prescribed fluid pressure: piecewise linear in time, with steps.
 
 MOST_POINTS = 4096
 _LARGEST_FILE = 1 << 20
@@ -123,14 +123,14 @@ _UNITS = {"time": "s", "pressure": "Pa"}
 
 @checked_dataclass(frozen=True, kw_only=True)
 class PressureCourse:
-    """Pressure p(t): held before the first instant and after the last, linear between, a step where one stands twice.
+    """Pressure p(t): constant before the first and after the last instant, linear between, a step at a repeated one.
 
     Attributes
     ----------
     times : tuple of float
-        [s], never descending, the same one at most twice.
+        [s], never descending, each at most twice.
     pressures : tuple of float
-        [Pa], one for each.
+        [Pa], one for each time.
     """
 
     times: tuple[float, ...]
@@ -159,19 +159,19 @@ class PressureCourse:
 
     @property
     def largest(self) -> float:
-        """[Pa]."""
+        """Largest pressure [Pa]."""
         return max(self.pressures)
 
     def before(self, time: float) -> float:
-        """Pressure [Pa] that a time [s] is reached with."""
+        """Pressure [Pa] just before a time [s]."""
         return self._at(time, int(np.searchsorted(self.times, time, side="left")))
 
     def after(self, time: float) -> float:
-        """Pressure [Pa] that a time [s] is left with."""
+        """Pressure [Pa] just after a time [s]."""
         return self._at(time, int(np.searchsorted(self.times, time, side="right")))
 
     def sampled(self, time: "np.ndarray") -> "np.ndarray":
-        """Pressures [Pa] at ascending times [s]; of a time that stands twice the one before and the one after."""
+        """Pressures [Pa] at ascending times [s]; at a repeated time those before and after the step."""
         twice = np.append(np.diff(time) == 0, False)
         return np.array([self.before(t) if early else self.after(t) for t, early in zip(time, twice, strict=True)])
 
@@ -188,8 +188,8 @@ def pressure_course(text: str) -> PressureCourse:
     Parameters
     ----------
     text : str
-        A constant; or instants as ``"0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5 MPa, 9 day: 2 MPa"``, linear between, a step
-        where one stands twice; or a path that ends in ``.csv``, its first row ``time [s],pressure [MPa]`` or with
+        A constant; or instants as ``"0 s: 0 MPa, 1 day: 0 MPa, 1 day: 5 MPa, 9 day: 2 MPa"``, linear between, with a
+        step at a repeated time; or a path that ends in ``.csv``, with the first row ``time [s],pressure [MPa]`` or
         other units.
 
     Raises
@@ -239,7 +239,7 @@ def _rows(path: str) -> Iterator[tuple[float, float]]:
 
 
 def _unit_of(name: str, column: str) -> str:
-    """Unit in a column's head such as ``pressure [MPa]``."""
+    """Unit in a column title such as ``pressure [MPa]``."""
     word, bracket, unit = column.strip().partition("[")
     if word.strip().lower() != name or not bracket or not unit.endswith("]"):
         raise UnitError(

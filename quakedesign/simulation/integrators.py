@@ -1,7 +1,7 @@
 """Integrators by name: fixed-step Runge–Kutta, and adaptive CVODES and IDAS.
 
 Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: backward differentiation formulas
-of SUNDIALS through CasADi. The last chapter tests whether a fixed step is short enough for a linear loop.
+of SUNDIALS through CasADi. The last function tests whether a fixed step is short enough for a linear loop.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -34,7 +34,7 @@ class Integrator:
         Order of convergence on smooth problems.
     nodes : tuple of Fraction
     matrix : tuple of tuple of Fraction
-        Row i holds the shares of the stages before i.
+        Row i contains the weights of the stages before i.
     weights : tuple of Fraction
     """
 
@@ -52,7 +52,7 @@ class Integrator:
         Parameters
         ----------
         field : callable
-            Time derivative of the state [1/s of its unit], given how much of the step has passed
+            Time derivative of the state [its unit per s] as a function of the passed share of the step
             [-, 0 to 1] and the state.
         state : SX, float or ndarray
         step : SX or float
@@ -71,7 +71,7 @@ class Integrator:
 
 
 class DormandPrince(Integrator):
-    """Fifth-order weights of the 5(4) pair, six stages, as Simulink's ode5."""
+    """Fifth-order method of the 5(4) pair with six stages, as Simulink's ode5."""
 
     name: ClassVar[str] = "dormand-prince"
     source: ClassVar[str] = "Dormand and Prince (1980), J. Comput. Appl. Math. 6, 19"
@@ -90,7 +90,7 @@ class DormandPrince(Integrator):
 
 
 class ClassicRungeKutta(Integrator):
-    """Fourth order with four stages."""
+    """Classic Runge–Kutta method of fourth order with four stages."""
 
     name: ClassVar[str] = "rk4"
     source: ClassVar[str] = "Kutta (1901), Z. Math. Phys. 46, 435"
@@ -102,29 +102,29 @@ class ClassicRungeKutta(Integrator):
 
 
 # ----------------------------------------------------------------------
-# What every integrator with a step of its own choice offers: solvers of the SUNDIALS family through CasADi.
+# Adaptive integrators: solvers of the SUNDIALS family through CasADi.
 
 TIGHTEST = 1e-13
 LOOSEST = 1e-3
 FLOOR = 1e-4
-_MOST_STEPS = 20000  # between two instants that are asked for
-_ITERATION_ERROR = 1e-3  # share of the tolerance; the usual 0.33 lets the slip of stiff earthquakes drift by a percent
+_MOST_STEPS = 20000  # between two requested instants
+_ITERATION_ERROR = 1e-3  # share of the tolerance; with the default 0.33 the slip of stiff earthquakes drifts by 1 %
 
 
 class StoppedError(RuntimeError):
-    """The solver could not go on; the run that asked for it says where."""
+    """The solver stopped; its caller reports the time."""
 
 
 class AdaptiveIntegrator:
-    """A solver of smooth, possibly stiff problems that meets a tolerance and answers at any instants.
+    """A solver of smooth, possibly stiff problems to a tolerance, with output at any instants.
 
-    Discontinuities are not located: CasADi's events are not used, so that a discontinuous field is the caller's to
-    refuse.
+    Discontinuities are not located, since CasADi's events are not used: the caller must reject a discontinuous
+    field.
 
     Attributes
     ----------
     name : str
-        Also that of CasADi's plugin.
+        Name of CasADi's plugin.
     """
 
     name: ClassVar[str]
@@ -145,20 +145,20 @@ class AdaptiveIntegrator:
         Parameters
         ----------
         rates : casadi.Function
-            (t [s], y, parameters) → dy/dt, and what is to be integrated along with it where there is any.
+            (t [s], y, parameters) → dy/dt, and optional integrands of quadratures.
         scales : sequence of float
-            Size of each variable; its error counts absolutely below `FLOOR` of that.
+            Size of each variable; below `FLOOR` times this size the tolerance is absolute.
         shares : sequence of float
-            Ascending instants in (0, 1], as shares of the interval, at which values are wanted.
+            Ascending output instants in (0, 1], as shares of the interval.
         rtol : float
             Tolerance of one step relative to a variable, 1e-13 … 1e-3.
         quadratures : int
-            How many integrals the second output of `rates` holds; they take no part in the choice of the step.
+            Number of integrands in the second output of `rates`; they do not influence the step size.
 
         Raises
         ------
         ParameterError
-            For another tolerance.
+            For a tolerance outside 1e-13 … 1e-3.
         """
         require_tolerance(rtol)
         size, count = rates.size1_in(1), rates.size1_in(2)
@@ -176,7 +176,7 @@ class AdaptiveIntegrator:
             "max_num_steps": _MOST_STEPS,
             "nonlin_conv_coeff": _ITERATION_ERROR,
             "disable_internal_warnings": True,
-            "show_eval_warnings": False,  # of trial steps that are too long, and rejected for it
+            "show_eval_warnings": False,  # trial steps that are too long give warnings and are rejected
         }
         solver = ca.integrator("flow", cls.name, problem, 0.0, [float(s) for s in shares], options)
         return Flow(solver, np.asarray(scales, dtype=float))
@@ -184,7 +184,7 @@ class AdaptiveIntegrator:
 
 @dataclass(frozen=True)
 class Flow:
-    """Solution over intervals of one subdivision."""
+    """Solver over intervals with a fixed subdivision."""
 
     solver: ca.Function  # casadi.Function
     scales: "np.ndarray"
@@ -197,12 +197,12 @@ class Flow:
         Returns
         -------
         tuple of ndarray
-            Shapes (variables, instants) and (integrals, instants); the latter since the start of the interval.
+            Shapes (variables, instants) and (integrals, instants); integrals start with the interval.
 
         Raises
         ------
         StoppedError
-            When the tolerance cannot be met, or a value is not finite.
+            If the tolerance cannot be met, or a value is not finite.
         """
         try:
             found = self.solver(x0=y / self.scales, p=[time, length, *parameters])
@@ -215,19 +215,19 @@ class Flow:
 
 
 def require_tolerance(rtol: float) -> None:
-    """Refuse a tolerance that no solver meets or that means nothing."""
+    """Reject a tolerance outside 1e-13 … 1e-3."""
     if not TIGHTEST <= rtol <= LOOSEST:
         raise ParameterError(f"rtol must be between {TIGHTEST} and {LOOSEST}. Received {rtol!r}.")
 
 
 def _reason(text: str) -> str:
-    """Name of the solver's own message, as in ``CV_TOO_MUCH_WORK``."""
+    """Name in the solver's message, such as ``CV_TOO_MUCH_WORK``."""
     quoted = text.split('"')
     return quoted[1] if len(quoted) > 2 else text.strip().splitlines()[-1]
 
 
 # ----------------------------------------------------------------------
-# Integrators by name: with a fixed step, or with one of their own choice.
+# Integrators by name: with a fixed step, or adaptive.
 
 
 @cache
@@ -238,29 +238,29 @@ def integrators() -> dict[str, type[Integrator]]:
 
 @cache
 def adaptive_integrators() -> dict[str, type[AdaptiveIntegrator]]:
-    """Every integrator with a step of its own choice, by name."""
+    """Every adaptive integrator, by name."""
     return {kind.name: kind for kind in (Cvodes, Idas)}
 
 
 def integrator(name: str) -> type[Integrator]:
-    """Integrator with a fixed step of a given name.
+    """Integrator with a fixed step, by its name.
 
     Raises
     ------
     ParameterError
-        When there is none.
+        For an unknown name.
     """
     require_known(name, sorted(integrators()), "method")
     return integrators()[name]
 
 
 def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
-    """Integrator of a given name, of either kind.
+    """Integrator by its name, with a fixed step or adaptive.
 
     Raises
     ------
     ParameterError
-        When there is none.
+        For an unknown name.
     """
     known = integrators() | adaptive_integrators()
     if name not in known:
@@ -273,7 +273,7 @@ def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
 
 
 class Cvodes(AdaptiveIntegrator):
-    """Orders 1 to 5, Newton's iteration with the exact Jacobian."""
+    """Backward differentiation formulas of orders 1 to 5, Newton's iteration with the exact Jacobian."""
 
     name: ClassVar[str] = "cvodes"
     source: ClassVar[str] = (
@@ -282,16 +282,16 @@ class Cvodes(AdaptiveIntegrator):
 
 
 class Idas(AdaptiveIntegrator):
-    """Orders 1 to 5 on 0 = f − y', a family of formulas other than that of `Cvodes`."""
+    """Backward differentiation formulas of orders 1 to 5 for 0 = f − y', of another family than in `Cvodes`."""
 
     name: ClassVar[str] = "idas"
     source: ClassVar[str] = "Hindmarsh et al. (2005), ACM TOMS 31, 363; Brenan, Campbell and Petzold (1996), SIAM"
 
 
 def amplification(poles: Iterable[complex], step: float, method: str = "dormand-prince") -> float:
-    """Growth per step of the fastest growing mode [-] for poles [1/s] and a step [s]; below 1 is stable.
+    """Growth per step of the fastest growing mode [-] for poles [1/s] and a step [s]; stable below 1.
 
-    For the scheme ``continuous``, where the law is part of the integrated field. A sampled law needs another test.
+    Valid for the scheme ``continuous``, where the law is part of the integrated field, not for a sampled law.
     """
     advance = integrator(method).advance
 

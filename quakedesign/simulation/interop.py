@@ -44,8 +44,8 @@ def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters:
     fault : Fault
     controller : Controller, optional
     parameters : sequence of str, optional
-        Of a fault without a controller: density [kg/m³], shear_modulus [Pa], damping [kg/s], effective_normal_stress
-        [Pa] or a quantity of its friction, such as ``critical_slip`` [m], that shall be free. They become one more
+        Free parameters of a fault without a controller: density [kg/m³], shear_modulus [Pa], damping [kg/s],
+        effective_normal_stress [Pa] or a friction parameter such as ``critical_slip`` [m]. They become one more
         input, for sensitivities and estimation.
 
     Returns
@@ -57,9 +57,9 @@ def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters:
     Raises
     ------
     UnsupportedError
-        For a law of samples.
+        For a sampled law.
     ParameterError
-        For a parameter that the fault has not, twice the same, or any beside a controller.
+        For an unknown or repeated parameter, or for any parameter if a controller is given.
     """
     if parameters:
         return _free_plant(fault, controller, tuple(parameters))
@@ -104,22 +104,22 @@ def to_iosystem(subject: Fault | Controller) -> Any:
     ----------
     subject : Fault or Controller
         A fault has the input ``p`` [Pa] and the outputs ``slip`` [m] and ``slip_rate`` [m/s]. A controller has the
-        inputs ``slip``, ``slip_rate``, ``r`` [m] and ``r_rate`` [m/s], with feed-forward of it also ``r_acceleration``
+        inputs ``slip``, ``slip_rate``, ``r`` [m] and ``r_rate`` [m/s], with feed-forward of r'' also ``r_acceleration``
         [m/s²], and the output ``p``.
 
     Returns
     -------
     control.NonlinearIOSystem
-        That of a fault is linearised by derivatives instead of differences, at rest on the side of forward slip.
+        The system of a fault is linearised with exact derivatives, not differences; at rest, for forward slip.
 
     Raises
     ------
     ParameterError
-        For anything else.
+        If `subject` is neither a fault nor a controller.
 
     Notes
     -----
-    The system of a law of samples is one in discrete time, with ``dt`` its T_s.
+    A sampled law gives a discrete-time system with ``dt`` = T_s.
     """
     if isinstance(subject, Fault):
         return _fault_system(subject)
@@ -181,7 +181,7 @@ def _controller_system(controller: Controller) -> Any:
 
 
 def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
-    """One step of the law's own scheme; states are the law's, and what the scheme keeps from one sample to the next."""
+    """One step of the law's own scheme; the states are those of the law and the memory of the scheme."""
     import control
 
     scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})
@@ -200,7 +200,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     numbers = ca.DM(found.numbers)
     pressure, after, kept, _ = found.function(ca.vertcat(*signals), state[: len(own)], numbers, state[len(own) : -1])
     later = ca.vertcat(after, kept, pressure)
-    if ca.depends_on(later, unknown):  # r'', what r and r' will be, or B0
+    if ca.depends_on(later, unknown):  # r'', future values of r and r', or B0
         raise UnsupportedError(
             "a system without a fault knows neither its input gain nor what comes next. Received a law for the scheme "
             f"{sampling}, which needs them. Use simulate, or export it."
@@ -224,13 +224,13 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
 # ----------------------------------------------------------------------
 # Faults and loops about an equilibrium, as python-control's StateSpace.
 
-_GAINS = np.exp(np.linspace(0, math.log(1e4), 1000)[1:])  # factors among which the end of stability is looked for
+_GAINS = np.exp(np.linspace(0, math.log(1e4), 1000)[1:])  # gain factors at which stability is tested
 _FREQUENCIES = 5000
-_LINEAR = 1e-9  # relative difference of twice the answer and the answer to twice
+_LINEAR = 1e-9  # tolerance of linearity: 2 f(x) against f(2 x), relative
 
 
 def resting_pressure(fault: Fault, slip: float) -> float:
-    """Pressure [Pa] at which the nominal fault rests at a slip [m] without disturbance (eq. shift at rest).
+    """Pressure [Pa] that keeps the nominal fault at rest at a slip [m] without disturbance (eq. shift at rest).
 
     Raises
     ------
@@ -261,26 +261,26 @@ def to_statespace(
     at : float
         Slip [m] of the equilibrium; the pressure is that of `resting_pressure`.
     setup : LoopSetup
-        Step, delay, lag and diffusion path. With a step the plant is one in discrete time under a pressure that is held
-        over it; a delay needs one.
+        Step, delay, lag and diffusion path. With a step the plant is in discrete time, with a zero-order hold of the
+        pressure; a delay needs a step.
     vertex : sequence of str, optional
-        ``"low"``, ``"middle"`` or ``"high"`` for the slope in slip s, the damping w and the input gain of the ranges
-        that `guarantee` is about, in place of the linearisation at a slip: ``("high", "low", "high")``.
+        ``"low"``, ``"middle"`` or ``"high"`` for the slope in slip s, the damping w and the input gain, such as
+        ``("high", "low", "high")``: a vertex of the ranges of `guarantee`, in place of the linearisation at a slip.
     disturbance : bool
-        Whether the acceleration that disturbs it [m/s²] is an input too, constant over a step.
+        Add the disturbing acceleration [m/s²] as an input, constant over a step.
     **given : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``step="184 ms"``.
 
     Returns
     -------
     control.StateSpace
-        Of deviations: input ``p`` [Pa], and ``disturbance`` [m/s²]; outputs ``slip`` [m] and ``slip_rate`` [m/s], the
-        first states; on the side of forward slip where friction has a kink.
+        In deviations: inputs ``p`` [Pa] and ``disturbance`` [m/s²] if requested; outputs ``slip`` [m] and ``slip_rate``
+        [m/s], the first states. Where friction has a kink, the derivative for forward slip.
 
     Raises
     ------
     ParameterError
-        For friction with a state, a slip that is no number, or a delay without a step.
+        For friction with a state, a slip that is not a number, or a delay without a step.
     """
     import control
 
@@ -317,7 +317,7 @@ _ENDS = ("low", "middle", "high")
 
 
 def _vertex(fault: Fault, ends: tuple[str, ...]) -> tuple[Any, Any]:
-    """A and B at ends of the ranges of s, w and input gain."""
+    """A and B at the given ends of the ranges of s, w and input gain."""
     if len(ends) != 3:
         raise ParameterError(
             "vertex must be three of low, middle and high, for slope, damping and input gain. "
@@ -339,37 +339,37 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     ----------
     fault : Fault
     controller : Controller
-        A linear law, as it is while the fault moves. One of samples has a pressure that is held over its T_s.
+        A linear law, taken as it acts while the fault moves. A sampled law has a zero-order hold over its T_s.
     at : float
         Slip [m] about which the fault is linearised.
     actuator : Actuator, optional
-        A delay, lag and rock between law and fault, which are in L; those for which a law of samples is designed unless
-        given, and none of them for an `Actuator` without stages.
+        Delay, lag and diffusion path between law and fault, which are part of L. Unless given, those for which a
+        sampled law is designed; an `Actuator` without stages has none.
 
     Returns
     -------
     control.StateSpace
-        L, from the pressure [Pa] that enters the actuator to the pressure that the law asks for, with negative
-        feedback: the closed loop is ``control.feedback(L, 1)``; in discrete time for a law of samples.
+        L, from the pressure [Pa] at the actuator's input to the pressure commanded by the law, for negative
+        feedback: the closed loop is ``control.feedback(L, 1)``. In discrete time for a sampled law.
 
     Raises
     ------
     UnsupportedError
-        For a law that is not linear, or needs more than slip and slip rate; for a stage that is not linear, or acts
-        once per sample around a law in continuous time.
+        For a law that is not linear, or needs more than slip and slip rate; for a stage that is not linear, or that
+        acts once per sample although the law is in continuous time.
     ParameterError
         As `to_statespace`.
 
     Notes
     -----
-    What is read off L is about one linear plant; `certify` and `guarantee` are about the whole box.
+    Results from L hold for one linear plant only; `certify` and `guarantee` cover the whole uncertainty box.
     """
     import control
 
     law = _linear(to_iosystem(controller.while_moving), ("slip", "slip_rate"))
     late, flowing = _between(controller, actuator)
     plant, before = to_statespace(fault, at), _linear(_flow_system(flowing), ("p",))
-    plant = plant * before if before.nstates else plant  # else everything passes at once
+    plant = plant * before if before.nstates else plant  # an actuator without states has gain 1
     if controller.sampling is not None:
         plant = _held(plant, controller.sampling.step, late)
     return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["answer"])
@@ -382,11 +382,11 @@ class LoopMargins:
     Attributes
     ----------
     stable : bool
-        Of the closed loop; without it no number is a margin.
+        Whether the closed loop is stable; if not, the numbers below are no margins.
     gain_reduction : float or None
-        Largest factor below 1 on L that destabilises [-], or of an unstable loop stabilises; None if none does.
+        Largest factor below 1 on L that destabilises the loop (stabilises an unstable one) [-]; None if none does.
     gain_margin : float or None
-        Smallest factor above 1 on L that does [-]; None if none does.
+        Smallest such factor above 1 [-]; None if there is none.
     phase_margin : float or None
         Smallest over all crossings [deg].
     modulus_margin : float
@@ -403,8 +403,8 @@ class LoopMargins:
 def loop_margins(loop: Any) -> LoopMargins:
     """Upper and lower gain margins, phase margin and modulus margin of a loop of `loop_transfer`.
 
-    Stability of a loop in discrete time may be lost at half the sampling frequency, z = −1, where
-    ``control.stability_margins`` does not look. Factors from 1e-4 to 1e4 are tried.
+    A discrete-time loop may lose stability at half the sampling frequency, z = −1, which
+    ``control.stability_margins`` omits. Factors from 1e-4 to 1e4 are tried.
 
     Parameters
     ----------
@@ -414,7 +414,7 @@ def loop_margins(loop: Any) -> LoopMargins:
     Raises
     ------
     ParameterError
-        For anything else, such as a loop with more than one input or output.
+        For another type, or for more than one input or output.
     """
     import control
 
@@ -443,7 +443,7 @@ def loop_margins(loop: Any) -> LoopMargins:
 
 
 def _edge(stable: Callable[[float], bool], factors: "np.ndarray") -> float | None:
-    """First factor where what is true of 1 is not, to one part in 10¹²; None if there is none."""
+    """First factor at which stability differs from that at factor 1, to 1e-12 relative; None if there is none."""
     at_once, inside = stable(1.0), 1.0
     for outside in factors:
         if stable(outside) != at_once:
@@ -457,14 +457,14 @@ def _edge(stable: Callable[[float], bool], factors: "np.ndarray") -> float | Non
 
 @dataclass(frozen=True)
 class _Answers:
-    """L along the edge of stability: x = ln ω of jω, or of e^{jω} up to half the sampling frequency."""
+    """L on the stability boundary jω, or e^{jω} up to half the sampling frequency, at places x = ln ω."""
 
     loop: Any
     places: "np.ndarray"
 
     @classmethod
     def of(cls, loop: Any) -> "_Answers":
-        """From frequencies far below its poles and zeros to far above."""
+        """Frequency response from far below the poles and zeros to far above them."""
         roots = np.concatenate([loop.poles(), loop.zeros()])
         known = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
         known = np.log(known[known > 1e-9 * np.max(known, initial=1.0)])
@@ -472,7 +472,7 @@ class _Answers:
         return cls(loop, np.linspace(*ends, _FREQUENCIES))
 
     def at(self, places: Any) -> Any:
-        """L there."""
+        """L at given x = ln ω."""
         return self.loop(np.exp(1j * np.exp(places)) if self.loop.dt else 1j * np.exp(places))
 
     @property
@@ -494,7 +494,7 @@ class _Answers:
 
 
 def _between(controller: Controller, actuator: Actuator | None) -> tuple[Fraction, Actuator]:
-    """Delay [s] and flowing stages between a law and its fault."""
+    """Delay [s] and continuous-time stages between a law and its fault."""
     own = controller.sampling
     if actuator is None:
         meant = Actuator() if own is None else Actuator.meant_for(replace(own, delay=Fraction(0)))
@@ -510,7 +510,7 @@ def _between(controller: Controller, actuator: Actuator | None) -> tuple[Fractio
 
 
 def _flow_system(actuator: Actuator) -> Any:
-    """Flowing stages from the pressure that is held, ``p``, to that in the fault."""
+    """Continuous-time stages from the zero-order hold's pressure ``p`` to the pressure in the fault."""
     import control
 
     numbers: list[Any] = [value for stage in actuator.flowing for value in stage.numbers]
@@ -530,17 +530,17 @@ def _flow_system(actuator: Actuator) -> Any:
 
 
 def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
-    """A plant as it is seen every step [s] under a pressure that is held as long, from a delay [s] later on.
+    """A plant sampled every step [s], with a zero-order hold of the pressure over a step after a delay [s].
 
-    Exact: with the delay m + f steps the held pressure of m + 1 samples ago acts for f steps, then that of m ago. Those
-    that wait are further states. Other inputs of the plant are constant over a step.
+    Exact: with a delay of m + f steps the pressure of m + 1 samples ago acts for f steps, then that of m samples ago.
+    The delayed pressures are further states. Other inputs of the plant are constant over a step.
     """
     import control
 
     whole, part = divmod(delay, step)
     n, waiting = plant.nstates, int(whole) + (part > 0)
     early, late = (control.sample_system(plant, float(time), method="zoh") for time in (part or step, step - part))
-    arriving = np.zeros((n, waiting + 1))  # of the pressure of now, of one sample ago, and so on
+    arriving = np.zeros((n, waiting + 1))  # effect of the present pressure, of that one sample ago, and so on
     arriving[:, int(whole)] = late.B[:, 0]
     A, B = np.zeros((n + waiting, n + waiting)), np.zeros((n + waiting, 1))
     A[:n, :n] = late.A
@@ -555,7 +555,7 @@ def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
 
 
 def _linear(system: Any, names: tuple[str, ...]) -> Any:
-    """StateSpace from the first inputs, named, to pressure of a linear system, read off unit vectors."""
+    """StateSpace of a linear system from its first inputs, by name, to the pressure, computed from unit vectors."""
     import control
 
     n, seen = system.nstates, system.ninputs

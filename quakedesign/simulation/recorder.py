@@ -16,11 +16,11 @@ from quakedesign.simulation.closed_loop import WORKS, ClosedLoop, EnergyBudget, 
 from quakedesign.simulation.integrators import Integrator
 
 # ----------------------------------------------------------------------
-# What is watched at every step, inside the compiled loop.
+# Quantities recorded at every step, inside the compiled loop.
 
 NEVER = -1.0
 LARGEST_MOTION = 1e9
-LARGEST_STATE = 1e100  # of ξ, p and h: their squares can be summed
+LARGEST_STATE = 1e100  # bound of ξ, p and h, whose squares do not overflow in sums
 
 START = {
     "max_slip_error": 0.0,
@@ -48,13 +48,13 @@ START = {
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """What the vector of a run holds."""
+    """Parts of the vector of a run."""
 
     counter: Any  # SX or ndarray: Number of the step
     settled_from: Number  # Time from which errors count [s]
     state: Any  # SX or ndarray: x1 [m], x2 [m/s], ξ, memory of the scheme
     watched: dict[str, Any]
-    factors: tuple[Number, ...]  # Numbers of the plant that a run carries along unchanged
+    factors: tuple[Number, ...]  # Factors of the plant, constant in a run
 
     def joined(self) -> ca.SX:
         """The vector (SX)."""
@@ -63,16 +63,16 @@ class Parts:
 
 @dataclass(frozen=True)
 class Recorder:
-    """The vector [counter, settled_from, x1, x2, ξ, memory…, watched…, factors…] that one step maps onto itself."""
+    """Step map of the vector [counter, settled_from, x1, x2, ξ, memory…, watched…, factors…] of a run."""
 
     loop: ClosedLoop
     scheme: Scheme
     step: float  # T_s [s]
-    initial: tuple[float, float] = (0.0, 0.0)  # x1 [m] and x2 [m/s] at the start; rest unless given
+    initial: tuple[float, float] = (0.0, 0.0)  # Initial x1 [m] and x2 [m/s]; at rest unless given
 
     @cached_property
     def memory(self) -> dict[str, float]:
-        """Memory of the scheme at the start, by name."""
+        """Initial memory of the scheme, by name."""
         return self.scheme.memory(self.loop, self.step)
 
     @cached_property
@@ -86,7 +86,7 @@ class Recorder:
         return 2 + self.state_size + len(self.watching) + len(self.loop.factors)
 
     def parts(self, vector: Any) -> "Parts":
-        """Vector, of numbers or symbols, by its parts."""
+        """Parts of a vector of numbers or symbols."""
         first = 2 + self.state_size
         entries = [vector[i] for i in range(first, self.size)]
         watched = dict(zip(self.watching, entries, strict=False))
@@ -94,7 +94,7 @@ class Recorder:
 
     @cached_property
     def watching(self) -> dict[str, float]:
-        """What is accumulated, by name, with its value at the start; with an actuator the extremes of its signals."""
+        """Accumulated quantities and their initial values, by name; with an actuator also extremes of its signals."""
         extremes = (("max", -math.inf), ("min", math.inf))
         return START | {f"{side}_{signal}": start for signal in self.scheme.described for side, start in extremes}
 
@@ -112,13 +112,13 @@ class Recorder:
         return {name: float(value) for name, value in self.parts(vector).watched.items()}
 
     def observe(self, vector: ca.SX) -> ca.SX:
-        """Vector (SX) after its own instant has been watched."""
+        """Vector (SX) after the signals of its instant have been accumulated."""
         now = self.parts(vector)
         after = self._after(now.watched, vector)
         return replace(now, watched={name: after[name] for name in self.watching}).joined()
 
     def energy(self, end: ca.SX | np.ndarray) -> EnergyBudget:
-        """Energy budget of a run from its last vector: that from rest, less what it took to get to the start."""
+        """Energy budget of a run from its last vector: the budget from rest less that of the initial state."""
         last = self.parts(end)
         slip, rate = (float(v) for v in last.state[:2])
         whole = self.loop.budget(self.watched(end), float(last.counter) * self.step, slip, rate)
@@ -126,20 +126,20 @@ class Recorder:
         return EnergyBudget(**{name: now[name] - before[name] for name in now if name != "residual"})
 
     def advance(self, vector: ca.SX, method: type[Integrator]) -> ca.SX:
-        """Vector (SX) after its own instant has been watched and one step has been taken."""
+        """Vector (SX) after accumulation at its instant and one step."""
         now, first = self.parts(vector), self.index(WORKS[0])
         meter = Meter(self.loop_of(vector), vector[first : first + len(WORKS)])
         moved = self.scheme.advance(cast(Stepped, meter), method, now.counter, now.state, self.step)
         return ca.cse([self.moved(vector, moved, meter.works)])[0]
 
     def moved(self, vector: ca.SX, state: ca.SX, done: ca.SX) -> ca.SX:
-        """Vector (SX) after its own instant has been watched, with the state and works of the next instant."""
+        """Vector (SX) after accumulation at its instant, with given state and works of the next instant."""
         now = self.parts(self.observe(vector))
         watched = now.watched | dict(zip(WORKS, (done[i] for i in range(len(WORKS))), strict=True))
         return replace(now, counter=now.counter + 1, state=state, watched=watched).joined()
 
     def index(self, name: str) -> int:
-        """Place of a watched value in the vector."""
+        """Index of an accumulated value in the vector."""
         return 2 + self.state_size + list(self.watching).index(name)
 
     def signals(self, vector: ca.SX) -> dict[str, ca.SX]:
@@ -166,7 +166,7 @@ class Recorder:
     def _after(self, before: dict[str, Number], vector: ca.SX) -> dict[str, Number]:
         now, parts, described = self.signals(vector), self.parts(vector), self.scheme.described
         settled, later = now["time"] > parts.settled_from, parts.counter > 0
-        # The plant without stick is at rest only in passing.
+        # The plant without stick does not stay at rest.
         rests: ca.SX | float = now["slip_rate"] == 0 if self.loop.sticks else 0
         slip_error = ca.if_else(settled, now["slip"] - now["reference"], 0)
         rate_error = ca.if_else(settled, now["slip_rate"] - now["reference_rate"], 0)
@@ -209,9 +209,9 @@ class Recorder:
 
 
 # ----------------------------------------------------------------------
-# The figures by which controllers are compared, computed from every step of a run.
+# Metrics for the comparison of controllers, computed from every step of a run.
 
-_FASTEST = 1e6  # m/s: far above an earthquake, and below what a plant reaches whose motion overflows
+_FASTEST = 1e6  # m/s: far above an earthquake, and below the slip rates of an overflow
 EVENTS = ("diverged", "opening", "reverse_slip", "stick", "load_reversed")
 
 
@@ -222,16 +222,16 @@ def _figure(unit: str) -> Any:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Metrics:
-    """Figures of one run; those that do not apply are None, and all of a diverged run but its peak.
+    """Metrics of one run; None if not applicable. A diverged run has its peak slip rate only.
 
     All but `peak_slip_rate`, `max_h_rate` and the two extreme pressures are taken over t > settled_from.
 
     Attributes
     ----------
     max_slip_error, rms_slip_error : float or None
-        Of x1 − r [m].
+        Largest and root mean square of x1 − r [m].
     max_slip_rate_error, rms_slip_rate_error : float or None
-        Of x2 − r' [m/s].
+        Largest and root mean square of x2 − r' [m/s].
     mise_slip, mise_slip_rate : float or None
         Mean of the squared error [m², m²/s²].
     rms_pressure : float or None
@@ -241,7 +241,7 @@ class Metrics:
     reverse_slip_fraction : float or None
         Share of the steps with x2 < 0 [-].
     time_at_rest_fraction : float or None
-        Share of the steps with x2 = 0 on the stick–slip plant [-], given without a controller too.
+        Share of the steps with x2 = 0 on the stick–slip plant [-], also without a controller.
     peak_slip_rate : float or None
         Largest |x2| of the whole run [m/s].
     max_h_rate : float or None
@@ -253,7 +253,7 @@ class Metrics:
     steps : int
         Steps taken before the end or before divergence.
     seconds : float
-        Time that the computation took [s].
+        Computing time [s].
     """
 
     max_slip_error: float | None = _figure("m")
@@ -275,27 +275,27 @@ class Metrics:
     seconds: float = field(metadata={"unit": "s"})
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures by name, as JSON can hold them."""
+        """Return the metrics by name, in JSON types."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @staticmethod
     def unit(name: str) -> str:
-        """SI unit of one figure; empty for a number."""
+        """SI unit of one metric; empty if dimensionless."""
         return _UNITS[name]
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ActuatorMetrics(Metrics):
-    """Figures of one run whose pressure reaches the fault through an actuator; extremes of the whole run.
+    """Metrics of one run with an actuator between law and fault; extremes are over the whole run.
 
     Attributes
     ----------
     max_well_pressure, min_well_pressure : float or None
-        Of the pressure at the well, behind delay, saturation and the like [Pa].
+        Pressure at the well, after delay, saturation and other stages [Pa].
     max_injected_volume, min_injected_volume : float or None
-        Of the fluid that the rock holds more than before the start, where a stage stores it [m³].
+        Fluid stored in the rock since the start, if a stage stores fluid [m³].
     max_flow_rate, min_flow_rate : float or None
-        Into the well, negative for withdrawal [m³/s].
+        Flow rate into the well, negative for withdrawal [m³/s].
     """
 
     max_well_pressure: float | None = _figure("Pa")
@@ -310,7 +310,7 @@ _UNITS: dict[str, str] = {each.name: each.metadata.get("unit", "") for each in f
 
 
 def events(watched: dict[str, float]) -> dict[str, float]:
-    """Time of the first occurrence [s] of everything that happened; what came after divergence means nothing."""
+    """Time of the first occurrence [s] of each event, without events after divergence."""
     end = watched["diverged"] if watched["diverged"] >= 0 else math.inf
     return {name: watched[name] for name in EVENTS if 0 <= watched[name] <= end}
 
@@ -326,11 +326,11 @@ def metrics(
     sticks: bool = False,
     further: Iterable[str] = (),
 ) -> Metrics:
-    """Figures from what the loop accumulated; `step` [s] is the length of one step, `further` are signals beyond p."""
+    """Metrics from accumulated values; `step` [s] is the length of one step, `further` are signals beyond p."""
     signals = list(further)
     kind = ActuatorMetrics if signals else Metrics
     if watched["diverged"] >= 0:
-        peak = watched["peak_slip_rate"]  # of a plant that stays finite where the numbers of its law overflow
+        peak = watched["peak_slip_rate"]  # valid if only the numbers of the law overflow
         known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
         return kind(**known, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
     figures = {"peak_slip_rate": watched["peak_slip_rate"]}

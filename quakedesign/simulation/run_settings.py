@@ -31,7 +31,7 @@ from quakedesign.simulation.stick_slip_plant import StickSlipLoop
 from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion
 
 # ----------------------------------------------------------------------
-# How far and how finely a run goes.
+# Duration, step and output of a run.
 
 MOST_STEPS = 10**10
 _ALMOST_A_STEP = Fraction(1, 10**6)
@@ -39,7 +39,7 @@ _ALMOST_A_STEP = Fraction(1, 10**6)
 
 @dataclass(frozen=True, slots=True)
 class RunSetting:
-    """How far and how finely to go: times in s, checked."""
+    """Step, number of steps and output of a run, with times in s, checked."""
 
     step: float
     steps: int
@@ -50,7 +50,7 @@ class RunSetting:
     def of(
         cls, fault: Fault, step: float | None, duration: float | None, samples: int, settled_from: float | None
     ) -> "RunSetting":
-        """Setting from what `simulate` was given; None stands for its defaults."""
+        """Setting from arguments of `simulate`; None selects the default."""
         task = fault.reference.operation_time
         length = _positive("duration", task if duration is None else duration)
         pace = _positive("step", fault.sampling_time if step is None else step)
@@ -73,7 +73,7 @@ def _positive(name: str, value: float) -> float:
 
 
 # ----------------------------------------------------------------------
-# From the vectors that a run kept to the trajectory that it returns.
+# Trajectory from the stored vectors of a run.
 
 
 def trajectory(
@@ -84,19 +84,19 @@ def trajectory(
     provenance: Json,
     began: tuple[float, float],
 ) -> LoopTrajectory:
-    """Trajectory from the kept vectors, of which those before a divergence are shown.
+    """Trajectory from the stored vectors before a divergence.
 
     Parameters
     ----------
     kept : ndarray
-        Vectors of the recorder, shape (their length, number of instants).
+        Vectors of the recorder, shape (length of a vector, number of instants).
     began : tuple of float
-        Readings of the clock when the work and when the stepping began [s].
+        Clock times [s] at the start of the preparation and of the stepping.
 
     Raises
     ------
     SimulationError
-        When nothing is finite, not even the start.
+        If not even the initial values are finite.
     """
     vector = ca.SX.sym("z", recorder.size)
     named = recorder.signals(vector)
@@ -123,7 +123,7 @@ def trajectory(
     )
     values = ca.Function("signals", [vector], list(named.values())).call([kept])
     columns: dict[str, Any] = {name: value.full().ravel() for name, value in zip(named, values, strict=True)}
-    if loop.controller is None:  # nothing is followed
+    if loop.controller is None:  # there is no reference to track
         columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
     columns["integrals"] = kept[4 : 4 + len(loop.integrals)]
     described = recorder.scheme.described
@@ -153,15 +153,15 @@ def sampled_scheme(
     measurement: Sensor | None = None,
     **numbers: Any,
 ) -> Scheme:
-    """Scheme with what lies around the controller, as `simulate` takes it.
+    """Scheme with the loop setup of the controller, from the arguments of `simulate`.
 
-    An actuator without stages and a measurement without noise are none, which every scheme takes. The numbers are those
-    that a law of samples has for its scheme, see `own_way`.
+    An actuator without stages and a measurement without noise are ignored, so that every scheme accepts them. `numbers`
+    are those of a sampled law for its scheme, see `own_way`.
 
     Raises
     ------
     ParameterError
-        For an unknown name, for settings that the scheme does not have, or that are given beside a scheme.
+        For an unknown name, for settings that the scheme does not have, or for settings in addition to a `Scheme`.
     """
     settings: dict[str, Any] = numbers | ({"substeps": substeps} if substeps != 1 else {})
     settings |= {"actuator": actuator} if actuator is not None and actuator.stages else {}
@@ -178,7 +178,7 @@ def sampled_scheme(
 def own_path(
     controller: Controller | None, actuator: Actuator | None, substeps: int = 1
 ) -> tuple[Actuator | None, int]:
-    """Actuator and substeps of a named scheme: as told, else what a law of samples is for, and what it needs."""
+    """Actuator and substeps of a named scheme: as given, else those for which a sampled law is designed."""
     sampling = controller.sampling if controller else None
     if actuator is not None or sampling is None:
         return actuator, substeps
@@ -189,9 +189,9 @@ def own_path(
 def by_no_clock(
     controller: Controller | None, scheme: str | Scheme, step: float | None, numbers: dict[str, Any]
 ) -> tuple[float | None, dict[str, Any]]:
-    """Step [s] and numbers of a run; of a law whose samples follow no clock a part of the shortest interval, and those.
+    """Step [s] and numbers of a run; with aperiodic sampling a fraction of the shortest interval, and the intervals.
 
-    A scheme that is no name has its own intervals, or a clock.
+    A `Scheme` has its own intervals, or is periodic.
     """
     sampling = controller.sampling if controller else None
     clock = getattr(scheme, "clock", None)
@@ -214,7 +214,7 @@ def loop_class(plant: str | None) -> type[ClosedLoop]:
     Raises
     ------
     ParameterError
-        When there is none of that name.
+        For an unknown name.
     """
     name = STICK_SLIP if plant is None else _EARLIER.get(plant, plant)
     require_known(name, _LOOPS, "plant")
@@ -271,7 +271,7 @@ def run_adaptive(
 
 
 def _step(recorder: Recorder, method: type[Integrator]) -> ca.Function:
-    """CasADi Function of the vector: one step."""
+    """CasADi Function that advances the vector by one step."""
     before = ca.SX.sym("z", recorder.size)
     return ca.Function(STEP, [before], [recorder.advance(before, method)])
 
@@ -303,7 +303,7 @@ def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveInte
 
 
 def library_versions(*packages: str) -> dict[str, str]:
-    """Installed version of each package, as provenance."""
+    """Installed version of each package, for the provenance."""
     return {f"version_{package}": _version(package) for package in packages}
 
 

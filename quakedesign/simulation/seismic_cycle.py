@@ -1,4 +1,4 @@
-"""Run of a fault with friction state without control: slip events (nucleation, onset, arrest), cycle and outcome."""
+"""Uncontrolled run of a fault whose friction has a state: slip events (nucleation, onset, arrest), cycle, outcome."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,44 +14,44 @@ from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, Outcome, Traject
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlipEvent:
-    """One event of a fault, as far as the run shows it."""
+    """One slip event of a fault, as far as the run covers it."""
 
     # Time [s] at which the slip rate last rose through the loading rate before the onset; None if it began above
     nucleation: float | None
-    onset: float  # Time [s] at which it rises through the `onset_rate` of the run
-    # Time [s] at which it falls below that again; None where the run ends before, as are the three last ones then
+    onset: float  # Time [s] at which the slip rate rises through the `onset_rate` of the run
+    # Time [s] at which it falls below that again; None, with the last three fields, if the run ends earlier
     arrest: float | None
     peak_slip_rate: float  # [m/s]
     slip: float | None  # From onset to arrest [m]
-    moment: float | None  # GA times that slip [N·m]
+    moment: float | None  # G·A times the slip [N·m]
     magnitude: float | None  # M_w of that moment [-]
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class StateTrajectory(Trajectory):
-    """One run of a spring-slider without control; see `Trajectory`.
+    """One uncontrolled run of a spring-slider; see `Trajectory`.
 
-    At a step of the pressure an instant occurs twice, before and after.
+    At a step of the pressure an instant occurs twice, before and after the step.
 
     Attributes
     ----------
     load_point, stretch : ndarray
         Displacement of the load point, and stretch of the spring [m], shape (n,).
     states : ndarray
-        State of friction, shape (number of variables, n), named `state_names`, in `state_units`.
+        State variables of friction, shape (number of variables, n), with `state_names` and `state_units`.
     state_names, state_units : tuple of str
     imbalance : ndarray
         Driving minus resisting stress over normal stress [-], shape (n,), which accelerates the mass.
-        Without mass it must vanish, and its value is an integration error.
+        Without mass it is zero but for the integration error.
     onsets : ndarray
         Times [s] at which the slip rate rises through `onset_rate`.
     onset_rate, loading_rate : float
         [m/s]; the latter is the largest v_∞.
     dynamic_rate, moment_per_slip : float
-        aσ'A/(η + √(km)) [m/s] and G·A [N]; infinite and nan of a `SpringSlider`, which is no fault.
+        aσ'A/(η + √(km)) [m/s] and G·A [N]; infinite and nan for a `SpringSlider`.
     energy : EnergyBudget
-        [J], of the fault, or of 1 m² of a `SpringSlider`. Works are forces along the path through the instants of
-        `time`; without mass the residual is the work of `imbalance`.
+        [J], of the fault, or of 1 m² of a `SpringSlider`. Each work is a force integrated along the path through the
+        instants of `time`; without mass the residual is the work of `imbalance`.
     """
 
     load_point: "np.ndarray" = signal("displacement of the load point", "m")
@@ -72,7 +72,7 @@ class StateTrajectory(Trajectory):
 
     @property
     def outcome(self) -> Outcome:
-        """``earthquake`` where a tenth of `dynamic_rate` is reached, ``slow slip`` with an event, or else ``creep``."""
+        """``earthquake`` if a tenth of `dynamic_rate` is reached, else ``slow slip`` with an event, else ``creep``."""
         peak = self.metrics.peak_slip_rate
         if peak is None:
             return Outcome(kind="unknown", peak_slip_rate=None, share_of_natural=None)
@@ -87,7 +87,7 @@ class StateTrajectory(Trajectory):
 
     @property
     def cycle(self) -> dict[str, float | None]:
-        """Recurrence interval [s], slip [m] and magnitude of the last one that is complete; None for none."""
+        """Last recurrence interval [s], and slip [m] and magnitude of the last complete event; None without one."""
         intervals = [later.onset - event.onset for event, later in pairwise(self.slip_events)]
         whole = [event for event in self.slip_events if event.arrest is not None]
         return {
@@ -116,7 +116,7 @@ class StateTrajectory(Trajectory):
         )
 
     def _last_rise(self, before: float) -> float | None:
-        """Last time [s] before another at which the logarithm of the slip rate, linear in time, rises through v_∞."""
+        """Last time [s] before a given one at which log(slip rate), linear between instants, rises through log v_∞."""
         if self.loading_rate <= 0:
             return None
         ahead = np.log(self.slip_rate[self.time <= before]) - np.log(self.loading_rate)
@@ -133,7 +133,7 @@ class StateTrajectory(Trajectory):
 
     @property
     def event_slips(self) -> "np.ndarray":
-        """Slip [m] of every event that has ended: from its onset until the slip rate is back at `onset_rate`.
+        """Slip [m] of every finished event, from its onset until the slip rate falls to `onset_rate` again.
 
         Linear interpolation between the instants of `time`. `Fault.moment_of` gives the seismic moment.
         """
@@ -142,11 +142,11 @@ class StateTrajectory(Trajectory):
 
     @property
     def arrests(self) -> "np.ndarray":
-        """Times [s] at which the slip rate is back at `onset_rate`, of every event that has ended."""
+        """Times [s] at which the slip rate falls to `onset_rate` again, one for every finished event."""
         return self._at_arrest(self.time)
 
     def _at_arrest(self, values: "np.ndarray") -> "np.ndarray":
-        """Values where the slip rate falls through `onset_rate` after every onset, by linear interpolation."""
+        """Values at which the slip rate falls through `onset_rate` after each onset, by linear interpolation."""
         below = self.slip_rate <= self.onset_rate
         falls = np.flatnonzero(~below[:-1] & below[1:]).tolist()
         ends = [next((i for i in falls if self.time[i + 1] > onset), None) for onset in self.onsets]

@@ -37,15 +37,15 @@ _KEPT = 20_000
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Study:
-    """Largest errors of several schemes over one parameter.
+    """Largest errors of several schemes against one parameter.
 
     Attributes
     ----------
     title : str
     label, unit : str
-        Of the parameter.
+        Name and unit of the parameter.
     levels : tuple of float
-        Its values.
+        Values of the parameter.
     errors : mapping of str to mapping
         Largest errors at every level, by scheme and by the names of `QUANTITIES`; infinite for a run that diverged.
     """
@@ -57,7 +57,7 @@ class Study:
     errors: Mapping[str, Mapping[str, tuple[float, ...]]]
 
     def rows(self) -> list[Json]:
-        """One row a scheme and level."""
+        """One row per scheme and level."""
         return [
             {"scheme": scheme, self.label: level} | {name: values[i] for name, values in found.items()}
             for scheme, found in self.errors.items()
@@ -71,9 +71,9 @@ class Study:
         return pd.DataFrame(self.rows())
 
     def orders(self) -> dict[str, dict[str, float | None]]:
-        """Exponent n of error ~ levelⁿ by scheme and quantity: slope of the line of least squares in logarithms.
+        """Exponent n of error ~ levelⁿ by scheme and quantity, by least squares in logarithms.
 
-        None where a run diverged or left no error.
+        None if a run diverged or an error is zero.
         """
         return {
             scheme: {name: _slope(self.levels, values) for name, values in found.items()}
@@ -81,7 +81,7 @@ class Study:
         }
 
     def to_dict(self) -> Json:
-        """JSON-able facts; null stands for a run that diverged."""
+        """Return the study in JSON types; null marks a run that diverged."""
         errors = {
             scheme: {name: [v if math.isfinite(v) else None for v in values] for name, values in found.items()}
             for scheme, found in self.errors.items()
@@ -89,7 +89,7 @@ class Study:
         return {k: getattr(self, k) for k in ("title", "label", "unit")} | {"levels": [*self.levels], "errors": errors}
 
     def figure(self) -> "Figure":
-        """Return a matplotlib Figure with one panel a quantity, one line a scheme."""
+        """Return a matplotlib Figure with one panel per quantity and one line per scheme."""
         from matplotlib.figure import Figure
 
         shown = list(next(iter(self.errors.values())))
@@ -122,7 +122,7 @@ def accuracy(
     duration: float,
     settled_from: float,
 ) -> Study:
-    """Errors of a sliding mode against the sampling period, on the plant without stick, for which orders are known.
+    """Errors of a sliding mode against the sampling period, on the plant without stick, where orders are known.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def accuracy(
         T_s [s].
     schemes : sequence of str
     duration, settled_from : float
-        Length of every run, and time from which errors count [s].
+        Duration of every run, and time from which errors count [s].
 
     Returns
     -------
@@ -175,7 +175,7 @@ def noise_sensitivity(
     duration: float | None = None,
     plant: str | None = None,
 ) -> Study:
-    """Errors against the noise of the measurement.
+    """Errors against the measurement noise.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def noise_sensitivity(
     levels : sequence of float
         Standard deviations, in the unit of `of`.
     of : str
-        ``"slip_noise"`` [m] or ``"rate_noise"`` [m/s]; the other one is 0.
+        ``"slip_noise"`` [m] or ``"rate_noise"`` [m/s]; the other noise is 0.
     schemes : sequence of str
     seed : int
     duration : float, optional
@@ -214,10 +214,10 @@ def gain_sensitivity(
     duration: float | None = None,
     plant: str | None = None,
 ) -> Study:
-    """Errors against the true input gain, over the whole range of β = μN̂/(μ0N̂0) that the fault's box allows.
+    """Errors against the true input gain, over the whole range of β = μN̂/(μ0N̂0) in the fault's box.
 
-    At every level N̂ is chosen such that β at rest is that level times the geometric middle of the box, which is what
-    the scheme ``compensated`` assumes; the run then lowers β further as friction weakens.
+    At every level, N̂ is chosen such that β at rest is the level times the geometric mean of the box, which the
+    scheme ``compensated`` assumes. In the run β decreases further as friction weakens.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def _study(
 
 
 def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
-    """Largest errors of a run; that of e3 from the instants that it keeps."""
+    """Largest errors of a run; that of e3 from the returned instants alone."""
     metrics, infinite = run.metrics, math.inf
     errors = {"slip_error": metrics.max_slip_error, "slip_rate_error": metrics.max_slip_rate_error}
     if "diverged" in run.events:

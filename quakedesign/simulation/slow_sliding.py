@@ -31,12 +31,12 @@ PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class SlidingRun(LoopTrajectory):
-    """One run of a law around slow sliding: four instants a period, all of them kept; no energy.
+    """One controlled run in slow sliding, with four instants a period and without an energy budget.
 
     Attributes
     ----------
     theta, asked, stress : ndarray
-        State of friction [s], pressure that the law asks for beside that of the reference, and shear stress disturbance
+        State of friction [s], feedback pressure commanded in addition to the planned one, and shear stress disturbance
         [Pa], shape (n,).
     """
 
@@ -45,7 +45,7 @@ class SlidingRun(LoopTrajectory):
     stress: "np.ndarray" = signal("shear stress disturbance", "Pa")
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
-        """Values, long name and SI unit of every signal that this run has, by name."""
+        """Values, long name and SI unit of every signal of this run, by name."""
         return super().signals() | {"slip_error": (self.slip - self.reference, "slip less that of the reference", "m")}
 
 
@@ -68,36 +68,36 @@ def simulate_sliding(
     method: str = "cvodes",
     progress: Callable[[float], None] = lambda _: None,
 ) -> SlidingRun:
-    """Let a fault slip along r of `SlidingReference`, from steady sliding at its first rate V.
+    """Simulate a controlled fault that tracks r of `SlidingReference`, from steady sliding at its first rate V.
 
-    The far end rests. The pressure that the nominal fault needs at V at the slip r, kr/(μ*A), is planned ahead and
-    reaches the fault as it is; the law sees the slip error at every sample, and what it asks for is held and goes
-    through the lag and the rock.
+    The far end rests. The planned pressure kr/(μ*A), with which the nominal fault slides at V at the slip r, reaches
+    the fault directly. The law measures the slip error at every sample; the pressure that it commands in addition
+    passes a zero-order hold, the lag and the diffusion path.
 
     Parameters
     ----------
     fault : Fault
         With one state; its table of disturbances is not used.
     law : LinearLaw
-        Of the slip error alone [m → Pa].
+        From the slip error alone [m → Pa].
     step : Fraction
         T_s [s].
     lag, diffusion, stages : Fraction, Fraction, tuple of SampledStage
-        As of `PressurePath`.
+        As in `PressurePath`.
     transducer : Transducer, optional
-        That the slip is read with; exact unless given.
+        Transducer of the slip; exact unless given.
     tide : Tide, optional
         None: no disturbance.
     variation : SlidingVariation, optional
-        True constants other than the nominal ones; the fault slides steadily at V at the start all the same.
+        True constants that differ from the nominal ones; the fault still starts in steady sliding at V.
     duration : float, optional
         [s]; the operation time unless given.
     pressure_per_slip : float, optional
-        Of the plan [Pa/m]; k/(μ*A) of the nominal fault unless given.
+        Planned pressure per slip [Pa/m]; k/(μ*A) of the nominal fault unless given.
     settled_from : float, optional
         Time [s] from which errors count; a quarter of the operation time, or of a shorter run.
     samples : int, optional
-        About how many instants to keep; all unless given. Metrics are taken from all.
+        Approximate number of instants to return; all unless given. Metrics use all instants.
     inertia : bool
         Whether the fault has its mass.
     method : str
@@ -106,7 +106,7 @@ def simulate_sliding(
     Returns
     -------
     SlidingRun
-        One that opens ends there; one with which the solver cannot go on has diverged, and has no metrics.
+        It ends if the fault opens. If the solver stops, the run has diverged and has no metrics.
     """
     if len(fault.friction.state_names) != 1 or not law.of_slip_alone:
         raise ParameterError(
@@ -137,7 +137,7 @@ def simulate_sliding(
             "sum_square_slip_rate_error": float(np.sum(rate_error**2)),
             "sum_square_pressure": float(np.sum(applied**2)),
             "pressure_variation": float(np.sum(np.abs(np.diff(applied)))),
-            "reverse_count": 0.0,  # the logarithm of the slip rate is what is integrated
+            "reverse_count": 0.0,  # the logarithm of the slip rate is integrated
             "max_h_change": math.nan,
             "max_pressure": float(pressure.max()),
             "min_pressure": float(pressure.min()),
@@ -194,7 +194,7 @@ def simulate_sliding(
 
 @dataclass(frozen=True)
 class _Loop:
-    """Plant between samples: slip, stretch (with the stress over the stiffness), log rate and log state."""
+    """Plant between samples: slip, stretch plus tide over stiffness, log rate and log state."""
 
     slider: SpringSlider
     reference: SlidingReference
@@ -220,24 +220,24 @@ class _Loop:
 
     @property
     def start(self) -> "np.ndarray":
-        """In steady sliding, but that the stress of the tide has come at once."""
+        """Vector after a step of the tide's initial stress in steady sliding."""
         y = np.array(self.slider.start(float(self.reference.first_rate)))
         y[1] += self.tide.at(0.0) / self.slider.stiffness
         return self.slider.stepped(y, 0.0, 0.0)
 
     def planned(self, time: Any) -> Any:
-        """Pressure [Pa] that the nominal fault needs at its first rate at a time [s]."""
+        """Planned pressure [Pa] at a time [s]."""
         return self.pressure_per_slip * self.reference.slip(time)
 
     def pressure(self, time: Any, held: Any, since: Any, modes: Any, exp: Callable[[Any], Any] = np.exp) -> Any:
-        """Pressure [Pa] of the fault at a time [s], `since` [s] after the law asked for `held` [Pa]."""
+        """Pressure [Pa] in the fault at a time [s], `since` [s] after the hold changed to `held` [Pa]."""
         direct, layered = held * (1 - sum(self.share)), 0
         for i, (rate, share) in enumerate(zip(self.decay, self.share, strict=True)):
             layered = layered + share * (held + (modes[i] - held) * exp(-rate * since))
         return self.planned(time) + direct + layered
 
     def rates(self) -> ca.Function:
-        """CasADi Function (t, y, (held pressure, its time, modes)) → dy/dt."""
+        """CasADi Function (t, y, (held pressure, time of its change, modes)) → dy/dt."""
         time, y, told = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("told", 2 + len(self.decay))
         pressure = self.pressure(time, told[0], time - told[1], told[2:], ca.exp)
         turn = 2 * math.pi / self.tide.period
@@ -249,7 +249,7 @@ class _Loop:
 def _followed(
     loop: _Loop, law: LinearLaw, around: Instruments, length: float, method: str, progress: Callable[[float], None]
 ) -> tuple["np.ndarray", dict[str, float]]:
-    """Rows of (time, y, asked, pressure), and what ends them: when the fault opens, or nothing can go on."""
+    """Rows of (time, y, commanded pressure, pressure), and the event that ends them: opening or divergence."""
     sizes = [float(loop.slider.law.critical_slip)] * 2 + [1.0, 1.0]  # type: ignore[attr-defined]
     flow = adaptive_integrators()[method].flow(loop.rates(), sizes, _SHARES, rtol=_RTOL)
     own, fed, output = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output))
@@ -278,7 +278,7 @@ def _followed(
 
 
 def criterion_of(fault: Fault) -> OutcomeCriterion:
-    """What the outcome of a run in slow sliding is decided by; the natural peak takes a cycle to know."""
+    """Criterion for the outcome of a run in slow sliding, without a natural peak, which would need a cycle."""
     reference = SlidingReference(task=fault.reference)
     return OutcomeCriterion(
         natural_peak=None,

@@ -1,6 +1,6 @@
 """Adaptive integration of smooth equations with CVODES or IDAS, and level crossings.
 
-Output intervals are so short that the solution is nearly linear in each, so that no earthquake is missed.
+The solution is nearly linear within each output interval, so that no earthquake is missed.
 """
 
 from collections import deque
@@ -16,11 +16,11 @@ from quakedesign.errors import SimulationError, require_known
 from quakedesign.simulation.integrators import Flow, StoppedError, adaptive_integrators, require_tolerance
 
 # ----------------------------------------------------------------------
-# CVODES and IDAS of CasADi as a solver of SciPy's `solve_ivp`, whose steps are nearly straight lines.
+# CVODES and IDAS of CasADi as a solver for SciPy's `solve_ivp`, with nearly linear steps.
 #
-# A solver that is evaluated only at given times misses an earthquake between two of them. Here intervals are taken
-# so short that in the middle of each of their pieces, the steps, the value is nearly the mean of its ends. Slopes are
-# not used: those of a stiff problem are lost in rounding.
+# A solver that is evaluated only at given times misses an earthquake between two of them. Here intervals are so short
+# that the value in the middle of each of their pieces, the steps, is nearly the mean of the values at its ends. Slopes
+# are not used, since those of a stiff problem are lost in rounding.
 
 AGREEMENT = 0.02
 """Share of the size of a variable that a straight line may miss."""
@@ -31,16 +31,16 @@ _SHORTEST = 1e-15
 
 
 class Resolved(OdeSolver):  # type: ignore[misc]
-    """Steps of an interval at a time.
+    """SciPy solver that computes the steps of one interval at a time.
 
     Parameters
     ----------
     fun, t0, y0, t_bound, vectorized
         As of SciPy's `OdeSolver`.
     pieces, whole : Flow
-        Over an interval, at `SHARES` of it, and with its end alone.
+        Solvers over an interval, with output at `SHARES` of it, and at its end alone.
     parameters : list of float
-        Of both.
+        Parameters of both.
     """
 
     t: float
@@ -65,7 +65,7 @@ class Resolved(OdeSolver):  # type: ignore[misc]
         return True, None
 
     def _look_ahead(self) -> None:
-        """Points of the first pieces of an interval that are nearly straight; none if it is too long."""
+        """Append the ends of the first nearly linear pieces of an interval; none if the interval is too long."""
         length = self._length = min(self._length, self.t_bound - self.t)
         shortest = length < _SHORTEST * self.t_bound
         try:
@@ -92,12 +92,12 @@ class Resolved(OdeSolver):  # type: ignore[misc]
         return _Between(self, {self.t_old: self._before, self.t: self.y})
 
     def follow(self, start: float, y: np.ndarray, time: float) -> np.ndarray:
-        """Value at a time [s] from that at another."""
+        """Value at a time [s] from the value y at time `start` [s]."""
         return self._whole.follow(start, time - start, y, self._parameters)[0][:, -1]
 
 
 class _Between(DenseOutput):  # type: ignore[misc]
-    """Values within a step, of the solver itself; its ends are as they are known."""
+    """Values within a step, computed by the solver; at its ends the known values."""
 
     def __init__(self, solver: Resolved, known: dict[float, np.ndarray]) -> None:
         super().__init__(solver.t_old, solver.t)
@@ -113,9 +113,9 @@ class _Between(DenseOutput):  # type: ignore[misc]
 
 
 # ----------------------------------------------------------------------
-# Integration of smooth differential equations to a tolerance, with crossings of one level found on the way.
+# Integration of smooth differential equations to a tolerance, with detection of crossings of one level.
 
-_FRESH = 1.0  # s; what a clock reads at most that a new one would not help, for it tells 1e-16 s apart
+_FRESH = 1.0  # s; before this time a new time origin would not help, since floats resolve about 1e-16 s
 Field = Callable[[float, np.ndarray], np.ndarray]
 METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
@@ -135,7 +135,7 @@ class Ramp:
 
 @dataclass(frozen=True)
 class SmoothSolution:
-    """Instants [s], shape (n,); values there, shape (variables, n); instants at which the level was crossed [s]."""
+    """Instants [s], shape (n,); values at these, shape (variables, n); instants of upward level crossings [s]."""
 
     time: "np.ndarray"
     values: "np.ndarray"
@@ -148,18 +148,18 @@ class SmoothProblem:
     """y' = f(y, load(t)) in the variables of a CasADi Function (y, load) → f, ∂f/∂y."""
 
     rates: ca.Function
-    scales: "np.ndarray"  # Size of each variable below which its error counts absolutely
-    # Index of the variable whose upward crossings of `level` are found, or of those of which the largest is watched
+    scales: "np.ndarray"  # Size of each variable below which its tolerance is absolute
+    # Index of the variable whose upward crossings of `level` are detected, or slice of variables with the largest used
     watched: int | slice
     level: float
 
     def integrate(
         self, start: "np.ndarray", load: Ramp, times: "np.ndarray", *, every_step: bool, method: str, rtol: float
     ) -> SmoothSolution:
-        """Follow the equations from times[0] to times[-1], with a clock that starts with them.
+        """Integrate the equations from times[0] to times[-1], with times[0] as origin of time.
 
-        After years the steps of an earthquake are shorter than what floats of the absolute time can tell apart. Where
-        radau stops for this reason it goes on with a new clock.
+        After years the steps of an earthquake are shorter than the resolution of the absolute time in floats. If
+        radau stops for this reason, it continues with a new origin of time.
 
         Parameters
         ----------
@@ -168,18 +168,18 @@ class SmoothProblem:
         every_step : bool
             Return the accepted steps of the method; otherwise the values at `times`.
         method : str
-            ``"dop853"`` (explicit, order 8; its interpolant of order 7 serves the instants) or ``"radau"`` (implicit,
-            order 5, for stiff problems; it stops at each instant), or ``"cvodes"`` or ``"idas"`` (implicit, orders 1 to
-            5; points as close as a cubic needs take the place of accepted steps).
+            ``"dop853"`` (explicit, order 8, output by its interpolant of order 7), ``"radau"`` (implicit, order 5, for
+            stiff problems, with a step end at each instant), or ``"cvodes"`` or ``"idas"`` (implicit, orders 1 to 5;
+            nearly linear pieces replace the accepted steps).
         rtol : float
-            Tolerance of one step, relative beyond `scales`.
+            Tolerance of one step, relative to variables larger than `scales`, absolute below.
 
         Raises
         ------
         ParameterError
             For an unknown method, or a tolerance outside 1e-13 … 1e-3.
         SimulationError
-            When the method cannot go on.
+            If the method stops.
         """
         known = (*METHODS, *adaptive_integrators())
         require_known(method, known, "method")
@@ -201,7 +201,7 @@ class SmoothProblem:
         for span in spans:
             begin, reached = float(span[0]), False
             while not reached:
-                with np.errstate(over="ignore", invalid="ignore"):  # of trial steps that are too long, and rejected
+                with np.errstate(over="ignore", invalid="ignore"):  # in trial steps that are too long, and rejected
                     part = solve_ivp(
                         field,
                         (begin - clock, span[-1] - clock),
@@ -228,7 +228,7 @@ class SmoothProblem:
         return SmoothSolution(np.concatenate([t for t, _ in pieces]), values, np.concatenate(crossed), evaluations)
 
     def _solver(self, method: str, load: Ramp, rtol: float) -> tuple[Field, dict[str, Any]]:
-        """Field, solver of SciPy, and what it takes beside instants and tolerances."""
+        """Field, and the arguments of `solve_ivp` for the method."""
         field = _Bound.of(self.rates, 0, load, np.empty(self.rates.size1_in(0))).at
         if method not in adaptive_integrators():
             more = {"jac": self._jacobian(load)} if method == "radau" else {}
@@ -258,7 +258,7 @@ class SmoothProblem:
 
 @dataclass(frozen=True)
 class _Bound:
-    """One output of a CasADi Function, evaluated through its buffers, which must live as long."""
+    """One output of a CasADi Function, evaluated through its buffers, which must stay alive with it."""
 
     load: Ramp
     state: "np.ndarray"
@@ -280,7 +280,7 @@ class _Bound:
         return cls(load, state, given, result, evaluate, (dense, buffer))
 
     def at(self, time: float, y: "np.ndarray") -> "np.ndarray":
-        """Result at a time [s] and a state; a matrix comes out transposed, as CasADi stores columns first."""
+        """Result at a time [s] and a state; a matrix is transposed, since CasADi stores it by columns."""
         self.state[:] = y
         self.given[:] = self.load.at(time)
         self.evaluate()

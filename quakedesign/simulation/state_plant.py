@@ -1,6 +1,6 @@
 """Spring-sliders with rate-and-state friction in logarithms of slip rate and state.
 
-The second chapter holds the conditions of a run in slow sliding: tide, deviation of the true constants
+The second chapter gives the conditions of a run in slow sliding: tide, deviation of the true constants
 from the nominal ones, pressure path, and instruments with their memory.
 """
 
@@ -32,7 +32,7 @@ from quakedesign.symbolic.rate_and_state_plant import loading_rate, rate, state_
 # Spring-sliders whose friction has a state, as differential equations in logarithms of rate and state.
 
 slip, stretch, pressure_rate = sp.symbols("slip stretch pressure_rate", real=True)
-_WIDEST = 1e3  # change of the logarithm of a rate that is looked for
+_WIDEST = 1e3  # largest change of the logarithm of a rate in a step
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -40,8 +40,8 @@ class SpringSlider:
     """A block per unit of area: mass·v' = stiffness·stretch − (normal_stress − p)·μ(slip, v, state) − damping·v.
 
     The stretch of the spring grows with the loading rate less the slip rate. Without mass the balance of forces is a
-    constraint, which its time derivative turns into v' (quasi-dynamic; needs (normal_stress − p)·∂μ/∂v + damping > 0).
-    The pressure p changes the state as well, if the law says so (`FrictionLaw.stress_exponents`).
+    constraint, whose time derivative gives v' (quasi-dynamic; needs (normal_stress − p)·∂μ/∂v + damping > 0).
+    The pressure p also changes the state if the law has `FrictionLaw.stress_exponents`.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class SpringSlider:
     stiffness : float
         [Pa/m], positive.
     normal_stress : float
-        Effective normal stress [Pa] where p = 0, positive.
+        Effective normal stress [Pa] at p = 0, positive.
     damping : float
         [Pa·s/m], not negative.
     mass : float
@@ -58,7 +58,7 @@ class SpringSlider:
     Raises
     ------
     ParameterError
-        When a value is outside its range.
+        If a value is outside its range.
     """
 
     law: FrictionLaw
@@ -92,7 +92,7 @@ class SpringSlider:
 
     @property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
-        """Exact values for the symbols of the force balance, of an area of 1 m²; a massless block has any mass."""
+        """Exact values for the symbols of the force balance of 1 m²; the mass of a massless block is arbitrary."""
         held = {
             plant.m: self.mass or 1.0,
             plant.k: self.stiffness,
@@ -104,7 +104,7 @@ class SpringSlider:
 
     @cached_property
     def derivation(self) -> tuple[sp.Expr, ...]:
-        """Rates of slip, stretch, v and the states, in these, the pressure, `loading_rate` and `pressure_rate`."""
+        """Rates of slip, stretch, v and the states in these variables, p, `loading_rate` and `pressure_rate`."""
         law, states = self.law.exact(), state_symbols(self.law.state_names)
         stressing = -pressure_rate / (self.numbers[plant.sigma] - plant.p)
         state_rates = tuple(
@@ -144,12 +144,12 @@ class SpringSlider:
         return ca.Function("readings", [y, pressure], [friction, driving - (self.normal_stress - pressure) * friction])
 
     def start(self, at_rate: float, states: tuple[float, ...] | None = None, pressure: float = 0.0) -> list[float]:
-        """Vector y with the forces in balance at a rate [m/s] and a pressure [Pa], in its steady state by default.
+        """Vector y with the forces in balance at a rate [m/s] and a pressure [Pa]; in steady state by default.
 
         Raises
         ------
         ParameterError
-            When the rate or a state is not positive, or the number of states is not that of the law.
+            If the rate or a state is not positive, or the number of states is not that of the law.
         """
         require_positive("Rate and state enter by their logarithms.", start_rate=at_rate)
         held = self.law.steady_state(at_rate) if states is None else states
@@ -164,14 +164,14 @@ class SpringSlider:
         return [0.0, resisting / self.stiffness, *logs]
 
     def stepped(self, y: "np.ndarray", before: float, after: float) -> "np.ndarray":
-        """Vector y after a step of the pressure [Pa]: no slip meanwhile, but of the state what the law says.
+        """Vector y after a step of the pressure [Pa]: the slip stays, the state changes by the law.
 
-        Without mass the slip rate jumps to where the forces balance again.
+        Without mass the slip rate jumps to a value at which the forces balance.
 
         Raises
         ------
         SimulationError
-            When they do at no rate.
+            If they balance at no rate.
         """
         found = np.array(y)
         change = math.log((self.normal_stress - after) / (self.normal_stress - before))
@@ -181,7 +181,7 @@ class SpringSlider:
         return found
 
     def _balanced(self, y: "np.ndarray", pressure: float) -> float:
-        """Logarithm of the rate at which the forces balance, which they do from below; near that of y."""
+        """Logarithm of the rate next to that of y at which the forces balance, with a stable crossing."""
         from scipy.optimize import brentq
 
         def excess(logarithm: float) -> float:
@@ -219,17 +219,17 @@ def spring_acceleration() -> sp.Expr:
 
 
 # ----------------------------------------------------------------------
-# Around a fault in slow sliding: what pushes it, what its law does not know, and what the pressure goes through.
+# Conditions of a fault in slow sliding: tide, true constants, pressure path and instruments.
 
-TIDE = 12.42 * 3600.0  # s, of the largest tide, M2
-MODES = 24  # of the layer; the law has fewer
+TIDE = 12.42 * 3600.0  # s, period of the largest tide, M2
+MODES = 24  # of the diffusion path; the law's model has fewer
 FRICTION = ("direct_effect", "evolution_effect", "critical_slip")
 """Constants of friction that a spread is about: a, b and D_c."""
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Tide:
-    """Shear stress S·sin(2πt/P + φ) on the fault, beside that of the spring; it begins with what it has at once.
+    """Shear stress S·sin(2πt/P + φ) on the fault, added to that of the spring; it starts with a step to S·sin φ.
 
     Attributes
     ----------
@@ -256,14 +256,14 @@ class Tide:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingVariation:
-    """True constants of a fault over those that its law and its plan know [-], each positive.
+    """Ratios of a fault's true constants to the nominal ones of its law and its plan [-], each positive.
 
     Attributes
     ----------
     direct_effect, evolution_effect, critical_slip : float
-        Of a, b and D_c.
+        Ratios of a, b and D_c.
     normal_stress, stiffness, damping : float
-        Of σ', k and η.
+        Ratios of σ', k and η.
     """
 
     direct_effect: float = 1.0
@@ -277,7 +277,7 @@ class SlidingVariation:
         require_positive(**asdict(self))
 
     def slider(self, fault: Fault, *, inertia: bool) -> SpringSlider:
-        """The true fault."""
+        """Spring-slider with the true constants."""
         nominal, factors = SpringSlider.of(fault, inertia=inertia), asdict(self)
         changed = {name: getattr(nominal.law, name) * factors[name] for name in FRICTION if factors[name] != 1}
         law = replace(nominal.law, **changed) if changed else nominal.law  # type: ignore[type-var]
@@ -287,18 +287,18 @@ class SlidingVariation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressurePath:
-    """What a pressure goes through before it is in the fault: a pump, then a lag of pump and pipe, then rock."""
+    """Pressure path between law and fault: a pump, then a lag of pump and pipe, then a diffusion path."""
 
     # lag, diffusion: Time constant and L²/D [s], not negative; 0 for none
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
-    # What happens to it once a sample, before it is held. All but a delay see the pump's whole pressure, the planned
-    # one included; what is planned is known ahead, so that it is not late.
+    # Stages that act once per sample, before the zero-order hold. All but a delay act on the total pressure of the
+    # pump, including the planned one, which is known ahead and thus not delayed.
     stages: tuple[SampledStage, ...] = ()
 
     @classmethod
     def of(cls, meant: Sampling, actuator: Actuator | None) -> "PressurePath":
-        """That of an actuator; without a lag and rock in it that which a law of samples is meant for."""
+        """Path of an actuator; lag and diffusion are those of a sampled law's design if the actuator has neither."""
         given = (
             Actuator.meant_for(replace(meant, lag=Fraction(0), diffusion=Fraction(0))) if actuator is None else actuator
         )
@@ -320,10 +320,10 @@ class PressurePath:
 
     @property
     def modes(self) -> "tuple[np.ndarray, np.ndarray]":
-        """Rates λ_i [1/s] and shares c_i [-] of filters side by side, of a step 1 − Σ c_i·e^{−λ_i·t}.
+        """Rates λ_i [1/s] and shares c_i [-] of parallel filters with the step response 1 − Σ c_i·e^{−λ_i·t}.
 
-        Partial fractions of those of the rock behind the lag: exact but for what 24 modes of the rock leave out. A lag
-        that has the rate of a mode is taken as a billionth slower.
+        Partial fractions of the diffusion path in series with the lag: exact but for the truncation error of 24
+        modes. A lag with the rate of a mode is made slower by 1e-9.
         """
         rock = Layer(time=self.diffusion or Fraction(1))
         found = [(float(rock.rate(i)), float(rock.share(i))) for i in range(MODES if self.diffusion else 0)]
@@ -344,7 +344,7 @@ class Instruments:
     step : float
         T_s [s].
     part : float
-        Share of it after which the pressure that is held changes.
+        Share of T_s after which the zero-order hold changes.
     """
 
     def __init__(self, step: float, part: float, *elements: Callable[[float], Any]) -> None:
@@ -353,28 +353,28 @@ class Instruments:
 
     @classmethod
     def of(cls, path: PressurePath, transducer: Transducer | None, step: float) -> "Instruments":
-        """Before the first sample."""
+        """Instruments before the first sample."""
         late = [stage for stage in path.stages if isinstance(stage, Delay)]
         others = [stage for stage in path.stages if not isinstance(stage, Delay)]
         stages = (_remembering(_held(s, step)) for s in (late, others))
         return cls(step, Actuator(stages=path.stages).part, _remembering(_read(transducer, step)), *stages)
 
     def read(self, slip: float) -> float:
-        """Slip [m] that is told."""
+        """Measured slip [m]."""
         return float(self._reading(slip))
 
     def pump(self, asked: float, planned: float) -> float:
-        """Pressure [Pa] beside a planned one that is held, of what is asked for beside it."""
+        """Pressure [Pa] of the hold less the planned one, from the commanded pressure less the planned one."""
         return float(self._pumped(float(self._late(asked)) + planned)) - planned
 
     def sections(self, now: float, before: float, after: float) -> list[tuple[float, float, float]]:
-        """Starts and lengths [s] between a sample and the next of what is held, with the pressures."""
+        """Starts and lengths [s] of the sections of constant pressure between two samples, with the pressures."""
         late = self.part * self.step
         return [(now, late, before)] * (late > 0) + [(now + late, self.step - late, after)]
 
 
 def _read(transducer: Transducer | None, step: float) -> "tuple[ca.Function, tuple[float, ...]] | None":
-    """CasADi Function (memory, slip) → reading, memory, and the memory at first; None without a transducer."""
+    """CasADi Function (memory, slip) → reading, memory, and the initial memory; None without a transducer."""
     if transducer is None:
         return None
     memory, slip = ca.SX.sym("memory", len(transducer.start)), ca.SX.sym("slip")
@@ -383,7 +383,7 @@ def _read(transducer: Transducer | None, step: float) -> "tuple[ca.Function, tup
 
 
 def _held(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tuple[float, ...]] | None":
-    """The same of a pressure and what is held of it; None without stages."""
+    """CasADi Function (memory, commanded pressure) → held pressure, memory, and initial memory; None without stages."""
     if not stages:
         return None
     chain, start = Actuator(stages=tuple(stages)), tuple(v for stage in stages for v in stage.start)
@@ -394,7 +394,7 @@ def _held(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tu
 
 
 def _remembering(element: tuple[ca.Function, tuple[float, ...]] | None) -> Callable[[float], Any]:
-    """Number → number of such a Function, which keeps its memory; as it is without one."""
+    """Callable on numbers that stores the memory of such a Function; the identity without one."""
     if element is None:
         return float
     function, start = element

@@ -1,6 +1,6 @@
 """Long runs in steps: checkpoints, retained samples, and cached results.
 
-An interrupted run continues with bitwise the same numbers.
+The result of an interrupted and resumed run is bitwise equal to that of an uninterrupted one.
 """
 
 import hashlib
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     import casadi as ca
 
 # ----------------------------------------------------------------------
-# Long runs that can be interrupted at any moment and go on later with the same digits.
+# Checkpoints: long runs that are interrupted at any moment and resumed with bitwise equal results.
 
 SECONDS = 30.0
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """File that holds what a run has kept so far, written whole or not at all."""
+    """File with the vectors that a run has stored so far, written atomically."""
 
     path: Path
-    fingerprint: str  # Of everything that determines the digits of the run; a file of another run is refused
+    fingerprint: str  # Digest of everything that determines the results; a file of another run is rejected
     _written: list[float] = field(default_factory=lambda: [monotonic()], repr=False)
 
     @classmethod
@@ -50,20 +50,20 @@ class Checkpoint:
         start : sequence of float
             Vector at time zero.
         kept : sequence of int
-            Numbers of the steps to keep.
+            Numbers of the steps to store.
         """
         told = (step.serialize(), *(float(x).hex() for x in start), *map(str, kept), version("casadi"))
         return cls(Path(path), hashlib.sha256("\n".join(told).encode()).hexdigest())
 
     def read(self) -> "list[np.ndarray]":
-        """Vectors kept so far; none where there is no file yet.
+        """Vectors stored so far; none without a file.
 
         Raises
         ------
         OutputError
-            When the file cannot be read.
+            If the file cannot be read.
         SimulationError
-            When it is no checkpoint, or that of another run.
+            If it is not a checkpoint, or that of another run.
         """
         sweep(self.path.parent)
         try:
@@ -83,12 +83,12 @@ class Checkpoint:
         return list(vectors)
 
     def write(self, vectors: "Sequence[np.ndarray]", *, now: bool = False) -> None:
-        """Write the vectors kept so far, if the last time is long enough ago or `now`.
+        """Write the vectors stored so far, at most every `SECONDS` s unless `now`.
 
         Raises
         ------
         OutputError
-            When the file cannot be written.
+            If the file cannot be written.
         """
         if not now and monotonic() - self._written[0] < SECONDS:
             return
@@ -98,12 +98,12 @@ class Checkpoint:
         self._written[0] = monotonic()
 
     def remove(self) -> None:
-        """Delete the file of a run that has ended."""
+        """Delete the file after the end of the run."""
         self.path.unlink(missing_ok=True)
 
 
 # ----------------------------------------------------------------------
-# Running a backend over many steps and keeping some instants.
+# Many steps of a backend, with storage at some instants.
 
 GOLDEN = (5**0.5 - 1) / 2
 
@@ -115,13 +115,13 @@ class Advancer:
     """Moves one vector forward in place, by any number of steps."""
 
     vector: "np.ndarray"
-    calls: tuple[Callable[[], None], ...] = ()  # Advance the vector by 1, 64 and 4096 steps; none beside machine code
-    owners: tuple[object, ...] = ()  # tuple: CasADi's buffers, which must live as long as the calls
+    calls: tuple[Callable[[], None], ...] = ()  # Advance the vector by 1, 64 and 4096 steps; empty with machine code
+    owners: tuple[object, ...] = ()  # tuple: CasADi's buffers, which must stay alive with the calls
     machine_code: MachineCode | None = None  # See `Backend`
 
     @classmethod
     def of(cls, backend: Backend, start: list[float]) -> "Advancer":
-        """Advancer at a starting vector."""
+        """Advancer at an initial vector."""
         vector = np.array(start)
         if backend.machine_code:
             return cls(vector, machine_code=backend.machine_code)
@@ -158,11 +158,11 @@ def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], obj
 
 
 def instants(steps: int, samples: int) -> list[int]:
-    """Step numbers to keep: one of every stride of equal length, at most `samples` strides, and the first and the last.
+    """Step numbers to store: the first, the last, and one of each of at most `samples` strides of equal length.
 
-    Its place within the stride moves on by the golden section of it (Weyl 1916: such places are evenly distributed).
-    Instants at equal distances would meet chatter, a disturbance or anything else that repeats with their distance, or
-    a divisor of it, in one phase alone, and never show its size.
+    The place within the stride advances by its golden section (Weyl 1916: such places are uniformly distributed).
+    Equidistant instants would sample chatter, a disturbance or any other signal whose period divides their distance at
+    one phase only, and could miss its amplitude.
     """
     stride = max(1, -(-steps // samples))
     starts = enumerate(range(stride, steps, stride), start=1)
@@ -176,10 +176,10 @@ def march(
     progress: ProgressReport | None,
     checkpoint: Checkpoint | None = None,
 ) -> "np.ndarray":
-    """Vectors at the kept instants, one a column; ends early once the entry `diverged_at` is set.
+    """Vectors at the instants `kept`, one a column; ends early once the entry `diverged_at` is set.
 
-    Python runs between two calls, so that the user can interrupt and sees the progress; what was kept until then is in
-    the checkpoint, if there is one, and the next march goes on from there.
+    Python runs between two calls, so that the user can interrupt and sees the progress. The vectors stored so far are
+    in the checkpoint, if there is one, from which the next march resumes.
     """
     found = (checkpoint.read() if checkpoint else []) or [advancer.vector.copy()]
     advancer.vector[:] = found[-1]
@@ -203,7 +203,7 @@ def march(
 
 
 # ----------------------------------------------------------------------
-# Long runs are kept on the user's disk, see `quakedesign.cache`: the same code from the same start ends the same.
+# Long runs are cached on the user's disk, see `quakedesign.cache`: code and initial vector determine the result.
 
 LONG = 100_000_000
 """Instructions of a run from which on it is worth a place."""
@@ -212,14 +212,14 @@ LONG = 100_000_000
 def run_question(
     step: "ca.Function", start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
 ) -> tuple[bytes, ...]:
-    """Everything that determines the digits of so many steps of a casadi.Function; empty for a run that is not kept."""
+    """Everything that determines the results of a run of a casadi.Function; empty for a run that is not cached."""
     if not cache.in_use() or compiled is False or steps * step.n_instructions() < LONG:
         return ()
     return step.serialize().encode(), np.array(start).tobytes(), np.array(instants).tobytes(), compilation().encode()
 
 
 def recall_run(question: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
-    """Vectors at the kept instants, one a column, and backend and why, as in the provenance of a run; or None."""
+    """Cached vectors, one a column, and backend with its reason as in the provenance of a run; None if not cached."""
     if not question or (content := cache.recall("run", *question)) is None:
         return None
     with np.load(BytesIO(content), allow_pickle=False) as kept:
@@ -228,7 +228,7 @@ def recall_run(question: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str
 
 
 def keep_run(question: tuple[bytes, ...], vectors: "np.ndarray", told: dict[str, str]) -> None:
-    """Keep a run for `recall_run`, unless no compiler made it."""
+    """Cache a run for `recall_run` if it was compiled."""
     if question and told["backend"] == "compiled":
         content = BytesIO()
         np.savez(content, allow_pickle=False, vectors=vectors, **{name: np.array(text) for name, text in told.items()})

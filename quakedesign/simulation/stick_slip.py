@@ -1,6 +1,6 @@
 """Uncontrolled runs with rate-and-state friction: velocity steps and stick–slip cycles.
 
-A further chapter has initial conditions: steady sliding, after a hold, or late in a cycle.
+The last part gives initial conditions: steady sliding, after a hold, or late in a cycle.
 """
 
 import math
@@ -25,13 +25,13 @@ from quakedesign.simulation.state_plant import SpringSlider
 from quakedesign.symbolic import derive
 
 # ----------------------------------------------------------------------
-# Faults with rate-and-state friction under loading from afar and pressure: velocity steps and stick-slip cycles.
+# Faults with rate-and-state friction under remote loading and pressure: velocity steps and stick-slip cycles.
 
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
 _FARTHEST = 1e7  # critical slips that the load point travels; one earthquake may take a million
-_LONGEST = 1e9  # s on one clock, which tells 1.2e-7 s apart
-_LONGEST_RUN = 1e5 * _LONGEST  # s, three million years: a run is cut into that many spans at most
+_LONGEST = 1e9  # s of one time variable, whose resolution is then 1.2e-7 s
+_LONGEST_RUN = 1e5 * _LONGEST  # s, three million years: limits the number of spans of a run
 
 
 def simulate_state(
@@ -48,28 +48,28 @@ def simulate_state(
     method: str = "radau",
     rtol: float = 1e-9,
 ) -> StateTrajectory:
-    """Simulate a fault whose friction has a state, uncontrolled, loaded from afar, under a prescribed pressure.
+    """Simulate an uncontrolled fault whose friction has a state, under remote loading and a prescribed pressure.
 
-    Rate and state are integrated in their logarithms, so that a hold of years and a slip of milliseconds keep the same
-    number of digits. At the start the forces are in balance, under the pressure before a step at t = 0.
+    The logarithms of rate and state are integrated, so that a hold of years and a slip of milliseconds have the same
+    relative accuracy. Initially the forces are in balance, under the pressure before a step at t = 0.
 
     Parameters
     ----------
     subject : Fault or SpringSlider
-        A fault with its own damping.
+        A fault has its own damping.
     loading : float or sequence of (float, float)
-        v_∞ [m/s], for `duration`; or pairs of (time it lasts [s], v_∞ [m/s]), one after the other. Not negative.
+        v_∞ [m/s] for `duration`; or consecutive pairs of (length [s], v_∞ [m/s]). Not negative.
     duration : float, optional
         [s]; only for a single loading rate.
     inertia : bool
-        Of a fault: third order with inertia, or quasi-dynamic without. A `SpringSlider` has its own mass.
+        For a fault: third order with inertia, quasi-dynamic without. A `SpringSlider` has its own mass.
     pressure : float or PressureCourse
-        Fluid pressure [Pa], below the effective normal stress. Where it steps, the values before and after are returned
-        both, at the same time; of the instants in `times` those after.
+        Fluid pressure [Pa], below the effective normal stress. At a step of the pressure the values before and after it
+        are both returned, at the same time; at instants of `times` only those after.
     start_rate : float, optional
-        Slip rate at the start [m/s]; the first loading rate unless given.
+        Initial slip rate [m/s]; the first loading rate unless given.
     start_state : sequence of float, optional
-        State at the start, in the law's units; steady at `start_rate` unless given.
+        Initial state, in the law's units; steady at `start_rate` unless given.
     times : sequence of float, optional
         Instants to return [s]; every step of the method unless given.
     onset_rate : float, optional
@@ -78,14 +78,14 @@ def simulate_state(
         ``"radau"`` (stiff: inertia), ``"dop853"`` (usually faster without inertia), ``"cvodes"`` or ``"idas"`` (both
         for stiff problems, as independent codes).
     rtol : float
-        Tolerance of one step, for logarithms of rate and state absolute, 1e-13 … 1e-3.
+        Tolerance of one step, 1e-13 … 1e-3; absolute for the logarithms of rate and state.
 
     Raises
     ------
     ParameterError
         For a law without state, or settings that are not positive, finite or known.
     SimulationError
-        When the method cannot go on, as when the slip rate grows without bound (no inertia and no damping).
+        If the integration fails, as when the slip rate grows without bound (no inertia and no damping).
     """
     slider = subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia)
     slider.law.require(simulate_state=subject)
@@ -100,7 +100,7 @@ def simulate_state(
     start = slider.start(first, None if start_state is None else tuple(start_state), course.before(0.0))
     level = _ONSET * max(v for _, v in pieces) if onset_rate is None else onset_rate
     length = getattr(slider.law, "critical_slip", abs(start[1]) * _SHARE_OF_STRETCH)
-    scales = np.array([length, length, *[1.0] * (len(start) - 2)])  # 1 for the logarithms
+    scales = np.array([length, length, *[1.0] * (len(start) - 2)])  # scale 1 for the logarithms
     farthest = _FARTHEST * float(scales[0])
     travelled = sum(length * speed for length, speed in pieces)
     if travelled > farthest:
@@ -122,9 +122,9 @@ def velocity_step(
     method: str = "dop853",
     rtol: float = 1e-11,
 ) -> StateTrajectory:
-    """Slide a sample through a spring whose far end is driven at given rates, as in the laboratory.
+    """Slide a sample through a spring whose far end moves at given rates, as in the laboratory.
 
-    Starts in steady sliding at the first rate, with neither inertia nor damping. A rate of 0 is a hold.
+    The run starts in steady sliding at the first rate, without inertia or damping. A rate of 0 is a hold.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def velocity_step(
     stiffness : float
         Change of friction per displacement of the far end [1/m]: stiffness per area over normal stress.
     loading : sequence of (float, float)
-        Pairs of (time it lasts [s], rate of the far end [m/s]).
+        Consecutive pairs of (length [s], rate of the far end [m/s]).
     times, method, rtol
         As in `simulate_state`.
 
@@ -193,7 +193,7 @@ class _History:
     rtol: float
 
     def run(self, start: list[float]) -> SmoothSolution:
-        """Solution over all pieces; at a jump of the loading rate the variables are continuous."""
+        """Solution over all pieces; the variables are continuous at a jump of the loading rate."""
         parts: list[SmoothSolution] = []
         y = np.array(start)
         for now, end, load in self._spans():
@@ -214,7 +214,7 @@ class _History:
         return self._joined(np.array(start), parts)
 
     def _spans(self) -> "list[tuple[float, float, float]]":
-        """Starts, ends [s] and loading rates [m/s] of spans without a break of loading or pressure, none too long."""
+        """Start, end [s] and loading rate [m/s] of spans of limited length with smooth loading and pressure."""
         found, now = [], 0.0
         for length, load in self.pieces:
             end = now + length
@@ -225,7 +225,7 @@ class _History:
         return found
 
     def _stepped(self, y: "np.ndarray", now: float) -> "tuple[np.ndarray, np.ndarray]":
-        """Variables after a step of the pressure, if there is one now, and the time if the rate jumps to an event."""
+        """Variables after a step of the pressure at this time, if any; the time if the rate jumps above the onset."""
         before, after = self.course.before(now), self.course.after(now)
         if before == after:
             return y, np.empty(0)
@@ -234,7 +234,7 @@ class _History:
         return found, np.array([now] if risen else [])
 
     def _joined(self, start: "np.ndarray", parts: list[SmoothSolution]) -> SmoothSolution:
-        """All parts; where a variable jumps, both values are kept, or the later one at an instant that is asked for."""
+        """All parts joined; at a jump both values are returned, but only the later one at a requested instant."""
         times, values = [parts[0].time[:1]], [start[:, None]]
         for part in parts:
             same = int(np.array_equal(part.values[:, 0], values[-1][:, -1]))
@@ -311,7 +311,7 @@ def _energy(
     friction: "np.ndarray",
     pressure: "np.ndarray",
 ) -> EnergyBudget:
-    """Budget of an area [m²] from forces along the paths of block and load point, both resolved by the instants."""
+    """Energy budget of an area [m²] from forces integrated along the paths of block and load point."""
     slip, stretch, rate = values[0], values[1], np.exp(values[2])
 
     def gained(energy: "np.ndarray") -> float:
@@ -332,11 +332,11 @@ def _energy(
 
 
 # ----------------------------------------------------------------------
-# Where damping and inertia take as much stress as the direct effect gives.
+# Slip rate at which damping and inertia balance the direct effect.
 
 
 def direct_strength(fault: Fault) -> float:
-    """aσ' [Pa]: what the strength of steady sliding gains at once when the slip rate grows e-fold."""
+    """aσ' [Pa]: instantaneous increase of the strength in steady sliding when the slip rate grows e-fold."""
     law = fault.friction
     rate, state = law.operating_rate, law.steady_state(law.operating_rate)
     gain = law.coefficient(0, math.e * rate, *state) - law.coefficient(0, rate, *state)
@@ -344,22 +344,22 @@ def direct_strength(fault: Fault) -> float:
 
 
 def dynamic_rate(fault: Fault) -> float:
-    """aσ'A/(η + √(km)) [m/s]: where damping and inertia take as much stress as the direct effect gives."""
+    """aσ'A/(η + √(km)) [m/s]: slip rate at which damping and inertia balance the direct effect."""
     resisting = fault.damping + fault.mass * fault.natural_frequency
     return direct_strength(fault) * fault.area / resisting
 
 
 # ----------------------------------------------------------------------
-# Where a fault with a state starts: in steady sliding, after a hold, or late in its cycle.
+# Initial conditions of a fault with a state: in steady sliding, after a hold, or late in its cycle.
 
-_CYCLES = 3  # the first one depends on its start
-_FIRST_LOADS, _MOST_LOADS = 10.0, 1000.0  # by which a strength aσ' is loaded, before a fault is taken to have no cycle
+_CYCLES = 3  # the first cycle depends on the initial condition
+_FIRST_LOADS, _MOST_LOADS = 10.0, 1000.0  # loads in units of aσ' of the first and longest run
 _OLDER = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartingState:
-    """Slip rate and state of friction at the start; the spring is stretched so that the forces are in balance."""
+    """Initial slip rate and friction state; the stretch of the spring balances the forces."""
 
     slip_rate: float  # [m/s]
     state: tuple[float, ...]  # In the units of the law
@@ -376,7 +376,7 @@ def sliding(fault: Fault, rate: float) -> StartingState:
 
 
 def locked(fault: Fault, rate: float, hold: float, **settings: Any) -> StartingState:
-    """A fault that slid steadily at a rate [m/s] until the far end stopped, and has been held so for a time [s].
+    """A fault after steady sliding at a rate [m/s] and a hold of the far end for a time [s].
 
     `settings` are ``inertia, method, rtol`` of `simulate_state`.
     """
@@ -386,14 +386,14 @@ def locked(fault: Fault, rate: float, hold: float, **settings: Any) -> StartingS
 
 
 def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> StartingState:
-    """A fault loaded at a rate [m/s] when a share of the time between the onsets of two of its events has passed.
+    """A fault loaded at a rate [m/s], at a given share of the time between the onsets of two events.
 
     `settings` are ``inertia, method, rtol`` of `simulate_state`.
 
     Raises
     ------
     ParameterError
-        Also for a fault that does not repeat its events.
+        For a share outside [0, 1), or a fault without repeated events.
     SimulationError
     """
     require_positive(loading_rate=rate)
@@ -420,9 +420,9 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
 
 
 def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
-    """A fault loaded at a rate [m/s], near steady sliding at first, until it has repeated its events.
+    """A run at a loading rate [m/s] from near steady sliding, until events repeat.
 
-    One that does not ends after a thousand times the load of its direct effect, a stable one after ten. `settings` as
+    Without repeated events the run ends at a load of at most 1000 aσ', that of a stable fault at 10 aσ'. `settings` as
     in `locked`.
     """
     unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
@@ -435,5 +435,5 @@ def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
 
 
 def disturbed(fault: Fault, rate: float) -> StartingState:
-    """Sliding at a rate [m/s] with a state that is older than steady."""
+    """Sliding at a rate [m/s] with `_OLDER` times the steady state."""
     return StartingState(slip_rate=rate, state=tuple(_OLDER * float(v) for v in fault.friction.steady_state(rate)))

@@ -9,20 +9,20 @@ from quakedesign.loop.schemes.base import Motion
 from quakedesign.simulation.closed_loop import ClosedLoop, Number
 from quakedesign.simulation.integrators import Integrator
 
-_BISECTIONS = 4  # of the step, which leave a sixteenth of it, from where Newton's method converges quadratically
+_BISECTIONS = 4  # leave 1/16 of the step, from which Newton's method converges quadratically
 _NEWTON_STEPS = 3
-_TINY = 1e-300  # at the least of the slope, so that a flat root is no division by zero
+_TINY = 1e-300  # smallest slope, so that a flat root causes no division by zero
 
 
 @dataclass(frozen=True)
 class StickSlipLoop(ClosedLoop):
     """A closed loop with x2 ≥ 0: x2' = load − F + λ, with the reaction λ ≥ 0, λ·x2 = 0 and F = μ N̂ max(σ' − p, 0).
 
-    While the fault slips it obeys eq. shift, and digits are those of `ClosedLoop` as long as p < σ'. Where the slip
-    rate falls to zero it stops; it rests as long as friction can carry the load, and the slip rate is exactly zero.
-    A step locates one stop or one release, to the order of the integrator. Friction in the backward direction is not
-    modelled: `reversing` says where it would be exceeded. Friction that heals (`rest_excess` of the law) holds a fault
-    at rest by so much more, which is lost at the release.
+    While the fault slips it obeys eq. shift, and results equal those of `ClosedLoop` bitwise as long as p < σ'. It
+    stops when the slip rate falls to zero. It rests as long as friction can carry the load, with a slip rate of exactly
+    zero. A step locates one stop or one release, to the order of the integrator. Backward slip is not modelled:
+    `reversing` tells when friction would be exceeded backward. Friction with healing carries `rest_excess` of the law
+    in addition at rest, which is lost at the release.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class StickSlipLoop(ClosedLoop):
 
     @property
     def plant(self) -> Motion:
-        """Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²] while it slips; without friction where it is opened."""
+        """Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²] while it slips; without friction beyond p = σ'."""
         _, normal, _, stress = self.hats()
 
         def rates(time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
-            pulling = normal * self.friction(x) * ca.fmin(stress - pressure, 0)  # of the printed plant beyond p = σ'
+            pulling = normal * self.friction(x) * ca.fmin(stress - pressure, 0)  # friction printed for p > σ'
             rate = self.printed(time, x, pressure)
             return rate + ca.vertcat(0, pulling)
 
@@ -48,7 +48,7 @@ class StickSlipLoop(ClosedLoop):
 
     @property
     def held(self) -> Motion:
-        """As `plant`, out of rest: with the friction that holds the fault there."""
+        """As `plant`, with the larger friction of a fault at rest."""
         plant, excess = self.plant, self.fault.friction.rest_excess
         _, normal, _, stress = self.hats()
         if not excess:
@@ -56,7 +56,7 @@ class StickSlipLoop(ClosedLoop):
         return lambda time, x, p: plant(time, x, p) - ca.vertcat(0, normal * excess * ca.fmax(stress - p, 0))
 
     def resting_load(self, time: ca.SX, slip: ca.SX, pressure: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Load less friction, and load plus friction [m/s²], of a fault at rest (SX): it rests from ≤ 0 to ≥ 0."""
+        """Load less friction, and load plus friction [m/s²], at rest (SX); the fault stays if they are ≤ 0 and ≥ 0."""
         forward = self.held(time, ca.vertcat(slip, 0), pressure)[1]
         _, normal, _, stress = self.hats()
         friction = self.friction(ca.vertcat(slip, 0)) + self.fault.friction.rest_excess
@@ -67,7 +67,7 @@ class StickSlipLoop(ClosedLoop):
         return ca.logic_and(state[1] == 0, self.resting_load(time, state[0], pressure)[1] < 0)
 
     def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
-        """Shear stress [Pa]: μ max(σ' − p, 0) against slip, or what carries the load at rest (SX)."""
+        """Shear stress [Pa]: μ max(σ' − p, 0) in slip, or the stress that balances the load at rest (SX)."""
         closed = ca.fmax(self.fault.effective_normal_stress - pressure, 0)
         strength, held = friction * closed, (friction + self.fault.friction.rest_excess) * closed
         carried = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + held
@@ -87,7 +87,7 @@ class StickSlipLoop(ClosedLoop):
 
 @dataclass(frozen=True)
 class _SplitStep:
-    """The motion within one step, cut at shares [-] of its length."""
+    """Motion within one step, divided at shares [-] of its length."""
 
     plant: Motion
     held: Motion
@@ -101,15 +101,15 @@ class _SplitStep:
         return self.motion(self.plant, passed, state)
 
     def push(self, passed: Number, state: ca.SX) -> ca.SX:
-        """Acceleration [m/s²] out of rest; positive where friction cannot hold the fault."""
+        """Acceleration [m/s²] from rest; positive if friction cannot carry the load."""
         return self.motion(self.held, passed, ca.vertcat(state[0], 0, state[2:]))[1]
 
     def slid(self, passed: Number, share: Number, state: ca.SX) -> ca.SX:
-        """State after a share of the step of the sliding fault."""
+        """State after a share of the step in slip."""
         return self.method.advance(lambda part, now: self.rates(passed + share * part, now), state, share * self.step)
 
     def rested(self, passed: Number, share: Number, state: ca.SX) -> ca.SX:
-        """State after a share of the step at rest: slip and slip rate stay, the rest of the state goes on."""
+        """State after a share of the step at rest: slip and slip rate stay, the other states evolve."""
 
         def field(part: Number, now: ca.SX) -> ca.SX:
             return self.motion(lambda *_: ca.SX.zeros(2), passed + share * part, ca.vertcat(state[0], 0, now[2:]))
@@ -119,14 +119,14 @@ class _SplitStep:
         return state + share * self.step * field(0.0, state)
 
     def _further(self, state: ca.SX) -> bool:
-        """Whether there is more than slip, slip rate and works: states of the law, or pressures on their way."""
+        """Whether the state has more than slip, slip rate and works: states of the law or of the pressure path."""
         return bool(state.shape[0] - 2 - self.works)
 
     def stop(self, begin: Number, start: ca.SX, ahead: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Share of the step at which the slip rate has fallen to zero, and the state there.
+        """Share of the step at which the slip rate falls to zero, and the state at this time.
 
         The slip rate is the quartic in time with the values and slopes of both ends and the slip between them. States
-        of the law and pressures on their way are integrated up to there; works are cubics.
+        of the law and of the pressure path are integrated to this time; without these, works are cubics.
         """
         length = (1 - begin) * self.step
         first, last = self.rates(begin, start), self.rates(1.0, ahead)
@@ -143,7 +143,7 @@ class _SplitStep:
 
 
 def _crossing(before: ca.SX, after: ca.SX) -> ca.SX:
-    """Share of a step at which a quantity that ends positive has left zero, by its secant; 1 where it stays below."""
+    """Share of a step at which a quantity becomes positive, by its secant; 1 if it does not."""
     crosses = ca.logic_and(before <= 0, after > 0)
     return ca.if_else(crosses, before / ca.if_else(crosses, before - after, 1), 1)
 
@@ -159,7 +159,7 @@ class _Quartic:
         """Quartic with these values and slopes at 0 and 1, and this mean."""
         cubic = 2 * (start - end) + start_slope + end_slope
         square = 3 * (end - start) - 2 * start_slope - end_slope
-        bulge = 30 * (mean - (start + start_slope / 2 + square / 3 + cubic / 4))  # of s²(1 − s)²
+        bulge = 30 * (mean - (start + start_slope / 2 + square / 3 + cubic / 4))  # coefficient of s²(1 − s)²
         return cls((start, start_slope, square + bulge, cubic - 2 * bulge, bulge))
 
     def at(self, share: Number) -> ca.SX:
@@ -178,7 +178,7 @@ class _Quartic:
         return b + share * (2 * c + share * (3 * d + share * 4 * e))
 
     def root(self) -> ca.SX:
-        """A share at which it falls through zero, where it is ≥ 0 at 0 and < 0 at 1."""
+        """A share at which it falls through zero, for values ≥ 0 at 0 and < 0 at 1."""
         low, high = ca.SX(0), ca.SX(1)
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2

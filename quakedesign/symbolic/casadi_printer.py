@@ -1,4 +1,4 @@
-"""SymPy expressions in CasADi and NumPy: one walk over the tree, two tables of operations."""
+"""SymPy expressions in CasADi and NumPy: one traversal of the tree, two tables of operations."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, reduce
@@ -27,11 +27,11 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Values, motion: Sequence[c
     expressions : sequence of Expr
         In signed and absolute powers, sums, products, powers, comparisons and elementary functions.
     values : mapping of Symbol to SX
-        What every free symbol stands for.
+        Value of every free symbol.
     motion : sequence of SX
         Symbols that grow in motion. Where two branches of Max, Min or Abs meet, the derivative is that of the branch
-        which is entered when the first of them grows, or the second where the first changes nothing, and so on; without
-        any it is the mean of both branches, as CasADi has it. Values are the same.
+        which is entered when the first of these symbols grows, or the second if the first has no effect, and so on.
+        Without symbols it is the mean of both branches, as in CasADi. Values do not depend on `motion`.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def _number(node: sp.Basic) -> float:
 
 def _operate(node: sp.Basic, table: Operations, walk: Callable[[sp.Basic], Value]) -> Value:
     if node.is_Add or node.is_Mul:
-        # Sum or product, with its numbers joined exactly before they are rounded.
+        # Sum or product; its numbers are combined exactly and then rounded once.
         numbers = [arg for arg in node.args if arg.is_number]
         rest = [walk(arg) for arg in node.args if not arg.is_number]
         first = [walk(node.func(*numbers))] if numbers else []
@@ -99,7 +99,7 @@ def _operate(node: sp.Basic, table: Operations, walk: Callable[[sp.Basic], Value
 
 
 def _power(library: ModuleType, base: Value, exponent: sp.Expr) -> Value:
-    """Power with square roots as such, since they are cheaper and correctly rounded."""
+    """Power, with the exponent ½ as a square root, which is cheaper and correctly rounded."""
     if exponent in (1, -1):
         return base if exponent == 1 else 1 / base
     if exponent in (2, 3):
@@ -121,7 +121,7 @@ def _powers(library: ModuleType) -> dict[type[sp.Basic], Callable[..., Value]]:
         return _power(library, library.fabs(x), a)
 
     def larger(first: Value, *others: Value) -> Value:
-        """The positive part, a maximum with 0, without a branch: x/2 + |x|/2 is exactly x or 0."""
+        """Positive part max(x, 0) without a branch: x/2 + |x|/2 is exactly x or 0."""
         rest: Value = reduce(library.fmax, others)
         greater: Value = library.fmax(first, rest)
         return (rest + library.fabs(rest)) / 2 if isinstance(first, float) and first == 0 else greater
@@ -144,7 +144,7 @@ def _powers(library: ModuleType) -> dict[type[sp.Basic], Callable[..., Value]]:
 
 
 def _kinks(motion: ca.SX) -> dict[type[sp.Basic], Callable[..., Value]]:
-    """Max, Min and Abs with the values of CasADi's, and the derivatives of the branch that a motion enters."""
+    """Max, Min and Abs with CasADi's values, and the derivatives of the branch that a motion enters."""
 
     def not_less(a: Value, b: Value) -> Value:
         ahead: ca.SX | bool = True
@@ -184,24 +184,24 @@ def _operations(library: ModuleType, *others: Callable[..., Value]) -> Operation
 
 
 # ----------------------------------------------------------------------
-# Functions of CasADi at many points at once.
+# Evaluation of CasADi Functions at many points at once.
 
 
 def vectorised(function: ca.Function) -> Callable[..., "np.ndarray"]:
-    """A Function of SX at many points at once, in NumPy: some times as fast as `Function.map`.
+    """Evaluate a Function of SX at many points at once in NumPy, several times as fast as `Function.map`.
 
     Parameters
     ----------
     function : casadi.Function
-        Of dense inputs, with one dense output.
+        With dense inputs and one dense output.
 
     Returns
     -------
     callable
-        Of arrays of shape (numbers of an input, points), or (numbers, 1) for what all points share; gives the numbers
-        of the output, column by column, in shape (numbers, points).
+        From arrays of shape (numbers of an input, points), or (numbers, 1) if all points share the input, to the
+        numbers of the output, column by column, in shape (numbers, points).
     """
-    steps: list[tuple[int, list[int], Any]] = []  # operation, places of the results, and of the arguments or a constant
+    steps: list[tuple[int, list[int], Any]] = []  # operation, places of results, places of arguments or a constant
     for k in range(function.n_instructions()):
         code, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if code not in (ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT) and code not in _INSTRUCTIONS:

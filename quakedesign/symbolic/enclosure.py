@@ -1,8 +1,8 @@
 """Rigorous enclosures of SymPy expressions over boxes, and proofs of upper limits.
 
 Interval arithmetic with rational ends over boxes that may be unbounded: rational operations are exact,
-all others are rounded outwards. Further chapters: ball arithmetic (python-flint), and proof that an
-expression stays below a limit, by subdivision of the box.
+all others are rounded outwards. Further chapters: ball arithmetic (python-flint), and proof by subdivision
+of the box that an expression stays below a limit.
 """
 
 import heapq
@@ -26,9 +26,9 @@ from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, slope_
 # ----------------------------------------------------------------------
 # Rigorous enclosures of SymPy expressions over boxes that may be unbounded, with exact rational ends.
 #
-# Rational operations are exact, so a bound that is attained is found as it is; the others are rounded outwards to
-# `_BITS` bits by python-flint. At a jump of `Heaviside` or `sign`, which derivatives of Max, Min and Abs bring, the
-# enclosure holds every value between both sides; where a box only touches the jump it holds the side of the box.
+# Rational operations are exact, so that an attained bound has no rounding error; python-flint rounds the others
+# outwards to `_BITS` bits. At a jump of `Heaviside` or `sign`, from derivatives of Max, Min and Abs, the enclosure
+# contains every value between both sides; if a box only touches the jump, only the value on the side of the box.
 
 End = Fraction | float  # the only floats are −inf and inf
 Interval = tuple[End, End]
@@ -38,26 +38,26 @@ EVERYTHING: Interval = (-inf, inf)
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _BITS = 256
 _LONGEST = 3 * _BITS  # bits of a numerator or denominator beyond which an end is rounded
-_LARGEST = 16 * _BITS  # bits of size beyond which an end is rounded to infinity or zero, or away from them
+_LARGEST = 16 * _BITS  # bits of magnitude beyond which an end is rounded to infinity, zero or ±2^∓`_LARGEST`
 _POWERS = sp.Pow, SignedPower, AbsolutePower
 _RISING: dict[type[sp.Basic], Interval] = {  # with their limits at −inf and inf
     sp.exp: (_ZERO, inf),
     sp.log: EVERYTHING,
     sp.asinh: EVERYTHING,
     sp.sinh: EVERYTHING,
-    sp.cosh: (_ONE, inf),  # of a size
+    sp.cosh: (_ONE, inf),  # for arguments ≥ 0
     sp.tanh: (-_ONE, _ONE),
 }
 
 
 def interval(expression: sp.Expr, box: Box) -> Interval:
-    """Interval that contains every value of an expression over a box; the whole line where it may be undefined.
+    """Interval that contains every value of an expression over a box; the whole line if it may be undefined.
 
     Parameters
     ----------
     expression : Expr
         Built from numbers, real symbols, +, ·, powers, exp, log, sin, cos, asinh, sinh, tanh, Abs, Max, Min, signed
-        powers, and what the derivatives of these bring.
+        powers, and the functions in the derivatives of these.
     box : mapping of Symbol to (low, high)
         Fractions, or −inf and inf.
 
@@ -72,7 +72,7 @@ def interval(expression: sp.Expr, box: Box) -> Interval:
 def regular(expression: sp.Expr, box: Box) -> bool:
     """Whether an expression has no pole, no end of its domain and no jump of a signed power on a box.
 
-    Then its derivatives off the kinks tell how it runs; at other jumps derivatives have an impulse.
+    Then its derivatives off the kinks determine its monotonicity; at other jumps derivatives contain an impulse.
     """
     intervals = _intervals(expression, box)
     ends = [intervals[node.args[0]] for node in intervals if _singular_at_zero(node)]
@@ -85,7 +85,7 @@ def _singular_at_zero(node: sp.Basic) -> bool:
 
 
 def _intervals(expression: sp.Expr, box: Box) -> dict[sp.Basic, Interval]:
-    """Intervals of an expression and of every part of it."""
+    """Intervals of an expression and of all its subexpressions."""
     bounds: dict[sp.Basic, Interval] = dict(box)
 
     def walk(node: sp.Basic) -> Interval:
@@ -126,18 +126,18 @@ def _without(what: str) -> NoReturn:
 
 
 def add(a: Interval, b: Interval) -> Interval:
-    """Sums of two intervals."""
+    """Interval of the sums of two intervals."""
     return _sum(a[0], b[0]), _sum(a[1], b[1])
 
 
 def times(a: Interval, b: Interval) -> Interval:
-    """Products of two intervals."""
+    """Interval of the products of two intervals."""
     ends = [_product(x, y) for x in a for y in b]
     return min(ends), max(ends)
 
 
 def negative(a: Interval) -> Interval:
-    """The interval mirrored at 0."""
+    """Interval of the negative values."""
     return -a[1], -a[0]
 
 
@@ -192,7 +192,7 @@ def _signed_power(x: Interval, exponent: sp.Expr, *, signed: bool) -> Interval:
 
 
 def _rising(function: type[sp.Basic], x: Interval) -> Interval:
-    """Enclosure by a function that rises."""
+    """Enclosure of an increasing function."""
     if function is sp.log and x[0] < 0:
         return EVERYTHING
     return _rise(function, x[0], up=False), _rise(function, x[1], up=True)
@@ -205,15 +205,15 @@ def _rise(function: type[sp.Basic], x: End, *, up: bool) -> End:
 
 
 def _end(evaluate: Callable[[], arb], *, up: bool) -> End:
-    """Upper or lower end of a ball that is evaluated with `_BITS` bits."""
+    """Upper or lower end of a ball, evaluated with `_BITS` bits."""
     with flint.ctx.workprec(_BITS):
         return upper_end(evaluate()) if up else -upper_end(-evaluate())
 
 
 def upper_end(ball: arb) -> End:
-    """Rational at or above a ball of python-flint, of a size between 2 to ± `_LARGEST`; zero, or infinite.
+    """Upper bound of a python-flint ball: a rational with magnitude from 2^−`_LARGEST` to 2^`_LARGEST`, zero, or inf.
 
-    Numbers of any size have balls, but as rationals the largest and the smallest would fill the memory.
+    Balls may have any magnitude, but as rationals the largest and the smallest numbers would fill the memory.
     """
     end, large = ball.upper(), type(ball)(2) ** _LARGEST
     if not end < large:
@@ -282,7 +282,7 @@ _OPERATIONS: dict[type[sp.Basic], Callable[[list[Interval]], Interval]] = {
 
 
 def _rounded(a: Interval) -> Interval:
-    """The interval, rounded outwards where its ends have grown long."""
+    """Interval with ends of too many bits rounded outwards."""
 
     def end(x: End, *, up: bool) -> End:
         if isinstance(x, float) or max(x.numerator.bit_length(), x.denominator.bit_length()) <= _LONGEST:
@@ -317,7 +317,7 @@ def enclose(expression: sp.Expr, box: BallBox) -> arb:
     Returns
     -------
     flint.arb
-        Not finite where the expression is not defined on all of the box.
+        Not finite if the expression is not defined on the whole box.
 
     Raises
     ------
@@ -328,12 +328,12 @@ def enclose(expression: sp.Expr, box: BallBox) -> arb:
 
 
 class _Operations:
-    """An expression as a list of ball operations, each subexpression once."""
+    """An expression as a list of ball operations, with each subexpression once."""
 
     def __init__(self, expression: sp.Expr) -> None:
         places: dict[sp.Expr, int] = {}
         self._places: dict[sp.Symbol, int] = {}
-        self._start: list[Any] = []  # arb, or None before the symbols are known
+        self._start: list[Any] = []  # arb, or None for values that depend on symbols
         work: Work = []
 
         def place(e: sp.Expr) -> int:
@@ -363,7 +363,7 @@ class _Operations:
         return _worked(results, self._work)
 
     def moved(self, results: list[arb], symbol: sp.Symbol, changed: arb) -> list[arb]:
-        """The same for another ball of one symbol: what depends on it is computed again."""
+        """Results for another ball of one symbol: only subexpressions with this symbol are recomputed."""
         results = results.copy()
         results[self._places[symbol]] = changed
         return _worked(results, self._after[symbol])
@@ -402,7 +402,7 @@ def _ball_number(e: sp.Expr) -> arb:
 
 
 def _operation(e: sp.Expr) -> Operation:
-    """What a node does with the balls of its arguments; everything about its exponent is settled here."""
+    """Operation of a node on the balls of its arguments; its exponent is analysed once, here."""
     if e.is_Add:
         return sum
     if e.func in (folded := {sp.Mul: mul, sp.Max: arb.max, sp.Min: arb.min}):
@@ -437,7 +437,7 @@ def _ball_power(exponent: sp.Expr) -> Operation:
 
 
 def _integer_power(base: arb, n: int) -> arb:
-    """Tight enclosure of base^n, n ≥ 1, from its ends; arb's own power is not finite about a zero midpoint."""
+    """Tight enclosure of base^n, n ≥ 1, from its ends; arb's own power is not finite at a zero midpoint."""
     if n == 1:
         return base
 
@@ -486,16 +486,16 @@ def upper_bound(
     Parameters
     ----------
     tolerance : Fraction
-        Stop when the bound is within this share of a value that is attained.
+        Stop when the bound is within this relative distance of an attained value.
     pieces : int
         Largest number of subdivisions; the bound is rigorous whenever it stops.
     limit : Fraction, optional
-        Stop as soon as the bound is below that, or never will be, where nothing else is asked.
+        Stop as soon as the bound is below the limit, or an attained value shows that it cannot be.
 
     Raises
     ------
     ParameterError
-        When no finite bound is found.
+        If no finite bound is found.
     """
     order = count()
     operations = _compiled(sp.sympify(expression))
@@ -531,7 +531,7 @@ def _balls(box: BallBox) -> dict[sp.Symbol, arb]:
 def _halves(
     operations: _Operations, box: dict[sp.Symbol, tuple[Fraction, Fraction]], values: list[arb]
 ) -> list[tuple[dict[sp.Symbol, tuple[Fraction, Fraction]], list[arb]]]:
-    """Halve the box where that lowers the bound most: parts with the balls of all subexpressions."""
+    """Halves of the box along the side that lowers the bound most, with the balls of all subexpressions."""
     best: list[tuple[dict[sp.Symbol, tuple[Fraction, Fraction]], list[arb]]] = []
     least: End | None = None
     for symbol, (low, high) in box.items():
@@ -542,7 +542,7 @@ def _halves(
         for part in ((low, middle), (middle, high)):
             moved = operations.moved(values, symbol, ball(*part))
             upper = _upper(moved[-1])
-            if least is not None and upper >= least:  # the other half cannot make it better
+            if least is not None and upper >= least:  # the other half cannot lower the maximum
                 break
             parts.append((box | {symbol: part}, moved))
             worst = upper if worst is None else max(worst, upper)
@@ -556,45 +556,45 @@ def _upper(enclosure: arb) -> End:
 
 
 # ----------------------------------------------------------------------
-# Whether an expression stays below a limit on a box, decided by subdivision in interval arithmetic.
+# Decision whether an expression stays below a limit on a box, by subdivision in interval arithmetic.
 
 PIECES = 600
-FURTHEST = 10**60  # beyond it a half-line is not halved any more
+FURTHEST = 10**60  # beyond this a half-line is not divided further
 
 
 @dataclass(frozen=True)
 class Excess:
-    """Where a limit is exceeded."""
+    """A point at which a limit is exceeded."""
 
     at: dict[sp.Symbol, Fraction]
-    value: Fraction  # A rigorous lower bound of the expression there
+    value: Fraction  # A rigorous lower bound of the expression at this point
 
 
 @dataclass(frozen=True)
 class Undecided:
-    """What subdivision did not decide."""
+    """A box on which subdivision gave no decision."""
 
-    where: Box  # The box with the largest enclosure that is left
+    where: Box  # The remaining box with the largest enclosure
 
 
 def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction) -> Fraction | Excess | Undecided:
-    """Smallest proved upper bound of an expression on a box that is not below a limit, if it is at most limit + slack.
+    """Prove an upper bound of an expression on a box, between a limit and limit + slack.
 
     Parameters
     ----------
     expression : Expr
-        As in `quakedesign.symbolic.enclosure.interval`.
+        As in `interval`.
     box : mapping of Symbol to (low, high)
         May be unbounded.
     limit : Fraction
-        Returned itself where the expression does not exceed it.
+        Returned if the expression is proved not to exceed it.
     slack : Fraction
-        How far an enclosure may exceed the limit where it cannot be sharpened.
+        Largest accepted excess of an enclosure that cannot be sharpened.
 
     Returns
     -------
     Fraction, Excess or Undecided
-        `Excess` with a point at which the expression exceeds limit + slack.
+        Bound; or `Excess` with a point at which the expression exceeds limit + slack.
 
     Raises
     ------
@@ -614,7 +614,7 @@ def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction)
             return max(bound, Fraction(top))
         part = heapq.heappop(heap)[2]
         risen = form.risen(part)
-        for point in (_centre(risen), _centre(part)):  # a face may lie on a kink, where less is known than beside it
+        for point in (_centre(risen), _centre(part)):  # a face may lie on a kink, with a wider enclosure than nearby
             low, _ = interval(form.expression, {symbol: (x, x) for symbol, x in point.items()})
             if low > limit + slack:
                 return Excess(at=point, value=Fraction(low))
@@ -646,7 +646,7 @@ class _Form:
         return interval(self.slopes[symbol], box)
 
     def highest(self, box: Box) -> End:
-        """The lower of the upper ends of the plain enclosure and, on a bounded box, of the mean-value form."""
+        """Smaller upper end of the plain enclosure and, on a bounded box, of the mean-value form."""
         high = interval(self.expression, box)[1]
         if any(isinstance(end, float) for ends in box.values() for end in ends) or not regular(self.expression, box):
             return high
@@ -658,9 +658,9 @@ class _Form:
         return min(high, mean[1])
 
     def risen(self, box: Box) -> Box:
-        """The face of a box on which the expression is largest, as far as the signs of its derivatives tell.
+        """Face of a box on which the expression is largest, by the signs of its derivatives if these are definite.
 
-        Where the expression has jumps, the half beside that face, so that the side of the jump stays known.
+        With jumps in the expression, the half of the box at this face, so that the side of the jump stays known.
         """
         if not regular(self.expression, box):
             return box
@@ -674,7 +674,7 @@ class _Form:
         return risen
 
     def halves(self, box: Box) -> list[Box]:
-        """Both halves of a box, across the side whose halves have the smaller largest enclosure."""
+        """Both halves of a box, divided along the side that gives the smallest maximum of both enclosures."""
         splits = [list(_halved_box(box, symbol)) for symbol, (low, high) in box.items() if low != high]
         return min(splits, key=lambda parts: max(map(self.highest, parts)), default=[box])
 
@@ -691,7 +691,7 @@ def _centre(box: Box) -> dict[sp.Symbol, Fraction]:
 
 
 def _middle(ends: Interval) -> Fraction:
-    """A rational inside an interval: its middle, or twice as far out as its only end."""
+    """A rational inside an interval: its middle; on a half-line 0 if inside, else ±1 or twice its end."""
     low, high = ends
     if isinstance(low, float):
         return Fraction(0) if isinstance(high, float) or high > 0 else min(Fraction(-1), Fraction(2 * high))

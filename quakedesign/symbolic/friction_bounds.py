@@ -15,26 +15,26 @@ from quakedesign.symbolic.enclosure import EVERYTHING, Box, Excess, Undecided, u
 from quakedesign.symbolic.rate_and_state_plant import without_overflow
 from quakedesign.symbolic.signed_power import SignedPower, slope_off_kinks
 
-SLACK = Fraction(1, 10**9)  # relative; what is declared may be rounded inward by less
+SLACK = Fraction(1, 10**9)  # relative tolerance for declared values that are rounded inward
 _NOTHING = Fraction(0)
 _UNITS = {"slip": "m", "rate": "m/s"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionBounds:
-    """What holds of a friction law for every slip and slip rate, and of its continuation too."""
+    """Bounds of a friction law and of its continuation, for every slip and slip rate."""
 
     # least, most: Bounds of the friction coefficient [-], 0 < least
     least: Fraction
     most: Fraction
-    slip_slope: Fraction  # Largest chord slope in slip [1/m]; with state, along a motion that carries the state with it
+    slip_slope: Fraction  # Largest chord slope in slip [1/m]; with state, along a motion in which the state evolves
     rate_slope: Fraction  # Largest chord slope in slip rate [s/m], at a fixed state
     weakens: bool  # Whether friction is proved not to grow with slip
 
 
 @dataclass(frozen=True)
 class _FrictionRange:
-    """Friction on a range of slip, slip rate and state, and its slopes there."""
+    """Friction and its slopes on a range of slip, slip rate and state."""
 
     friction: sp.Expr
     slip_slope: sp.Expr
@@ -46,16 +46,16 @@ class _FrictionRange:
 def friction_bounds(law: FrictionLaw) -> FrictionBounds:
     """Bounds and chord slopes of a law, proved by interval arithmetic on its `coefficient` and `extended`.
 
-    What a law declares is returned where it is confirmed, or what is confirmed where that is larger by less than one
-    part in 1e9. `coefficient` counts for slip ≥ 0 and slip rates ≥ 0 within `working_rates`, with states between the
-    steady ones of these; `extended` for all slips and slip rates.
+    A declared value is returned if it is proved; otherwise the proved value, if it exceeds the declared one by less
+    than 1e-9 relative. `coefficient` is examined for slip ≥ 0 and slip rates ≥ 0 within `working_rates`, with states
+    between the steady ones of these rates; `extended` for all slips and slip rates.
 
     Raises
     ------
     ParameterError
-        When the law exceeds what it declares, or may lose all friction.
+        If the law exceeds a declared value, or friction may vanish.
     UnsupportedError
-        When that cannot be decided.
+        If this cannot be decided.
     """
     exact = law.exact()
     courses = list(_courses(law, exact))
@@ -80,7 +80,7 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
 
 
 def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_FrictionRange]:
-    """The law within its domain, and its continuation where it has no state."""
+    """The law within its domain, and its continuation if it has no state."""
     slip, rate = sp.symbols("slip rate", nonnegative=True)
     states = sp.symbols([*law.state_names], positive=True)
     low, high = (end if abs(end) == inf else rational(end) for end in law.working_rates)
@@ -104,7 +104,7 @@ def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_FrictionRange]:
 
 
 def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
-    """Friction, if it has no jumps, which no slope would tell of."""
+    """Friction without jumps, which slopes would not reveal."""
     continued = sp.sympify(friction)
     signs = [power for power in continued.atoms(SignedPower) if power.args[1] == 0]
     if signs or continued.has(sp.sign, sp.Heaviside, sp.DiracDelta):
@@ -119,7 +119,7 @@ def _confirmed(
     declared: Fraction,
     parts: Callable[[_FrictionRange], list[sp.Expr]],
 ) -> Fraction:
-    """A bound that a law declares, if none of the parts exceeds it."""
+    """A declared bound of a law, if no part exceeds it."""
     bound = declared
     for course in courses:
         for part in parts(course):

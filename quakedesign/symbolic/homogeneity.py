@@ -1,8 +1,8 @@
 """Weighted homogeneity of functions and vector fields, weights, and relative degree.
 
 Homogeneity is proved symbolically or refuted by an exact counterexample. The weights are computed from
-the terms of the field. The relative degree is the number of derivatives of an output until the control
-appears.
+the terms of the field. The relative degree is the order of the first derivative of an output that depends
+on the control.
 """
 
 from collections.abc import Iterator, Mapping
@@ -22,13 +22,13 @@ from quakedesign.symbolic.term_expressions import lie_derivative
 # Weighted homogeneity of functions and of fields with signs, with a proof or an exact counterexample.
 
 Weights = Mapping[sp.Symbol, int | sp.Rational]
-epsilon = sp.Dummy("epsilon", positive=True)  # never the same as a symbol of the user's
+epsilon = sp.Dummy("epsilon", positive=True)  # differs from every symbol of the user
 _TRIES = 50
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """left = right for every state and every ε > 0: the expression at the dilated point, and what it must be."""
+    """left = right for every state and every ε > 0: the expression at the dilated point, and its required value."""
 
     # left, right: In the states and ε
     left: sp.Expr
@@ -36,7 +36,7 @@ class Identity:
 
     @property
     def holds(self) -> bool:
-        """Whether both sides have one normal form; computed anew."""
+        """Whether both sides have the same normal form; recomputed."""
         return bool(normal_form(self.left - self.right) == 0)
 
 
@@ -44,21 +44,21 @@ class Identity:
 class Counterexample:
     """A point and an ε at which a necessary identity fails."""
 
-    identity: Identity  # What homogeneity would require
+    identity: Identity  # Necessary for homogeneity
     meaning: str  # The identity in words
     point: Mapping[sp.Symbol, sp.Rational]  # Exact values of all states and parameters
     epsilon: sp.Rational
 
     @property
     def values(self) -> tuple[sp.Expr, sp.Expr]:
-        """Both sides at the point, exact."""
+        """Exact values of both sides at the point."""
         at = {**self.point, epsilon: self.epsilon}
         left, right = (side.subs(at, simultaneous=True) for side in (self.identity.left, self.identity.right))
         return left, right
 
     @property
     def holds(self) -> bool:
-        """Whether the two sides differ there for certain, by ball arithmetic."""
+        """Whether both sides are proved to differ at the point, by ball arithmetic."""
         left, right = self.values
         return _differ(left, right)
 
@@ -70,16 +70,16 @@ class Counterexample:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Homogeneity:
-    """Whether something is r-homogeneous, and of which degree (Bacciotti and Rosier 2005; Levant 2005 for inclusions).
+    """Whether a function or field is r-homogeneous, and its degree (Bacciotti, Rosier 2005; inclusions: Levant 2005).
 
     Attributes
     ----------
     weights : mapping of Symbol to Rational
         r_i of every state.
     degree : Rational or None
-        Degree, where one is proved; None also for what is identically zero.
+        Degree, if proved; also None for a function or field that is identically zero.
     proof : tuple of Identity
-        One for a function, one for every component of a field; empty without a proof.
+        One identity for a function, one for every component of a field; empty without a proof.
     counterexample : Counterexample or None
     switching : tuple of (Expr, Rational)
         Arguments of signs with their degrees: the switching surfaces are invariant under dilation, so that the identity
@@ -94,7 +94,7 @@ class Homogeneity:
 
     @property
     def verdict(self) -> str:
-        """``proved``, ``refuted`` or ``undecided``, from the identities and the point, computed anew."""
+        """``proved``, ``refuted`` or ``undecided``, recomputed from the identities and the counterexample."""
         if self.proof and all(identity.holds for identity in self.proof):
             return "proved"
         return "refuted" if self.counterexample is not None and self.counterexample.holds else "undecided"
@@ -115,7 +115,7 @@ def dilation(weights: Weights, factor: sp.Expr = epsilon) -> dict[sp.Symbol, sp.
     Raises
     ------
     ParameterError
-        When a weight is not positive, or the factor may not be.
+        If a weight or the factor is not known to be positive.
     """
     exact = {state: sp.sympify(weight) for state, weight in weights.items()}
     wrong = {state: weight for state, weight in exact.items() if not (weight.is_Rational and weight > 0)}
@@ -128,7 +128,7 @@ def dilation(weights: Weights, factor: sp.Expr = epsilon) -> dict[sp.Symbol, sp.
 
 
 def dilate(expression: sp.Expr, weights: Weights, factor: sp.Expr = epsilon) -> sp.Expr:
-    """Expression at the dilated point, in normal form: ε stands outside wherever an argument is homogeneous."""
+    """Expression at the dilated point, in normal form: ε is factored out wherever an argument is homogeneous."""
     return normal_form(normal_form(expression).subs(dilation(weights, factor), simultaneous=True))
 
 
@@ -143,21 +143,21 @@ def homogeneous(
     ----------
     subject : Expr or mapping of Symbol to Expr
         A function V(Δx) = ε^m V(x), or a field f(Δx) = ε^m Δf(x), single- or set-valued; parameters in intervals and
-        all other symbols stay as they are.
+        all other symbols are not dilated.
     weights : mapping of Symbol to int or Rational
         r_i > 0 of every state.
     degree : int or Rational, optional
-        Claim to decide; found without.
+        Degree to prove or refute; computed unless given.
 
     Returns
     -------
     Homogeneity
-        Its truth value is whether homogeneity is proved.
+        True if homogeneity is proved.
 
     Raises
     ------
     ParameterError
-        When a weight is missing or not positive.
+        If a weight is missing or not positive.
     """
     rates = subject if isinstance(subject, Mapping) else {None: subject}
     components = {s: normal_form(r) for s, r in rates.items()}
@@ -188,7 +188,7 @@ def _decided(components: Mapping[Any, Any], weights: Mapping[Any, Any], degree: 
 
 
 def _degrees(dilated: sp.Expr) -> set[sp.Rational] | None:
-    """Exponents of ε in the terms of a sum; None where ε is not a factor."""
+    """Exponents of ε in the terms of a sum; None if a term has no factor ε^q with rational q."""
     degrees = set()
     for term in sp.Add.make_args(dilated) if dilated != 0 else ():
         power = term.as_independent(epsilon, as_Add=False)[1]
@@ -211,7 +211,7 @@ def _switching(components: Mapping[Any, Any], weights: Mapping[Any, Any]) -> tup
 def _claims(
     components: Mapping[Any, Any], weights: Mapping[Any, Any], degree: sp.Rational | None
 ) -> Iterator[tuple[Identity, str]]:
-    """What homogeneity requires, of the claimed degree or of any."""
+    """Necessary identities for homogeneity of the claimed degree, or of any degree."""
     at = {e: e.subs(dilation(weights), simultaneous=True) for e in components.values()}
     if degree is not None:
         for s, e in components.items():
@@ -240,7 +240,7 @@ def _search(identity: Identity, meaning: str, weights: Mapping[Any, Any]) -> Cou
 
 
 def _on_a_switch(counterexample: Counterexample) -> bool:
-    """Whether a sign has no single value there; the values then say nothing about the sets."""
+    """Whether the argument of a sign may vanish at the point; its values then tell nothing about the sets."""
     at = {**counterexample.point, epsilon: counterexample.epsilon}
     both = sp.Tuple(counterexample.identity.left, counterexample.identity.right)
     return not all(_differ(argument.subs(at, simultaneous=True), sp.Integer(0)) for argument in signs(both))
@@ -255,23 +255,23 @@ def _differ(left: sp.Expr, right: sp.Expr) -> bool:
 
 
 # ----------------------------------------------------------------------
-# Weights found from a field's terms, instead of guessed.
+# Weights computed from the terms of a field.
 
 
 def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -> dict[sp.Symbol, sp.Rational]:
-    """Weights that make a field homogeneous of a degree, from the linear equations that its terms impose, then proved.
+    """Weights for homogeneity of a degree, from the linear equations of the field's terms, with proof.
 
     Parameters
     ----------
     rates : mapping of Symbol to Expr
-        Of the field.
+        Rate of every state.
     degree : int or Rational
-        Such as −1 for sliding modes with a discontinuous integral.
+        For example −1 for sliding modes with a discontinuous integral.
 
     Raises
     ------
     ParameterError
-        When no weights exist, or they are not unique.
+        If no weights exist, or they are not unique.
     """
     unknown = {state: sp.Dummy(f"r_{state}", positive=True) for state in rates}
     equations: list[sp.Expr] = []
@@ -297,14 +297,14 @@ def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -
 
 
 def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.Expr]) -> sp.Expr:
-    """How an expression grows with what its symbols grow with: exponents that add up in products.
+    """Degree of an expression from the degrees of its symbols; degrees add up in products.
 
-    What sums, extremes and arguments of functions ask of the sizes is added to `equations`, as expressions that vanish.
+    Conditions for sums, extremes and arguments of functions are appended to `equations`, as expressions that vanish.
 
     Parameters
     ----------
     sizes : mapping of Symbol to Expr
-        Linear in what is unknown; any other symbol does not grow.
+        Degrees, linear in the unknowns; every other symbol has degree 0.
     """
     if e in sizes or not e.has(*sizes):
         return sizes.get(e, sp.Integer(0))
@@ -326,7 +326,7 @@ def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.E
 
 
 # ----------------------------------------------------------------------
-# How many derivatives of an output it takes until the control appears.
+# Relative degree: order of the first derivative of an output that depends on the control.
 
 
 def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control: sp.Symbol) -> int | None:
@@ -340,7 +340,7 @@ def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control
     Returns
     -------
     int or None
-        None where as many derivatives as there are states do not depend on it, and so no later one does at all points.
+        None if no derivative up to the number of states depends on it, and thus no later one at all points.
     """
     for degree, _ in enumerate(field, start=1):
         output = sp.expand(lie_derivative(output, field))

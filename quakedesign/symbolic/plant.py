@@ -1,7 +1,7 @@
 """Symbolic plant and error dynamics, derived from the force balance of the spring-slider.
 
 SymPy derives the shifted plant, the error dynamics, the matched perturbation and the instability
-conditions. Further chapters: notation in LaTeX or plain text, and cached derivations (`derived.json`,
+conditions. Further chapters: notation in LaTeX or plain text, and stored derivations (`derived.json`,
 re-derived by a test).
 """
 
@@ -24,15 +24,15 @@ from quakedesign.fault import Fault, FrictionLaw
 
 
 def _read(text: str) -> sp.Basic:
-    """Expression of its ``srepr``, which leaves out that the functions of the plant are real."""
+    """Expression from its ``srepr``, which omits that the functions of the plant are real."""
     return eval(text, vars(sp) | {"Function": lambda name: sp.Function(name, real=True)})
 
 
 # ----------------------------------------------------------------------
-# Derivations that are the same for every fault, kept beside the code that derives them.
+# Stored derivations, which are equal for every fault.
 #
-# `derived.json` has what SymPy needs half a second for, by function and names of states; what it does not have is
-# derived. A test derives every entry again and compares; ``write_whole(FILE, derived_again())`` brings it up to date.
+# `derived.json` contains results that take SymPy half a second, by function and names of states; all others are
+# derived. A test derives every entry again and compares; ``write_whole(FILE, derived_again())`` updates the file.
 
 FILE = Path(__file__).parent / "derived.json"
 _Given = ParamSpec("_Given")
@@ -40,7 +40,7 @@ _Result = TypeVar("_Result")
 
 
 def stored(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
-    """Read the results of a derivation where they are stored. Its one argument, if any, are names of states."""
+    """Decorator that reads the results of a derivation if stored. Its one argument, if any, is the names of states."""
     home = derivation.__module__.rpartition(".")[2]
 
     @cache
@@ -53,7 +53,7 @@ def stored(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
 
 
 def derived_again() -> str:
-    """Content of the file, derived now."""
+    """Content of `derived.json`, derived again."""
     shipped_texts = shipped(FILE)
     before, derived = dict(shipped_texts), {}
     shipped_texts.clear()
@@ -72,7 +72,7 @@ def derived_again() -> str:
 # ----------------------------------------------------------------------
 # From the force balance to the shifted plant, the error dynamics and the instability conditions.
 #
-# Nothing here is typed in but the force balance; SymPy derives the rest.
+# Only the force balance is entered by hand; SymPy derives the rest.
 
 PARAMETERS = ("density", "shear_modulus", "damping", "effective_normal_stress")
 
@@ -92,7 +92,7 @@ reference = sp.Function("r", real=True)
 
 @dataclass(frozen=True, slots=True)
 class ErrorDynamics:
-    """e1' = e2, e2' = β(ν + h), eqs. esystem3: the two expressions that a controller must live with."""
+    """e1' = e2, e2' = β(ν + h), eqs. esystem3: control coefficient and matched perturbation."""
 
     beta: sp.Expr  # Control coefficient β [-]
     h: sp.Expr  # Matched perturbation [m/s²], the unit of ν
@@ -130,7 +130,7 @@ def shifted_acceleration() -> sp.Expr:
 
 
 def _by_kind(f: sp.Expr) -> list[sp.Expr]:
-    """Split into friction without pressure, friction with pressure, and the rest, for reading."""
+    """Group into friction without pressure, friction with pressure, and the rest, for readability."""
     with_pressure = sp.expand(f.coeff(p)) * p
     friction = sp.expand(f.coeff(p, 0).coeff(N_hat)) * N_hat
     rest = sp.expand(f - with_pressure - friction)
@@ -207,7 +207,7 @@ def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
 
 
 def hatted_parameters(fault: Fault, values: Mapping[str, Any]) -> dict[sp.Symbol, Any]:
-    """k̂, η̂, N̂ and σ'_n from values or symbols of `PARAMETERS`; m = nρh³, A = nh², k = nGh (see `Fault`)."""
+    """k̂, η̂, N̂ and σ'_n from values or symbols of `PARAMETERS`, with m = nρh³, A = nh², k = nGh (see `Fault`)."""
     rho, G, damping, stress = (values[name] for name in PARAMETERS)
     h = sp.Rational(str(rational(fault.side)))
     mass, shared = rho * h**3, damping / sp.Rational(str(fault.squares))
@@ -222,7 +222,7 @@ acceleration_error = sp.Symbol(r"\dot{e}_2", real=True)
 
 @stored
 def matched_rate() -> sp.Expr:
-    """h' along a solution, in values of friction, its slopes, the reference and its derivatives, and e1, e2, e2'.
+    """h' along a solution, in friction, its slopes, the reference and its derivatives, and e1, e2, e2'.
 
     The disturbance enters by its value φ, its explicit rate φ_t and its growth φ_1 in slip and φ_2 in slip rate. The
     control acts on h' through e2' = β(ν + h) (ERRATA 16).
@@ -255,7 +255,7 @@ def matched_rate() -> sp.Expr:
 
 @stored
 def matched_rate_in_parts() -> sp.Tuple:
-    """h' as what the slopes of friction bring in, and the rest, expanded."""
+    """h' as two expanded parts: the contribution of the slopes of friction, and the rest."""
     slopes = (slip_slope, rate_slope)
     total = sp.expand(matched_rate())
     flat = sp.expand(total.subs(dict.fromkeys(slopes, 0)))
@@ -265,9 +265,9 @@ def matched_rate_in_parts() -> sp.Tuple:
 
 @stored
 def sensitivities() -> sp.Tuple:
-    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time, each as what the slope of friction brings in and the rest.
+    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time, each as the part with the slope of friction and the rest.
 
-    The slopes are those of chords where friction has no derivative.
+    Slopes are chord slopes where friction has no derivative.
     """
     value = sp.Function("m_v", positive=True)(e1, e2)
     force = sp.Function("f_v", real=True)(e1, e2)
@@ -278,14 +278,14 @@ def sensitivities() -> sp.Tuple:
         bent = h.diff(error).subs({value.diff(error): slope, force.diff(error): growth})
         bent = sp.expand(_named(bent.subs({value: friction_value, force: phi})))
         part = sp.expand(bent.coeff(slope))
-        # apart, so that N̂ cancels where it can and occurs once elsewhere
+        # separate parts, so that N̂ cancels where possible and occurs once elsewhere
         stressed = sp.simplify(part.coeff(sigma)) * sigma
         parts += [slope * (stressed + sp.factor(part.coeff(sigma, 0))), bent.coeff(slope, 0)]
     return sp.Tuple(*parts)
 
 
 def _named(h: sp.Expr) -> sp.Expr:
-    """Symbols for the reference and its derivatives."""
+    """Expression with symbols for the reference and its derivatives."""
     r = reference(t)
     for part, name in ((r.diff(t, 2), r2), (r.diff(t), r1), (r, r0)):
         h = h.subs(part, name)
@@ -293,7 +293,7 @@ def _named(h: sp.Expr) -> sp.Expr:
 
 
 # ----------------------------------------------------------------------
-# One way to write derived equations: dots for rates, the reference without its argument, in LaTeX or plain text.
+# Notation of derived equations in LaTeX or plain text: dots for rates, the reference without its argument.
 
 
 class _Latex(LatexPrinter):  # type: ignore[misc]
@@ -320,7 +320,7 @@ def latex(expression: Any) -> str:
 
 
 def plain(expression: Any) -> str:
-    """Text of a derived expression: r, r' and r'' for the reference and its rates, k_hat for a symbol with a hat."""
+    """Text of a derived expression: r, r' and r'' for the reference and its rates, k_hat for k̂."""
     if isinstance(expression, sp.MatrixBase):
         return f"Matrix({plain(expression.tolist())})"
     text = _Plain().doprint(expression).replace(r"\mu_0\hat{N}_0", "(mu_0*N_hat_0)").replace(r"\mu^*", "mu_star")

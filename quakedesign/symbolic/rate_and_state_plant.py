@@ -1,8 +1,8 @@
 """Plant with rate-and-state friction about steady sliding, with and without inertia.
 
 Chapters: third-order and quasi-dynamic plant with slopes and stability conditions; error dynamics about
-slow sliding in slip and the logarithms of slip rate and state; the slip rate at which a fault is
-linearised.
+slow sliding in slip and the logarithms of slip rate and state; slip rate of the equilibrium for the
+linearisation.
 """
 
 from dataclasses import dataclass
@@ -20,9 +20,8 @@ from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, mu_star, p, sigma,
 # ----------------------------------------------------------------------
 # The plant about steady sliding, for friction with state: third order with inertia, quasi-dynamic without.
 #
-# The force balance is that of `quakedesign.symbolic.plant`, with a far end that moves at the loading rate; a law
-# without
-# state at rest gives the same equations as there. Everything else is derived.
+# The force balance is that of `quakedesign.symbolic.plant`, with a far end that moves at the loading rate. For a law
+# without state at rest it gives the equations of that module. Everything else is derived.
 
 loading_rate = sp.Symbol(r"v_\infty", nonnegative=True)
 rate = sp.Symbol("v", positive=True)
@@ -50,7 +49,7 @@ def sliding_acceleration(names: tuple[str, ...] = ()) -> sp.Expr:
     """v' [m/s²] of the force balance, measured from sliding at v_∞ without pressure and disturbance.
 
     x1 is the slip ahead of steady sliding [m], v the slip rate [m/s], and μ a function of x1, v and the states `names`.
-    The far end moves at v_∞, so the spring's stretch is steady and holds μ* and the damping there.
+    The far end moves at v_∞, so that the stretch of the spring is constant and balances μ* and the damping.
     """
     z, v, acceleration, far, z_star, far_start = sp.symbols("z v a delta_far z^* far", real=True)
     ahead = {z: z_star + loading_rate * plant.t + plant.x1, v: rate}
@@ -85,7 +84,7 @@ def slope_symbols(names: tuple[str, ...] = ()) -> dict[sp.Expr, sp.Symbol]:
 
 @stored
 def jacobian(names: tuple[str, ...] = ()) -> sp.Matrix:
-    """Jacobian of (x1, v, states) in the slopes of `slope_symbols`, at a pressure p that the far end balances."""
+    """Jacobian of (x1, v, states) in the slopes of `slope_symbols`, at an equilibrium with pressure p."""
     quiet = sliding_acceleration(names).replace(plant.disturbance, lambda *_: sp.Integer(0))
     field = sp.Matrix([rate - loading_rate, quiet, *_state_rates(names)])
     J = field.jacobian([plant.x1, rate, *state_symbols(names)]).subs(slope_symbols(names))
@@ -111,7 +110,7 @@ def slopes(law: FrictionLaw, at_rate: sp.Expr = loading_rate) -> dict[sp.Symbol,
 
 
 def _tidy(expression: sp.Expr) -> sp.Expr:
-    """Factor a rational function; leave anything else, which SymPy would only make longer."""
+    """Factor a rational function; return any other expression unchanged, which SymPy would make longer."""
     return sp.factor(expression) if expression.is_rational_function() else expression
 
 
@@ -119,8 +118,8 @@ def _tidy(expression: sp.Expr) -> sp.Expr:
 def characteristic(names: tuple[str, ...] = (), *, inertia: bool = True) -> tuple[sp.Expr, ...]:
     """Coefficients of det(λE − J), highest power first, in the slopes and `effective_stress`.
 
-    E is the identity, without its entry for the acceleration when there is no inertia: the balance of forces is then
-    a constraint that gives the rate, and the degree is one lower.
+    E is the identity; without inertia its entry for the acceleration is 0: the balance of forces is then a constraint
+    that gives the rate, and the degree is one lower.
     """
     J = jacobian(names).subs(sigma, p + effective_stress)
     E = sp.eye(len(names) + 2)
@@ -133,7 +132,7 @@ def characteristic(names: tuple[str, ...] = (), *, inertia: bool = True) -> tupl
 def stability_conditions(names: tuple[str, ...] = (), *, inertia: bool = True) -> tuple[sp.Expr, ...]:
     """Expressions that are all positive if and only if all eigenvalues have negative real part (Hurwitz 1895).
 
-    The leading coefficient (when it is not 1), the leading minors of Hurwitz's matrix but the last, and the last
+    The leading coefficient (unless it is 1), the leading minors of Hurwitz's matrix except the last, and the last
     coefficient. If one of them is negative, an eigenvalue has positive real part.
     """
     a = characteristic(names, inertia=inertia)
@@ -145,7 +144,7 @@ def stability_conditions(names: tuple[str, ...] = (), *, inertia: bool = True) -
 
 
 def _absent(law: FrictionLaw) -> dict[sp.Symbol, sp.Expr]:
-    """Slopes that a law does not have."""
+    """Slopes of a law that are zero."""
     return {symbol: value for symbol, value in slopes(law).items() if value == 0}
 
 
@@ -154,26 +153,26 @@ def _inserted(expression: sp.Expr, law: FrictionLaw) -> sp.Expr:
 
 
 def _positive(expression: sp.Expr) -> bool:
-    """Whether SymPy sees that an expression is positive for positive parameters, rate and effective stress."""
+    """Whether SymPy proves that an expression is positive for positive parameters, rate and effective stress."""
     return bool(_tidy(expression.subs(loading_rate, rate)).is_positive)
 
 
 def _with_stresses(expression: sp.Expr) -> sp.Expr:
-    """σ' − p for the effective stress, collected for reading."""
+    """Expression with σ' − p for the effective stress, collected for readability."""
     gathered = expression.replace(lambda e: e.is_Add, lambda e: sp.collect(e, N_hat * effective_stress))
     return gathered.subs(effective_stress, sigma - p)
 
 
 def critical_stiffness(law: FrictionLaw, *, inertia: bool = True) -> sp.Expr:
-    """k̂ [1/s²] above which steady sliding is stable as far as stiffness decides.
+    """k̂ [1/s²] above which all stability conditions that depend on the stiffness are met.
 
     For rate and state: Ruina (1983) without inertia, Rice and Ruina (1983, J. Appl. Mech. 50, 343) with it, here with
-    damping as well. Zero when no condition depends on the stiffness; not positive when every stiffness is stable.
+    damping as well. Zero if no condition depends on the stiffness; not positive if every stiffness is stable.
 
     Raises
     ------
     UnsupportedError
-        When a condition is not linear in the stiffness (several state variables).
+        If a condition is not linear in the stiffness (several state variables).
     """
     conditions = stability_conditions(law.state_names, inertia=inertia)
     polynomials = [sp.Poly(condition.subs(_absent(law)), k_hat) for condition in conditions]
@@ -186,9 +185,9 @@ def critical_stiffness(law: FrictionLaw, *, inertia: bool = True) -> sp.Expr:
 
 
 def instability(law: FrictionLaw, *, inertia: bool = True) -> sp.Basic:
-    """Condition for unstable sliding as inequalities, solved for stiffness or damping where that is linear.
+    """Condition for unstable sliding as inequalities, solved for stiffness or damping if linear in these.
 
-    Conditions that hold for all positive parameters and σ' > p are left out.
+    Stability conditions that are met for all positive parameters and σ' > p are omitted.
     """
     parts = []
     for condition in stability_conditions(law.state_names, inertia=inertia):
@@ -208,10 +207,10 @@ def _solved(expression: sp.Expr, law: FrictionLaw) -> sp.Basic:
 
 
 def nucleation_length(law: FrictionLaw) -> sp.Expr:
-    """L [m] whose stiffness per area G/L is the critical one without inertia and damping.
+    """Length L [m] whose stiffness per area G/L is critical without inertia and damping.
 
-    A fault shorter than this slides stably (Dieterich 1992, Tectonophysics 211, 115, with the factor of the
-    spring-slider, G/L, in place of a crack's). Infinite when no stiffness is critical, negative when none is unstable.
+    A fault shorter than L slides stably (Dieterich 1992, Tectonophysics 211, 115, with the stiffness of the
+    spring-slider, G/L, in place of a crack's). Infinite if no stiffness is critical, negative if none is unstable.
     """
     critical = critical_stiffness(law, inertia=False).subs(eta_hat, 0)
     return _tidy(shear_modulus * N_hat / critical) if critical != 0 else sp.oo
@@ -220,7 +219,7 @@ def nucleation_length(law: FrictionLaw) -> sp.Expr:
 def quasi_dynamic_rates(law: FrictionLaw) -> tuple[sp.Expr, ...]:
     """(v', θ', …) of the plant without inertia, from the time derivative of the balance of forces.
 
-    The pressure is held; needs η̂ + N̂(σ' − p)μ_v > 0, else the rate jumps (Rice and Ben-Zion 1996).
+    The pressure is constant; needs η̂ + N̂(σ' − p)μ_v > 0, else the rate jumps (Rice and Ben-Zion 1996).
     """
     names = law.state_names
     states = state_symbols(names)
@@ -244,7 +243,7 @@ def third_order_rates(law: FrictionLaw) -> tuple[sp.Expr, ...]:
 
 @cache
 def error_dynamics(names: tuple[str, ...] = ()) -> plant.ErrorDynamics:
-    """β and h of eq. esystem3 with μ a function of the state too; slip and rate are ahead of steady sliding."""
+    """β and h of eq. esystem3 with μ also a function of the state; slip and rate are relative to steady sliding."""
     derived = plant.error_dynamics()
     if not names:
         return derived
@@ -256,7 +255,7 @@ def error_dynamics(names: tuple[str, ...] = ()) -> plant.ErrorDynamics:
 
 
 def is_steady(law: FrictionLaw) -> bool:
-    """Whether sliding at a constant rate leaves a law steady: its state rests, and nothing depends on slip."""
+    """Whether sliding at a constant rate is steady: constant state, and no function of the law depends on slip."""
     variables = (plant.x1, rate, *state_symbols(law.state_names))
     parts = [sp.sympify(f) for f in (law.coefficient(*variables), *law.state_rates(*variables))]
     at = dict(zip(variables[2:], law.steady_state(rate), strict=True))
@@ -265,7 +264,7 @@ def is_steady(law: FrictionLaw) -> bool:
 
 
 def without_overflow(friction: sp.Expr) -> sp.Expr:
-    """The same friction with arsinh z = L + log(1 + √(1 + e^(−2L))), L = log z: z of the regularised law is e^(μ/a)."""
+    """Friction with arsinh z = L + log(1 + √(1 + e^(−2L))), L = log z, for large z such as e^(μ/a)."""
 
     def of_logarithm(z: sp.Expr) -> sp.Expr:
         positive = {x: sp.Symbol(x.name, positive=True) for x in z.free_symbols}
@@ -279,15 +278,14 @@ def without_overflow(friction: sp.Expr) -> sp.Expr:
 # ----------------------------------------------------------------------
 # Errors about slow sliding of a fault with rate-and-state friction: slip, and the logarithms of rate and state.
 #
-# About sliding at V without inertia, with v = Ve^y, θ = θ_ss(V)e^z, the slip error x, the pressure error q = p − p* and
-# a shear stress s on the fault, all per unit of area. What is derived here from the law is the change of friction, so
-# that
+# Errors are relative to sliding at V without inertia, with v = Ve^y, θ = θ_ss(V)e^z, the slip error x, the pressure
+# error q = p − p* and a shear stress s on the fault, all per unit of area:
 #
 #     N(μ(y, z) − μ*) + HV(e^y − 1) = −Kx + μ*q + s,    x′ = V(e^y − 1),    z′ = θ′/θ,
 #
-# N = σ′ − p, K = k/A, H = η/A. The slip rate is algebraic: it follows from x, z, q and s at the same instant, so that
-# the
-# pressure reaches y at once (relative degree 0) and x by one integration.
+# with N = σ′ − p, K = k/A, H = η/A. The change of friction is derived here from the law. The slip rate is algebraic: it
+# follows from x, z, q and s at the same instant, so that the pressure acts on y directly (relative degree 0) and on x
+# through one integration.
 
 log_rate, log_state = sp.symbols("y z", real=True)
 sliding_rate = sp.Symbol("V", positive=True)
@@ -295,7 +293,7 @@ sliding_rate = sp.Symbol("V", positive=True)
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingErrors:
-    """Friction and state about sliding at `sliding_rate`, in `log_rate` y and `log_state` z."""
+    """Changes of friction and state about sliding at `sliding_rate`, in `log_rate` y and `log_state` z."""
 
     friction_change: sp.Expr  # μ(y, z) − μ* [-]
     state_change: sp.Expr  # z′ [1/s]
@@ -316,7 +314,7 @@ class SlidingErrors:
 
 
 def sliding_errors(law: FrictionLaw) -> SlidingErrors:
-    """Error dynamics of a law with one state.
+    """Error dynamics about slow sliding for a law with one state.
 
     Parameters
     ----------
@@ -341,23 +339,23 @@ def sliding_errors(law: FrictionLaw) -> SlidingErrors:
 
 
 def _tidy_sliding(change: sp.Expr) -> sp.Expr:
-    """Differences of logarithms in one another; anything else as it is."""
+    """Combine differences of logarithms; return any other expression unchanged."""
     if change.has(sp.asinh):
         return change
     return sp.simplify(sp.expand(sp.expand_log(change, force=True)))
 
 
 # ----------------------------------------------------------------------
-# At which slip rate a fault is studied.
+# Slip rate of the equilibrium.
 
 
 def operating_rate(fault: Fault, rate: float | str | Fraction | None = None) -> Fraction:
-    """Slip rate [m/s] of the equilibrium that is studied, checked against the law.
+    """Slip rate [m/s] of the equilibrium for linearisation and stability, checked against the law.
 
     Raises
     ------
     ParameterError
-        When the rate is outside of the law's working range, or sliding at it is not steady.
+        If the rate is outside the law's working range, or sliding at this rate is not steady.
     """
     law = fault.friction
     value = rational(law.operating_rate if rate is None else rate, "loading_rate")

@@ -28,7 +28,7 @@ def off_kinks() -> Iterator[None]:
         yield
     finally:
         _ALLOW_KINKS.reset(token)
-        clear_cache()  # SymPy remembers derivatives, and must not remember these outside
+        clear_cache()  # SymPy caches derivatives; these must not be used outside
 
 
 def slope_off_kinks(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
@@ -38,19 +38,19 @@ def slope_off_kinks(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
 
 
 class _Power(sp.Function):  # type: ignore[misc]
-    """Common part: argument, exponent, and the rule for derivatives."""
+    """Common base class: argument, exponent, and the rule for derivatives."""
 
     nargs = 2
     is_real = True
     _brackets: ClassVar[tuple[str, str]]
 
     def fdiff(self, argindex: int = 1) -> sp.Expr:
-        """Derivative with respect to the argument; refused where the function has a kink.
+        """Derivative with respect to the argument, if the function has no kink.
 
         Raises
         ------
         KinkError
-            When the derivative is unbounded or jumps at zero, unless inside `off_kinks`.
+            If the derivative is unbounded or jumps at zero, unless inside `off_kinks`.
         """
         x, a = self.args
         if argindex != 1:
@@ -84,7 +84,7 @@ class SignedPower(_Power):
 
     @classmethod
     def eval(cls, x: Any, a: Any) -> sp.Expr | None:
-        """Evaluate a = 1, numbers, and pull out signs."""
+        """Evaluate a = 1 and numbers, and extract signs."""
         if a == 1:
             return x
         if x.is_number and a.is_number and x.is_real and (x != 0 or a >= 0):
@@ -124,7 +124,7 @@ class AbsolutePower(_Power):
 
 
 # ----------------------------------------------------------------------
-# One normal form for expressions in signed powers: an identity between them becomes a comparison with zero.
+# Normal form of expressions in signed powers, which reduces an identity to a comparison with zero.
 
 _ROUNDS = 6
 
@@ -134,7 +134,7 @@ def normal_form(expression: sp.Expr) -> sp.Expr:
 
     Rules, for real arguments: ⌈⌈x⌋^a⌋^b = ⌈x⌋^{ab}, |⌈x⌋^a|^b = |x|^{ab}, ⌈xy⌋^a = ⌈x⌋^a⌈y⌋^a, |x|^a⌈x⌋^b = ⌈x⌋^{a+b},
     ⌈x⌋^a⌈x⌋^b = |x|^{a+b}; `sympy.sign` and `sympy.Abs` become ⌈·⌋⁰ and |·|. A product of two signs of one argument is
-    1, as for the limits that make up a Filippov set.
+    1, as for the limits that span a Filippov set.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def normal_form(expression: sp.Expr) -> sp.Expr:
     Raises
     ------
     KinkError
-        Where a negative power of zero remains.
+        If a negative power of zero remains.
     """
     current = sp.sympify(expression)
     for _ in range(_ROUNDS):
@@ -211,7 +211,7 @@ def _spread_factor(kind: type, factor: sp.Expr, a: sp.Expr) -> sp.Expr:
 
 
 def _content(inner: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Positive factor and rest of an expanded sum: powers of positive symbols and whole powers that all terms share."""
+    """Positive factor and rest of an expanded sum: common powers of positive symbols and common whole powers."""
     terms = sp.Add.make_args(inner)
     if len(terms) == 1:
         return sp.Integer(1), inner

@@ -27,7 +27,7 @@ from quakedesign.symbolic.plant import ErrorDynamics, N_hat, eta_hat, k_hat, p, 
 from quakedesign.symbolic.rate_and_state_plant import effective_stress, operating_rate
 
 # ----------------------------------------------------------------------
-# Whether a fault slides stably, decided with exact rationals where they suffice and in ball arithmetic otherwise.
+# Decision on stable sliding, with exact rationals where these suffice and in ball arithmetic otherwise.
 
 Interval = tuple[Fraction, Fraction]
 Pressure = float | str | Fraction | tuple[float | str | Fraction, float | str | Fraction]
@@ -36,7 +36,7 @@ _PIECES = 200
 
 
 class Stability(Enum):
-    """Three outcomes; the third is no failure but the truth about a boundary."""
+    """Three outcomes; the third one is a valid result at a stability boundary."""
 
     STABLE = "every condition is positive"
     UNSTABLE = "a condition is negative"
@@ -45,14 +45,14 @@ class Stability(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """One expression that stability needs positive, and its value."""
+    """One expression that must be positive for stability, and its value."""
 
     expression: sp.Expr  # In the symbols of the plant and the slopes of friction (`state_plant.stability_conditions`)
-    # Enclosure of the expression relative to the sum of the sizes of its parts [-], in [−1, 1]. The parts are those
-    # with and without the stiffness k, so that a condition k > k_c has the margin (k − k_c)/(k + |k_c|); a condition
-    # without stiffness has its terms for parts.
+    # Enclosure of the expression over the sum of the magnitudes of its parts [-], in [−1, 1]. The parts are those
+    # with and without the stiffness k, so that a condition k > k_c has the margin (k − k_c)/(k + |k_c|). The parts of a
+    # condition without stiffness are its terms.
     margin: Interval
-    exact: bool  # Whether the two ends are one exact rational
+    exact: bool  # Whether both ends are the same exact rational
 
     @property
     def holds(self) -> bool | None:
@@ -73,7 +73,7 @@ class StabilityVerdict:
 
     @property
     def margin(self) -> Interval:
-        """Enclosure of the smallest condition's margin [-]; its sign is rigorous where the outcome is decided."""
+        """Enclosure of the smallest margin of all conditions [-]; its sign is rigorous if the outcome is decided."""
         return min(c.margin[0] for c in self.conditions), min(c.margin[1] for c in self.conditions)
 
     def _repr_latex_(self) -> str:
@@ -96,19 +96,19 @@ def stability(
     ----------
     fault : Fault
     pressure : number, text, or pair of them
-        Injected pressure p [Pa], below σ'; withdrawal is negative and raises the softening (ERRATA 1). A pair is a
-        range, over all of which the verdict holds.
+        Injected pressure p [Pa], below σ'; withdrawal is negative and increases the softening (ERRATA 1). For a pair
+        the verdict holds for the whole range.
     loading_rate : number or text, optional
         Slip rate v_∞ [m/s] of steady sliding; without it the law's ``operating_rate`` (rest for a law without state).
     inertia : bool
-        Whether the mass counts; without it the plant is quasi-dynamic.
+        Whether the plant has mass; without it the plant is quasi-dynamic.
     uncertain : bool
-        Whether stiffness, damping and authority range over the fault's uncertainty box.
+        Whether stiffness, damping and authority vary over the fault's uncertainty box.
 
     Raises
     ------
     ParameterError
-        When the pressure opens the fault, or the rate is outside of the law's domain.
+        If the pressure opens the fault, or the rate is outside the law's domain.
     """
     at = operating_rate(fault, loading_rate)
     pressures = _interval(pressure, fault)
@@ -173,13 +173,13 @@ def _condition(
     points = {s: (fraction_of(v), fraction_of(v)) for s, v in parameters.items()}
     try:
         margin = _enclosed(inserted, {**points, **ranges})
-    except UnsupportedError:  # a parameter as exponent, say: with its number there may be an enclosure
+    except UnsupportedError:  # such as a parameter as exponent: its number may have an enclosure
         margin = _enclosed([t.subs(parameters) for t in inserted], {**points, **ranges})
     return Condition(expression=expression, margin=margin, exact=False)
 
 
 def _parts(expression: sp.Expr) -> list[sp.Expr]:
-    """Summands of a condition by powers of the stiffness, factored: each symbol fewer times, so tighter enclosures."""
+    """Factored summands of a condition by powers of the stiffness: fewer repeated symbols give tighter enclosures."""
     if k_hat not in expression.free_symbols:
         return list(sp.Add.make_args(expression))
     powers = sp.Poly(expression, k_hat).terms()
@@ -187,7 +187,7 @@ def _parts(expression: sp.Expr) -> list[sp.Expr]:
 
 
 def _enclosed(terms: list[sp.Expr], box: BallBox) -> Interval:
-    """Enclosure of Σ terms/Σ |terms| over a box: more digits at a point, more pieces on a range."""
+    """Enclosure of Σ terms/Σ |terms| over a box, refined by precision at a point and by subdivision on a range."""
     before = ctx.prec
     try:
         for ctx.prec in _PRECISIONS:
@@ -231,7 +231,7 @@ def _ratio(terms: list[sp.Expr], box: BallBox) -> Interval:
 def critical_stiffness(
     fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True
 ) -> float:
-    """Stiffness k_c [N/m] below which the fault is unstable, from the closed form; not positive when none is.
+    """Stiffness k_c [N/m] below which the fault is unstable, in closed form; not positive if none is unstable.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def critical_stiffness(
 
 
 def nucleation_length(fault: Fault, *, pressure: float = 0, loading_rate: float | None = None) -> float:
-    """Length [m] below which a fault with this friction slides stably; infinite when every length does.
+    """Length [m] below which a fault with this friction slides stably; infinite if every length is stable.
 
     Parameters
     ----------
@@ -270,13 +270,13 @@ def _number(expression: sp.Expr, fault: Fault, pressure: float, rate: float | No
 
 
 # ----------------------------------------------------------------------
-# The derived model of one fault, for people: equations, eigenvalues, and why it is unstable.
+# Derived model of one fault, for display: equations, eigenvalues, and cause of instability.
 
 _DIGITS = 50
 
 
 class _Forms(NamedTuple):
-    """Expressions of a plant without a friction law, by the names of the state, and with one; why it is unstable."""
+    """Derivations of a plant: `general` and `jacobian` from names of states, the others from a friction law."""
 
     general: Callable[[tuple[str, ...]], sp.Expr]
     jacobian: Callable[[tuple[str, ...]], sp.Matrix]
@@ -306,8 +306,8 @@ _forms_of = by_equilibrium(rest=lambda fault: _AT_REST, sliding=lambda fault: _S
 class Model:
     """Equations of one fault, derived from its force balance.
 
-    A law without state is studied at rest, a law with state (rate and state) in steady sliding at its
-    ``operating_rate``; then the plant has one more dimension for every state variable.
+    The equilibrium is at rest for a law without state, and steady sliding at the ``operating_rate`` for a law with
+    state (rate and state); the plant then has one more dimension for every state variable.
     """
 
     fault: Fault
@@ -322,12 +322,12 @@ class Model:
 
     @cached_property
     def acceleration(self) -> sp.Expr:
-        """x2' of eq. shift [m/s²] with the fault's friction law, in symbols; v' about steady sliding with state."""
+        """x2' of eq. shift [m/s²] with the fault's friction law, in symbols; with state, v' about steady sliding."""
         return self._forms.acceleration(self.fault.friction.symbolic())
 
     @cached_property
     def error_dynamics(self) -> ErrorDynamics:
-        """β and h of eq. esystem3, in symbols; with state, slip is ahead of steady sliding at v_∞."""
+        """β and h of eq. esystem3, in symbols; with state, slip is relative to steady sliding at v_∞."""
         return state_plant.error_dynamics(self._names)
 
     @cached_property
@@ -366,7 +366,7 @@ class Model:
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
-        """Which of the conditions for instability hold, with their numbers [1/s², 1/s]."""
+        """Texts of the conditions for instability that hold, with their numbers [1/s², 1/s]."""
         if not self.unstable:
             return ()
         templates = {

@@ -1,6 +1,6 @@
 """Conversion between SymPy and sums of signed-power terms, and Lyapunov candidates.
 
-Candidates are homogeneous functions generated from weights and degree.
+Candidates are sums of homogeneous terms, generated from weights and degree.
 """
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
@@ -25,7 +25,7 @@ def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ..
     Raises
     ------
     CertificateError
-        When a part is not a product of rational number, parameters and signed powers of single states.
+        If a part is not a product of a rational number, parameters and signed powers of single states.
     """
     parts = sp.Add.make_args(sp.expand(expression))
     return collected((_split(part, set(states)) for part in parts), [state.name for state in states])
@@ -34,9 +34,9 @@ def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ..
 def without_nesting(
     expressions: Sequence[sp.Expr], states: Sequence[sp.Symbol], taken: Iterable[str] = ()
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
-    """Nested signed powers named: the argument of every power of a sum becomes a symbol of its own.
+    """Replace the argument of every signed power of a sum by a new symbol (lift), so that no power is nested.
 
-    Powers of a product of states need none: ⌈x²⌋⁰ = 1 and ⌈xy⌋⁰ = ⌈x⌋⁰⌈y⌋⁰ where neither vanishes.
+    Powers of a product of states need no symbol: ⌈x²⌋⁰ = 1 and ⌈xy⌋⁰ = ⌈x⌋⁰⌈y⌋⁰ where neither vanishes.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def without_nesting(
     lifts : dict of Symbol to Expr
         Argument of every new symbol, in states and earlier symbols; empty without nesting.
     expressions : list of Expr
-        The same, in states and new symbols.
+        The expressions, in states and new symbols.
     """
     lifts: dict[sp.Expr, sp.Symbol] = {}
     names = (f"n{i}" for i in count(1))
@@ -118,7 +118,7 @@ def lie_derivative(function: sp.Expr, field: Mapping[sp.Symbol, sp.Expr]) -> sp.
     Raises
     ------
     KinkError
-        When the function is not continuously differentiable.
+        If the function is not continuously differentiable.
     """
     return sum((function.diff(state) * rate for state, rate in field.items()), start=sp.Integer(0))
 
@@ -129,7 +129,7 @@ def real_symbols(names: Iterable[str]) -> dict[str, sp.Symbol]:
     Raises
     ------
     ParameterError
-        For what is no text.
+        For a name that is not a text.
     """
     listed = list(names)
     if wrong := [name for name in listed if not isinstance(name, str)]:
@@ -142,7 +142,7 @@ def real_symbols(names: Iterable[str]) -> dict[str, sp.Symbol]:
 
 
 def signed_monomials(weights: Mapping[str, int], degree: int, domain: str) -> tuple[Term, ...]:
-    """Every C¹ product of signed powers of the degree that is even under x → −x.
+    """Every C¹ product of signed powers of a degree that is even under x → −x.
 
     Parameters
     ----------

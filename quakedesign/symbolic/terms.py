@@ -17,12 +17,12 @@ class Term:
     """coefficient · parameters · factors."""
 
     coefficient: Fraction
-    parameters: tuple[str, ...]  # Names, each as often as it multiplies
+    parameters: tuple[str, ...]  # Names, each repeated by its power
     factors: tuple[Factor, ...]  # At most one for every state
 
 
 def plain(terms: Iterable[Term]) -> list[Any]:
-    """Terms as JSON can hold them: numbers as texts."""
+    """Terms in JSON types, with numbers as texts."""
     return [
         [exact_text(t.coefficient), list(t.parameters), [[s, exact_text(e), k] for s, e, k in t.factors]] for t in terms
     ]
@@ -39,7 +39,7 @@ def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:
 
 
 def multiplied(factors: Iterable[Factor]) -> tuple[Factor, ...]:
-    """Product of signed powers with every state once; ⌈x⌋⁰ is its sign, |x|⁰ is left out."""
+    """Product of signed powers with every state once; ⌈x⌋⁰ is its sign, |x|⁰ is omitted."""
     powers: dict[str, tuple[Fraction, bool]] = {}
     for state, exponent, kind in factors:
         power, odd = powers.get(state, (Fraction(0), False))
@@ -50,7 +50,7 @@ def multiplied(factors: Iterable[Factor]) -> tuple[Factor, ...]:
 def lie_terms(function: Term, field: Mapping[str, tuple[Term, ...]]) -> Iterator[Term]:
     """Terms of the derivative of a C¹ product along a field, by (⌈x⌋^a)′ = a|x|^{a−1} and (|x|^a)′ = a⌈x⌋^{a−1}.
 
-    That the product is C¹, a ≥ 1 for signed and a > 1 for absolute powers, is the caller's question.
+    The caller ensures that the product is C¹: a ≥ 1 for signed and a > 1 for absolute powers.
     """
     for state, a, kind in function.factors:
         others = [f for f in function.factors if f[0] != state]
@@ -62,7 +62,7 @@ def lie_terms(function: Term, field: Mapping[str, tuple[Term, ...]]) -> Iterator
 
 
 def written(terms: Iterable[Term]) -> str:
-    """Sum as SymPy would read it, with signed and absolute powers as functions; what is added stands first."""
+    """Sum as text for SymPy, with signed and absolute powers as functions and positive terms first."""
     ordered = sorted(terms, key=lambda term: term.coefficient < 0)
     words = [f" {'-' if term.coefficient < 0 else '+'} {_written_size(term)}" for term in ordered]
     return "".join(words)[3:] if ordered and ordered[0].coefficient > 0 else "-" + "".join(words)[3:] if words else "0"
@@ -78,7 +78,7 @@ def _written_size(term: Term) -> str:
 
 
 def value(term: Term, parameters: Mapping[str, Fraction]) -> Fraction:
-    """Coefficient with numbers for the parameters."""
+    """Coefficient of a term with numbers for the parameters."""
     product = term.coefficient
     for name in term.parameters:
         product *= parameters[name]
@@ -102,7 +102,7 @@ def cell_polynomial(
     Raises
     ------
     CertificateError
-        When an exponent does not become an integer.
+        If an exponent does not become a nonnegative integer.
     """
     total: dict[tuple[int, ...], Fraction] = {}
     for term in terms:
@@ -121,12 +121,12 @@ def cell_polynomial(
 def real_polynomial(
     terms: Iterable[Term], states: Sequence[str], parameters: Mapping[str, Fraction]
 ) -> dict[tuple[int, ...], Fraction]:
-    """Polynomial on ℝⁿ of terms whose factors are integer powers of the right parity.
+    """Polynomial on ℝⁿ from terms whose factors are odd signed or even absolute integer powers.
 
     Raises
     ------
     CertificateError
-        When a factor is not a polynomial.
+        If a factor is not a polynomial.
     """
     terms = tuple(terms)
     for term in terms:

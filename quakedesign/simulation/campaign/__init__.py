@@ -1,4 +1,4 @@
-"""Campaigns: many samples of one closed loop, in batches that survive whatever stops them."""
+"""Campaigns: many samples of one closed loop, in batches that survive an interruption."""
 
 from quakedesign.arguments import attach
 

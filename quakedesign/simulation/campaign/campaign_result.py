@@ -1,4 +1,4 @@
-"""Result of a campaign: quantiles, worst samples, samples by index, and its figure."""
+"""Result of a campaign: quantiles, worst samples, samples by index, and a figure."""
 
 import json
 import math
@@ -30,12 +30,12 @@ _DECADES = 30.0
 
 
 def figure(title: str, caption: str, shown: Mapping[str, tuple[np.ndarray, Mapping[float, float | None]]]) -> "Figure":
-    """Return a Figure with the share of samples below every value.
+    """Return a Figure of the empirical distribution functions of the metrics.
 
     Parameters
     ----------
     shown : mapping of str to tuple
-        Under what is shown, with its unit: values of the samples, nan where there is none, and quantiles to mark.
+        By metric with its unit: values of the samples, nan where there is none, and quantiles to mark.
     """
     from matplotlib.figure import Figure
 
@@ -75,7 +75,7 @@ def _distribution(axis: Any, name: str, values: np.ndarray, marks: Mapping[float
 
 
 # ----------------------------------------------------------------------
-# What a campaign returns: quantiles, the worst samples, and every sample again by its index.
+# Result of a campaign: quantiles, worst samples, and a new run of any sample by its index.
 
 LEVELS = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 1.0)
 SHOWN = 5
@@ -98,7 +98,7 @@ class Failure:
     Attributes
     ----------
     samples : tuple of str
-        Indices of its samples, those of the search as ``search-0``.
+        Indices of its samples; samples of the search are called ``search-0`` and so on.
     reason : str
     """
 
@@ -117,10 +117,10 @@ class Campaign:
         By index; None for a sample of a batch that failed.
     failures : tuple of Failure
     resumed : int
-        Number of samples whose result was found in the folder.
+        Number of samples whose result was read from the folder.
     search : Worst or None
     seconds : float
-        Time that this call took [s].
+        Wall-clock time of this call [s].
     """
 
     problem: CampaignProblem = field(repr=False)
@@ -132,7 +132,7 @@ class Campaign:
 
     @cached_property
     def metrics(self) -> tuple[str, ...]:
-        """Names of the metrics that the samples have."""
+        """Names of the metrics of the samples."""
         return metric_names([result for result in self.results if result])
 
     def values(self, metric: str) -> "np.ndarray":
@@ -151,8 +151,8 @@ class Campaign:
     def quantiles(self, levels: Sequence[float] = LEVELS) -> dict[str, dict[str, float | None]]:
         """Quantiles of every metric over the samples that did not fail, by level; None where they diverge.
 
-        A quantile is the value of a sample (inverse of the distribution function), and of `min_pressure`, where less is
-        worse, it is taken from above, so that high levels are bad throughout.
+        A quantile is the value of a sample (inverse of the distribution function). For `min_pressure`, where less is
+        worse, it is counted from above, so that high levels are bad for every metric.
 
         Raises
         ------
@@ -177,13 +177,13 @@ class Campaign:
 
     @cached_property
     def events(self) -> dict[str, list[int]]:
-        """Indices of the samples in which something happened, by what."""
+        """Indices of the samples in which an event occurred, by event."""
         pairs = [(i, result) for i, result in enumerate(self.results) if result]
         return {name: [i for i, result in pairs if name in result.events] for name in EVENTS}
 
     @cached_property
     def outcomes(self) -> tuple[Outcome | None, ...]:
-        """What every sample comes to, by index; None for a sample of a batch that failed."""
+        """Outcome of every sample, by index; None for a sample of a batch that failed."""
         return tuple(self.problem.outcome(result) if result else None for result in self.results)
 
     @cached_property
@@ -193,17 +193,17 @@ class Campaign:
         return {kind: [i for i, own in pairs if own == kind] for kind in KINDS}
 
     def trajectory(self, index: int | str, samples: int = 2000) -> Trajectory:
-        """Run one sample again, with about that many instants and the digits that it has in the campaign.
+        """Run one sample again with about `samples` instants; the results equal those of the campaign bitwise.
 
         Parameters
         ----------
         index : int or str
-            Of the sample; ``"search-3"`` is one that the search looked at.
+            Index of the sample; ``"search-3"`` is a sample of the search.
 
         Raises
         ------
         ParameterError
-            When there is no such sample.
+            If there is no such sample.
         """
         if not isinstance(index, str):
             return self.problem.trajectory(self.problem.sample(index), samples)
@@ -216,7 +216,7 @@ class Campaign:
         return self.problem.trajectory(looked_at[int(number)], samples)
 
     def to_dict(self) -> Json:
-        """Return what JSON can hold: samples, outcomes, worst, quantiles, events, failures, search, resumed."""
+        """Return JSON data: samples, outcomes, worst, quantiles, events, failures, search, resumed."""
         return {
             "samples": len(self.results),
             "outcomes": {kind: {"count": len(found), "first": found[:SHOWN]} for kind, found in self.kinds.items()},
@@ -244,7 +244,7 @@ class Campaign:
         }
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Return a pandas DataFrame over the index: numbers that differ, and metrics, with units; nan where unknown."""
+        """Return a pandas DataFrame by index: varied numbers and metrics with units, nan where unknown."""
         import pandas as pd
 
         numbers = [self.problem.sample(i).numbers for i in range(len(self.results))]
@@ -256,7 +256,7 @@ class Campaign:
         return pd.DataFrame(columns, index=pd.Index(range(len(numbers)), name="sample"))
 
     def save(self, folder: str | Path, figures: Mapping[str, bytes] | None = None) -> None:
-        """Write ``results.json``, ``samples.csv`` and figures into a folder, each whole.
+        """Write ``results.json``, ``samples.csv`` and figures into a folder, each file atomically.
 
         Parameters
         ----------
@@ -308,14 +308,14 @@ def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
 
 
 def require_metric(metric: str, known: Sequence[str]) -> None:
-    """Refuse a metric that there is not."""
+    """Raise if a metric is unknown."""
     if not known:
         raise ParameterError(f"metric must be one of none, as all diverge. Received {metric!r}.")
     require_known(metric, known, "metric")
 
 
 def badness(result: SampleResult, metric: str) -> float:
-    """Value of a metric, or its negative where less is worse; infinite for a diverged sample, or one too large."""
+    """Value of a metric, negated where less is worse; infinite for a diverged sample or a missing value."""
     if result.diverged or metric not in result.figures:
         return math.inf
     value = result.figures[metric]

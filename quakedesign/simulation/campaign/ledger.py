@@ -21,7 +21,7 @@ _NAMED = 5
 
 
 def plain(value: Any) -> Any:
-    """Value as JSON can hold it, types of dataclasses included; texts for what JSON does not know."""
+    """Value in JSON types, dataclasses with the name of their type; other types as text."""
     if is_dataclass(value) and not isinstance(value, type):
         named = {field.name: plain(getattr(value, field.name)) for field in fields(value) if field.compare}
         return {"type": type(value).__name__} | named
@@ -38,7 +38,7 @@ def plain(value: Any) -> Any:
 
 
 def _text(value: Any) -> str:
-    """Text of a value that has one, else the name of its type: never an address in memory."""
+    """Text of a value if its type defines one, else the name of the type: never an address in memory."""
     kind: Any = value if isinstance(value, type) else type(value)
     speaks = kind.__str__ is not object.__str__ or kind.__repr__ is not object.__repr__
     return str(value) if speaks and not isinstance(value, type) else kind.__name__
@@ -54,35 +54,35 @@ def differences(one: Any, other: Any, name: str = "") -> list[str]:
 
 
 def _told(names: list[str]) -> str:
-    """Some of the names; what follows from the others is left out."""
+    """The first few names as text, without the digest that follows from the other entries."""
     chosen = [name or "everything" for name in names if name != "arithmetic"] or names
     return ", ".join(chosen[:_NAMED]) + " and more" * (len(chosen) > _NAMED)
 
 
 @dataclass(frozen=True)
 class Ledger:
-    """Answers of a campaign on disk: the vector at the end of a sample, by the vector at its start."""
+    """Results of a campaign on disk: the final vector of a sample, by its initial vector."""
 
     folder: Path
-    fingerprint: str  # Of everything that the campaign is about
+    fingerprint: str  # Digest of all inputs of the campaign
 
     @classmethod
     def open(cls, folder: Path, inputs: Mapping[str, Any], *, renew: bool = False) -> "Ledger":
-        """Folder of a new campaign, or of this one if it was begun before.
+        """Open the folder of a new campaign, or of this campaign to resume it.
 
         Parameters
         ----------
         inputs : mapping
-            Everything that determines the digits of every sample, as `plain` gives it.
+            Everything that determines the numerical results of the samples, in the form of `plain`.
         renew : bool
-            Delete another campaign that the folder holds; the same one goes on.
+            Delete another campaign in the folder; the same campaign is resumed.
 
         Raises
         ------
         OutputError
-            When the folder holds something else, or cannot be written.
+            If the folder contains other files, or cannot be written.
         SimulationError
-            When it holds another campaign.
+            If it contains another campaign and `renew` is false.
         """
         text = json.dumps(inputs, indent=1, sort_keys=True, allow_nan=False)
         ledger = cls(folder, hashlib.sha256(text.encode()).hexdigest())
@@ -114,7 +114,7 @@ class Ledger:
             path.unlink(missing_ok=True)
 
     def _require_nothing_else(self) -> None:
-        """Refuse a folder without manifest, unless that is only because a campaign was killed at its beginning."""
+        """Raise if a folder without manifest contains other files than those of a campaign killed at its beginning."""
         try:
             names = [path.name for path in self.folder.iterdir()] if self.folder.exists() else []
         except OSError as error:
@@ -127,7 +127,7 @@ class Ledger:
             )
 
     def _changes(self, inputs: Any) -> list[str]:
-        """Names of what differs from the campaign that the folder holds."""
+        """Names of the inputs that differ from those of the campaign in the folder."""
         try:
             held = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -135,12 +135,12 @@ class Ledger:
         return differences(held, inputs)
 
     def read(self) -> "dict[bytes, np.ndarray]":
-        """Vectors at the end by the bytes of those at the start; files that are not whole are passed over.
+        """Final vectors by the bytes of the initial vectors; damaged files are skipped.
 
         Raises
         ------
         SimulationError
-            When there is a file of another campaign.
+            If there is a file of another campaign.
         """
         records: dict[bytes, np.ndarray] = {}
         for path in sorted((self.folder / BATCHES).glob("[!.]*.npz")):
@@ -152,7 +152,7 @@ class Ledger:
         try:
             with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as held:
                 fingerprint, starts, ends = str(held["fingerprint"]), held["starts"], held["ends"]
-        except Exception:  # what zipfile, zlib and numpy raise over damaged bytes has no common name
+        except Exception:  # zipfile, zlib and numpy raise errors without a common base for damaged bytes
             return []
         if fingerprint != self.fingerprint:
             raise SimulationError(
@@ -166,7 +166,7 @@ class Ledger:
         Raises
         ------
         OutputError
-            When it cannot be written.
+            If it cannot be written.
         """
         content = BytesIO()
         np.savez(content, fingerprint=np.array(self.fingerprint), starts=starts, ends=ends)

@@ -1,7 +1,7 @@
-"""Campaign problems: one closed loop, the variation of its samples, and its programme.
+"""Campaign problems: one closed loop, the variation of its samples, and the program that computes them.
 
-Chapters: interface; rate-and-state faults in slow sliding; compiled call for many samples; noise from
-other seeds; loops with a fixed step.
+Chapters: interface; rate-and-state faults in slow sliding; compiled call for many samples; new seeds for the noise;
+loops with a fixed step.
 """
 
 import ctypes
@@ -57,19 +57,19 @@ from quakedesign.simulation.stepping import Advancer
 from quakedesign.simulation.trajectory import Outcome, OutcomeCriterion, Trajectory
 
 # ----------------------------------------------------------------------
-# What a campaign is about: one closed loop, and how its samples differ.
+# Interface of a campaign problem: one closed loop, and the variation of its samples.
 
 NOT_COMPARED = ("settled_from", "steps", "seconds")
 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SampleResult:
-    """What is known of a sample that has been run; a diverged one has events, and its peak slip rate at most.
+    """Result of a sample's run; a diverged sample has events, and of the metrics at most its peak slip rate.
 
     Attributes
     ----------
     figures : mapping of str to float
-        Metrics of the run, those of its length excepted.
+        Metrics of the run, without `settled_from`, `steps` and `seconds`.
     events : mapping of str to float
         Time of first occurrence [s].
     """
@@ -84,14 +84,14 @@ class SampleResult:
 
 
 class CampaignProgram(Protocol):
-    """What a worker needs; it can be sent anywhere.
+    """Program that a worker runs; it can be pickled.
 
     Attributes
     ----------
     lanes : int
         Samples that are stepped at once.
     batch_steps : int
-        Of all samples of a batch together: what is lost when a worker dies, some half a minute.
+        Steps of all samples of a batch together, about half a minute: the loss when a worker dies.
     """
 
     lanes: ClassVar[int]
@@ -102,15 +102,15 @@ class CampaignProgram(Protocol):
         """Digest of the arithmetic."""
 
     def compiled(self, folder: Any) -> "CampaignProgram":
-        """The same, as fast as this machine can make it, with files in a private folder."""
+        """The same program, compiled for this machine if possible, with files in a private folder."""
 
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
-        """Vectors at the end of samples by those at their start, one a row."""
+        """Final vectors of samples from their initial vectors, one a row."""
 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class CampaignProblem(ABC):
-    """One closed loop, and how its samples differ; a vector of numbers at the start of a sample tells the end of it."""
+    """One closed loop and the variation of its samples; a sample's initial vector determines its final vector."""
 
     fault: Fault
     controller: Controller | None
@@ -124,12 +124,12 @@ class CampaignProblem(ABC):
         return f"{type(self).__name__}({self.fault.name}, {self.controller}, {', '.join(self.space.ranges)})"
 
     def point(self, index: int) -> "np.ndarray":
-        """Place of sample number `index` in the unit cube.
+        """Point of sample number `index` in the unit cube.
 
         Raises
         ------
         ParameterError
-            When it is no whole number, or too large.
+            If `index` is not a whole number, or too large.
         """
         if not 0 <= index < MOST_SAMPLES:
             raise ParameterError(f"index must be a whole number, 0 to {MOST_SAMPLES - 1}. Received {index!r}.")
@@ -141,54 +141,54 @@ class CampaignProblem(ABC):
         Raises
         ------
         ParameterError
-            When it is no whole number, or too large.
+            If `index` is not a whole number, or too large.
         """
         return self.space.sample(self.point(index), noise_seed(self.seed, index))
 
     @abstractmethod
     def start(self, sample: Sample) -> "np.ndarray":
-        """Vector of a sample at time zero."""
+        """Initial vector of a sample."""
 
     def starts(self, samples: Sequence[Sample]) -> "np.ndarray":
-        """Vectors of samples at time zero, one a row."""
+        """Initial vectors of samples, one a row."""
         return np.array([self.start(sample) for sample in samples])
 
     @property
     @abstractmethod
     def program(self) -> CampaignProgram:
-        """From the start of samples to their end."""
+        """Program from the initial to the final vectors of samples."""
 
     @abstractmethod
     def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
-        """What the vectors at the end tell."""
+        """Results of samples from their final vectors."""
 
     @property
     @abstractmethod
     def metrics(self) -> tuple[str, ...]:
-        """Names of what every sample has that does not diverge."""
+        """Names of the metrics of every sample that does not diverge."""
 
     @property
     @abstractmethod
     def criterion(self) -> OutcomeCriterion:
-        """What the outcome of every sample is decided by."""
+        """Criterion for the outcome of every sample."""
 
     @abstractmethod
     def trajectory(self, sample: Sample, samples: int) -> Trajectory:
-        """Run of a sample with about that many instants, with the digits that it has in the campaign."""
+        """Run of a sample with about `samples` instants; the results equal those of the campaign bitwise."""
 
     @property
     @abstractmethod
     def own_inputs(self) -> Json:
-        """What determines the digits beside `inputs` of every problem."""
+        """Further entries of `inputs` for this kind of problem."""
 
     def outcome(self, result: SampleResult) -> Outcome:
-        """What a sample comes to."""
+        """Outcome of a sample."""
         peak, error = (result.figures.get(name) for name in ("peak_slip_rate", "max_slip_error"))
         return self.criterion.outcome(peak, error, result.events, followed=self.controller is not None)
 
     @property
     def inputs(self) -> Json:
-        """Everything that determines the digits of every sample, as JSON can hold it."""
+        """Everything that determines the numerical results of the samples, in JSON types."""
         law = {"law": self.controller.name} | plain(self.controller) if self.controller else None
         named = {"name": self.scheme.name} | plain(self.scheme.settings)
         return {
@@ -206,7 +206,7 @@ class CampaignProblem(ABC):
 
 
 # ----------------------------------------------------------------------
-# Samples of a fault with rate-and-state friction held in slow sliding, each a run of its own.
+# Samples of a fault with rate-and-state friction in controlled slow sliding, each in a separate run.
 
 _FIGURES = tuple(part.name for part in fields(Metrics) if part.name not in (*NOT_COMPARED, "max_h_rate"))
 _FACTORS = tuple(field.name for field in fields(SlidingVariation))
@@ -214,7 +214,7 @@ _FACTORS = tuple(field.name for field in fields(SlidingVariation))
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingProgram:
-    """A run of `simulate_sliding` for every sample; vectors are its numbers, then its figures and event times."""
+    """A run of `simulate_sliding` for every sample, from its numbers to its metrics and event times."""
 
     lanes: ClassVar[int] = 1
     batch_steps: ClassVar[int] = 10_000
@@ -232,16 +232,16 @@ class SlidingProgram:
 
     @property
     def fingerprint(self) -> str:
-        """Of the fields that are not named elsewhere; the solver is that of the versions of the libraries."""
+        """Digest of the fields that `inputs` does not contain; the library versions there identify the solver."""
         text = f"{self.path} {self.stress!r} {self.period!r} {self.method}"
         return hashlib.sha256(text.encode()).hexdigest()
 
     def compiled(self, folder: Path) -> Self:
-        """Itself: nothing is compiled."""
+        """The program itself: nothing is compiled."""
         return self
 
     def run(self, numbers: Sequence[float], duration: float, samples: int | None = None) -> SlidingRun:
-        """Run of a sample over a time [s]."""
+        """Run of a sample over a duration [s]."""
         share, phase = numbers[-2:]
         return simulate_sliding(
             self.fault,
@@ -260,7 +260,7 @@ class SlidingProgram:
         )
 
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
-        """Figures, then times of events, one sample a row; nan for what there is not."""
+        """Metrics, then times of events, one sample a row; nan for missing ones."""
         duration = steps * float(self.step)
         return np.array([_told(self.run([float(v) for v in row], duration, 1)) for row in np.atleast_2d(starts)])
 
@@ -273,7 +273,7 @@ def _told(run: SlidingRun) -> list[float]:
 
 @checked_dataclass(frozen=True, kw_only=True, repr=False)
 class SlidingProblem(CampaignProblem):
-    """Friction with a state, held in slow sliding; see `CampaignProblem`. The scheme has the stages of the pressure.
+    """Friction with a state, controlled in slow sliding; see `CampaignProblem`. The actuator belongs to the scheme.
 
     Attributes
     ----------
@@ -305,7 +305,7 @@ class SlidingProblem(CampaignProblem):
 
     @cached_property
     def program(self) -> SlidingProgram:
-        """See `Problem.program`."""
+        """See `CampaignProblem.program`."""
         law: Any = self.controller
         return SlidingProgram(
             fault=self.fault,
@@ -320,11 +320,11 @@ class SlidingProblem(CampaignProblem):
         )
 
     def start(self, sample: Sample) -> "np.ndarray":
-        """See `Problem.start`."""
+        """See `CampaignProblem.start`."""
         return np.array([sample.numbers[name] for name in (*_FACTORS, "amplitude", "phase")])
 
     def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
-        """See `Problem.results`."""
+        """See `CampaignProblem.results`."""
         return [self._result(end.tolist()) for end in ends]
 
     def _result(self, end: list[float]) -> SampleResult:
@@ -334,31 +334,31 @@ class SlidingProblem(CampaignProblem):
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """See `Problem.metrics`."""
+        """See `CampaignProblem.metrics`."""
         return _FIGURES
 
     @cached_property
     def criterion(self) -> OutcomeCriterion:
-        """With the speed at which inertia or damping carries the nominal fault."""
+        """Criterion with the `dynamic_rate` of the nominal fault."""
         return criterion_of(self.fault)
 
     @property
     def own_inputs(self) -> Json:
-        """See `Problem.own_inputs`."""
+        """See `CampaignProblem.own_inputs`."""
         return {"method": self.method, "stress": self.stress, "stress_period": self.stress_period}
 
     def trajectory(self, sample: Sample, samples: int) -> SlidingRun:
-        """See `Problem.trajectory`."""
+        """See `CampaignProblem.trajectory`."""
         return self.program.run(self.start(sample).tolist(), self.setting.steps * self.setting.step, samples)
 
 
 def sliding_space(fault: Fault, spread: Fraction) -> Space:
-    """Space of a, b and D_c off by a share of their values [-], of the fault's box, and of a sine of stress.
+    """Space of relative errors of a, b and D_c [-], the fault's box, and amplitude and phase of a sine of stress.
 
     Raises
     ------
     ParameterError
-        For a spread that is not from 0 to below 1.
+        For a spread outside [0, 1).
     """
     if not 0 <= spread < 1:
         raise ParameterError(f"a spread must be from 0 to below 1. Received {shortly(spread)}. Change it.")
@@ -370,10 +370,10 @@ def sliding_space(fault: Fault, spread: Fraction) -> Space:
 
 
 # ----------------------------------------------------------------------
-# One step of a loop as text, and the compiled call that repeats it for many samples.
+# One step of a loop as source text, and the compiled call that repeats it for many samples.
 
 Mover = Callable[["np.ndarray", int], None]
-SLICE = 200_000  # steps of all samples together in one call of compiled code, which is deaf: a fraction of a second
+SLICE = 200_000  # steps of all samples in one call of compiled code, which cannot be interrupted: below one second
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -385,16 +385,16 @@ class Library:
 
     @classmethod
     def of(cls, path: Path) -> "Library":
-        """Library that has just been built in a private place."""
+        """Library that has just been built in a private folder."""
         return cls(path=path, digest=_digest(path.read_bytes()))
 
     def content(self) -> bytes:
-        """What was built.
+        """Bytes of the library as built.
 
         Raises
         ------
         OSError
-            When it is not there any more, or something else is.
+            If the file is missing or was changed.
         """
         content = self.path.read_bytes()
         if _digest(content) != self.digest:
@@ -408,13 +408,13 @@ def _digest(content: bytes) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class CompiledProgram:
-    """What a worker needs to move samples on; it can be sent anywhere."""
+    """Program with which a worker advances samples; it can be pickled."""
 
     lanes: ClassVar[int] = LANES
     batch_steps: ClassVar[int] = 80_000_000
 
     source: str  # C text with ``advance_samples``, which steps several of them at once
-    # The step with all elementary functions written out, as CasADi writes it, for workers without a C compiler
+    # The step with all elementary functions written out, serialised by CasADi, for workers without a C compiler
     function: str
     size: int  # Length of the vector of one sample
     diverged: int  # Index of the time of divergence in it
@@ -422,7 +422,7 @@ class CompiledProgram:
 
     @classmethod
     def of(cls, step: Any, diverged: int) -> "CompiledProgram":
-        """Program of a CasADi Function that maps the vector one step on."""
+        """Program of a CasADi Function that advances the vector by one step."""
         source, function = lanes_c(step, diverged), expanded(step).serialize()
         return cls(source=source, function=function, size=step.size1_in(0), diverged=diverged)
 
@@ -432,7 +432,7 @@ class CompiledProgram:
         return hashlib.sha256(self.function.encode()).hexdigest()
 
     def compiled(self, folder: Path) -> "CompiledProgram":
-        """Program whose library lies in a folder, which must be private; the same program where no compiler works."""
+        """Program with a library in a folder, which must be private; the same program if no compiler works."""
         try:
             command = compiler()
             built = shared_library(self.source, folder, command, (*LANE_FLAGS, *processor_flags(command)))
@@ -441,7 +441,7 @@ class CompiledProgram:
             return self
 
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
-        """Vectors after a number of steps, one a row, in slices that can be interrupted; one that diverges ends there.
+        """Vectors after a number of steps, one a row, in interruptible slices; a diverged sample stops.
 
         Parameters
         ----------
@@ -458,9 +458,9 @@ class CompiledProgram:
 
 @lru_cache(maxsize=8)
 def mover(program: CompiledProgram) -> Mover:
-    """Callable (vectors, steps) that moves vectors, one a row, on in place: machine code where it can be had.
+    """Callable (vectors, steps) that advances vectors, one a row, in place: in machine code if available.
 
-    A library that is missing or is not what was built, as on another machine, is built anew.
+    A library that is missing or was changed, as on another machine, is built again.
     """
     with temporary_folder() as folder:
         for given in (program, replace(program, library=None)):
@@ -471,7 +471,7 @@ def mover(program: CompiledProgram) -> Mover:
 
 
 def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
-    library = folder / f"{_digest(content)}.so"  # of another name than one that is loaded already, and refused
+    library = folder / f"{_digest(content)}.so"  # a name that differs from a rejected library that is already loaded
     library.write_bytes(content)
     loaded = ctypes.CDLL(str(library))
     if not loaded.made_for_this_processor():
@@ -502,7 +502,7 @@ def _virtual_machine(program: CompiledProgram) -> Mover:
 
 
 def _moved(advancer: Advancer, start: "np.ndarray", steps: int, diverged: int) -> "np.ndarray":
-    """Vector after a number of steps, or after the one at which divergence is noticed, as in machine code."""
+    """Vector after a number of steps, or after the step that detects divergence, as in machine code."""
     advancer.vector[:] = start
     advancer.advance(steps)
     if advancer.vector[diverged] >= 0:
@@ -513,15 +513,15 @@ def _moved(advancer: Advancer, start: "np.ndarray", steps: int, diverged: int) -
 
 
 # ----------------------------------------------------------------------
-# The same noise from other seeds.
+# New seeds for the noise of a scheme.
 
 Value = TypeVar("Value")
 
 
 def reseeded(value: Value, seed: int) -> Value:
-    """A frozen dataclass, or a tuple, in which every entry called ``seed`` is derived from another seed.
+    """Copy of a frozen dataclass or tuple in which every field ``seed`` is derived from a given seed.
 
-    Entries within entries are reached too; no two get the same seed, so that two noises stay independent.
+    Nested fields are included. All derived seeds differ, so that noises stay independent.
     """
     walked: Value = _walk(value, seed, [0])
     return walked
@@ -555,7 +555,7 @@ _SLICE = 4096
 
 @checked_dataclass(frozen=True, kw_only=True, repr=False)
 class SteppedProblem(CampaignProblem):
-    """Friction of slip and slip rate, with a fixed step; see `CampaignProblem`.
+    """Friction that depends on slip and slip rate, with a fixed step; see `CampaignProblem`.
 
     Attributes
     ----------
@@ -567,7 +567,7 @@ class SteppedProblem(CampaignProblem):
     load: Load
 
     def recorder(self, sample: Sample) -> Recorder:
-        """Loop of a sample with all that is watched."""
+        """Loop of a sample with all recorded quantities."""
         numbers = dict(sample.numbers)
         varied = Variation(**{name: numbers.pop(name) for name in names()})
         initial = numbers["initial_slip"], numbers["initial_slip_rate"]
@@ -578,11 +578,11 @@ class SteppedProblem(CampaignProblem):
         loop_class(self.plant)
 
     def start(self, sample: Sample) -> "np.ndarray":
-        """See `Problem.start`."""
+        """See `CampaignProblem.start`."""
         return np.array(self.recorder(sample).start(self.setting.settled_from))
 
     def starts(self, samples: Sequence[Sample]) -> "np.ndarray":
-        """See `Problem.starts`; without noise samples differ in their first state and their factors alone."""
+        """See `CampaignProblem.starts`; without noise samples differ only in initial state and factors."""
         if not samples or self._noisy:
             return super().starts(samples)
         rows = np.tile(self.start(samples[0]), (len(samples), 1))
@@ -593,18 +593,18 @@ class SteppedProblem(CampaignProblem):
 
     @cached_property
     def _noisy(self) -> bool:
-        """Whether the seed of a sample tells in its start; four seeds have one start where it does not."""
+        """Whether the initial vector of a sample depends on its seed, tested with four seeds."""
         one = self.sample(0)
         return len({self.start(replace(one, noise_seed=seed)).tobytes() for seed in range(4)}) > 1
 
     @cached_property
     def _watched(self) -> Recorder:
-        """Recorder of any sample: what it computes from a vector is the same for all."""
+        """Recorder of sample 0; all samples have the same functions of the vector."""
         return self.recorder(self.sample(0))
 
     @cached_property
     def criterion(self) -> OutcomeCriterion:
-        """With the natural earthquake of the nominal fault."""
+        """Criterion with the natural earthquake of the nominal fault."""
         return OutcomeCriterion.of(self.fault, natural_peak(self.fault))
 
     @cached_property
@@ -616,11 +616,11 @@ class SteppedProblem(CampaignProblem):
 
     @property
     def own_inputs(self) -> Json:
-        """See `Problem.own_inputs`."""
+        """See `CampaignProblem.own_inputs`."""
         return {"method": self.method.name, "load": plain(self.load)}
 
     def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
-        """See `Problem.results`."""
+        """See `CampaignProblem.results`."""
         vector = ca.SX.sym("z", self._watched.size)
         observe = ca.Function("observe", [vector], [self._watched.observe(vector)])
         slices = (ends[first : first + _SLICE] for first in range(0, len(ends), _SLICE))
@@ -632,7 +632,7 @@ class SteppedProblem(CampaignProblem):
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """See `Problem.metrics`."""
+        """See `CampaignProblem.metrics`."""
         return tuple(self._figures(defaultdict(lambda: 1.0, diverged=-1.0)))
 
     def _figures(self, watched: dict[str, float]) -> Json:
@@ -649,5 +649,5 @@ class SteppedProblem(CampaignProblem):
         return {name: value for name, value in measured.items() if value is not None and name not in NOT_COMPARED}
 
     def trajectory(self, sample: Sample, samples: int) -> Trajectory:
-        """See `Problem.trajectory`."""
+        """See `CampaignProblem.trajectory`."""
         return run(self.recorder(sample), replace(self.setting, samples=samples), self.method, self.criterion)

@@ -38,10 +38,10 @@ from quakedesign.simulation.slow_sliding import PLANTS
 from quakedesign.simulation.state_plant import TIDE
 
 # ----------------------------------------------------------------------
-# Batches handed to workers until each has an answer or has failed a bounded number of times.
+# Dispatch of batches to workers until each has a result or has failed a bounded number of times.
 
 ATTEMPTS = 3
-_MOST_DEATHS = 2 * ATTEMPTS  # in a row: then the workers themselves do not live
+_MOST_DEATHS = 2 * ATTEMPTS  # in a row: then the workers cannot run at all
 _DEATH = (
     "a worker died (out of memory, or killed; in a script, the call belongs under if __name__ == '__main__':), "
     "each time that this batch was computed"
@@ -51,10 +51,10 @@ _DEATH = (
 def dispatch(
     task: Callable[..., Any], batches: Mapping[int, tuple[Any, ...]], crew: Crew, keep: Callable[[int, Any], None]
 ) -> dict[int, str]:
-    """Reasons why batches failed, by their key; none for those whose answer was kept.
+    """Reasons why batches failed, by their key; a successful batch has no entry.
 
-    A worker that dies takes the whole pool along, so that the guilty batch is not known: all that were under way are
-    suspects, and are computed again one at a time. Only a batch that was alone is charged with a death.
+    A worker that dies stops the whole pool, so that the batch that caused it is not known: all running batches are
+    suspects, and are computed again one at a time. Only a batch that ran alone is charged with a death.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def dispatch(
     batches : mapping of int to tuple
         Arguments, by key.
     keep : callable
-        Called with key and answer, in any order.
+        Called with the key and result of each finished batch, in any order.
     """
     return _Dispatch(task, batches, crew, keep).run()
 
@@ -90,7 +90,7 @@ class _Dispatch:
         return self._failed
 
     def _fill(self) -> list[int]:
-        """Start as many batches as are worth it; those that a broken executor refused."""
+        """Start as many batches as the crew takes at once; return one that a broken executor rejects."""
         queue, most = (self._suspects, 1) if self._suspects else (self._waiting, self._crew.width)
         while queue and len(self._running) < most:
             key = queue.popleft()
@@ -101,7 +101,7 @@ class _Dispatch:
         return []
 
     def _collect(self, key: int, future: "Future[Any]") -> list[int]:
-        """Keep an answer, or charge the batch with its error; a batch whose worker died is returned."""
+        """Store a result, or charge the batch with its error; return a batch whose worker died."""
         try:
             answer = future.result()
         except BrokenExecutor:
@@ -114,7 +114,7 @@ class _Dispatch:
         return []
 
     def _bury(self, dead: list[int]) -> None:
-        """Renew the workers and decide who is suspected of the death."""
+        """Renew the workers and decide which batches are suspected of the death."""
         self._running.clear()
         self._deaths += 1
         if self._deaths > _MOST_DEATHS:
@@ -129,7 +129,7 @@ class _Dispatch:
             self._suspects.extend(dead)
 
     def _left(self) -> list[int]:
-        """Batches under way that the broken workers leave without an answer."""
+        """Running batches left without a result by the broken workers."""
         done, pending = wait(self._running, timeout=1.0)
         lost = [key for future in done for key in self._collect(self._running[future], future)]
         return lost + [self._running[future] for future in pending]
@@ -143,7 +143,7 @@ class _Dispatch:
 
 
 # ----------------------------------------------------------------------
-# A campaign from beginning to end, or from where it was left.
+# A campaign from beginning to end, or resumed.
 
 LARGEST_BATCH = 1024
 BATCHES_PER_WORKER = 8
@@ -176,7 +176,7 @@ def campaign_problem(
     ----------
     fault : Fault
     controller : Controller, optional
-        None: the pressure stays zero. Of friction with a state an e-LQR of `design`, which holds it in slow sliding.
+        None: the pressure stays zero. For friction with a state an e-LQR of `design`, which keeps the sliding slow.
     scheme, step, method, duration, settled_from, plant, load
         As in `simulate`; step [s], duration [s], settled_from [s].
     initial_slip : float
@@ -184,17 +184,17 @@ def campaign_problem(
     initial_slip_rate : float
         Largest initial slip rate of a sample [m/s].
     spread : float or Fraction
-        Of friction with a state: by how much of their values a, b and D_c are off [-]; σ', k and η by the fault's box,
-        whose authority is that of σ'.
+        For friction with a state: largest relative error of a, b and D_c [-]. σ', k and η vary within the fault's box;
+        its authority is the relative error of σ'.
     stress, stress_period : float
-        Of friction with a state: bound [Pa] and period [s] of a sine of shear stress, of any share and phase.
+        For friction with a state: bound [Pa] and period [s] of a sine of shear stress of varied amplitude and phase.
     seed : int
-        Of the Sobol sequence and of everything else that is random.
+        Seed of the Sobol' sequence and of all other random numbers.
 
     Raises
     ------
     ParameterError
-        When a value is out of range, or a scheme or integrator is unknown.
+        If a value is out of range, or a scheme or integrator is unknown.
     """
     require_whole(0, seed=seed)
     way, step, own = own_way(controller, scheme, step)
@@ -243,10 +243,10 @@ def run_campaign(
 ) -> Campaign:
     """Run many samples of a closed loop, and store every finished batch in a folder.
 
-    Interrupted or killed at any moment, the same call goes on from the files, and its answer has the digits of an
-    uninterrupted one, whatever the workers and their number. More samples than before go on from those that are there.
-    The digits depend neither on the processor nor on the C compiler and its library, but for loads with tan, inverse
-    functions or hyperbolic ones other than tanh.
+    After an interruption at any moment the same call resumes from the files. Its result equals that of an
+    uninterrupted call bitwise, for any kind and number of workers. A call with more samples computes only the new ones.
+    Results depend neither on the processor nor on the C compiler and its library, except for loads with tan, inverse
+    functions or hyperbolic functions other than tanh.
 
     Parameters
     ----------
@@ -255,11 +255,11 @@ def run_campaign(
     samples : int
         Number of samples; number i depends on the seed and on i alone.
     folder : str or Path
-        New, empty, or that of this campaign. It holds one file for each batch that is done.
+        New, empty, or that of this campaign. It contains one file for each finished batch.
     metric : str, optional
-        Look for the worst value of this metric, starting from the worst sample and the corners of the box.
+        Search for the worst value of this metric, starting from the worst sample and the corners of the box.
     rounds : int
-        Of that search.
+        Number of rounds of that search.
     workers : int, optional
         Number of processes; one per core unless given.
     scheduler : str, optional
@@ -267,11 +267,11 @@ def run_campaign(
     executor : Executor, optional
         Any other executor of `concurrent.futures` that is used instead.
     batch : int, optional
-        Samples in a batch; as many as take about half a minute, unless given.
+        Samples in a batch; unless given, as many as take about half a minute.
     renew : bool
-        Delete another campaign that the folder holds; the same one goes on.
+        Delete another campaign in the folder; the same campaign is resumed.
     tell : callable
-        Called with what is being done and the fraction done [-].
+        Called with the current task and the fraction done [-].
 
     Returns
     -------
@@ -281,7 +281,7 @@ def run_campaign(
     ------
     ParameterError, OutputError
     SimulationError
-        When the folder holds another campaign, or the workers cannot be reached.
+        If the folder contains another campaign, or the workers cannot be reached.
     """
     require_count(samples)
     if metric is not None:
@@ -329,7 +329,7 @@ class _Runner:
 
     @property
     def resumed(self) -> int:
-        """Number of samples whose result was in the folder."""
+        """Number of samples whose result was read from the folder."""
         return len(self._used & self._filed)
 
     def results(self, samples: Sequence[Sample], names: Sequence[str], what: str) -> list[SampleResult | None]:
@@ -369,7 +369,7 @@ class _Runner:
         return max(1, min(-(-count // width), max(lanes, wished // lanes * lanes)))
 
     def search(self, results: Sequence[SampleResult | None], metric: str, rounds: int) -> Worst | None:
-        """Worst sample by a metric, from the worst one known and the corners on; None where all failed."""
+        """Worst sample by a metric, searched from the worst result and the corners; None if all failed."""
         known = [(i, result) for i, result in enumerate(results) if result]
         if not known:
             return None

@@ -18,7 +18,7 @@ from quakedesign.fault import Fault
 from quakedesign.fault.model import require_nonnegative
 
 # ----------------------------------------------------------------------
-# What differs from sample to sample, and sample number i as a function of seed and i alone.
+# Numbers that vary between samples; sample number i is a function of seed and i alone.
 
 MOST_SAMPLES = 2**20
 PERIODIC = frozenset({"phase"})
@@ -32,10 +32,10 @@ class Sample:
     Attributes
     ----------
     numbers : mapping of str to float
-        What differs from sample to sample but for the seed, by the names of the space; x1 [m] and x2 [m/s] at the
-        start as ``initial_slip`` and ``initial_slip_rate``.
+        Varied numbers by the names of the space; the initial x1 [m] and x2 [m/s] are ``initial_slip`` and
+        ``initial_slip_rate``.
     noise_seed : int
-        Of the noise in the measurements.
+        Seed of the measurement noise.
     """
 
     numbers: Mapping[str, float]
@@ -44,24 +44,24 @@ class Sample:
 
 @checked_dataclass(frozen=True)
 class Space:
-    """Interval of every number that differs from sample to sample; within it all values are equally likely.
+    """Interval of every number that varies between samples, with a uniform distribution.
 
     Attributes
     ----------
     ranges : mapping of str to tuple of float
-        Lowest and highest value by the names of `Sample.numbers`, SI units.
+        Lowest and highest value by the names of `Sample.numbers`, in SI units.
     """
 
     ranges: Mapping[str, tuple[float, float]]
 
     @classmethod
     def of(cls, fault: Fault, *, initial_slip: float = 0.0, initial_slip_rate: float = 0.0) -> "Space":
-        """Space of a fault's uncertainty box and disturbance, and of initial states from rest up to given ones.
+        """Space of a fault's uncertainty box and disturbance, and of initial states from rest up to given bounds.
 
         Parameters
         ----------
         initial_slip, initial_slip_rate : float
-            Largest x1 [m] and x2 [m/s] at the start, not negative.
+            Largest initial x1 [m] and x2 [m/s], not negative.
         """
         require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
         widths = {name: getattr(fault.box, name) for name in ("stiffness", "damping", "authority")}
@@ -72,12 +72,12 @@ class Space:
 
     @property
     def active(self) -> tuple[int, ...]:
-        """Numbers of the coordinates whose interval is more than a point."""
+        """Indices of the coordinates whose interval is more than a point."""
         return tuple(i for i, (low, high) in enumerate(self.ranges.values()) if high > low)
 
     @property
     def periodic(self) -> tuple[int, ...]:
-        """Numbers of the coordinates whose ends are one."""
+        """Indices of the periodic coordinates."""
         return tuple(i for i, name in enumerate(self.ranges) if name in PERIODIC)
 
     def sample(self, point: "Sequence[float] | np.ndarray", noise_seed: int) -> Sample:
@@ -86,7 +86,7 @@ class Space:
         Raises
         ------
         ParameterError
-            When the point has another dimension.
+            If the point has another dimension.
         """
         if len(point) != len(self.ranges):
             raise ParameterError(f"point must hold {len(self.ranges)} numbers, one a range. Received {len(point)}.")
@@ -118,13 +118,13 @@ def noise_seed(seed: int, index: int) -> int:
 
 
 def require_count(samples: int) -> None:
-    """Refuse a number of samples that is none."""
+    """Raise if a number of samples is out of range."""
     if not is_whole(samples, 1, MOST_SAMPLES):
         raise ParameterError(f"samples must be a whole number, 1 to {MOST_SAMPLES}. Received {samples!r}.")
 
 
 # ----------------------------------------------------------------------
-# The worst sample that a search finds: the corners of the box, then a pattern that closes in.
+# Search for the worst sample: the corners of the box, then a pattern search.
 
 FIRST_SPAN = 0.25
 
@@ -134,7 +134,7 @@ Evaluate = Callable[[Sequence[Sample]], "Sequence[float]"]
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Worst:
-    """The worst sample that a search has found; that there is no worse one is not claimed.
+    """Worst sample of a search: a lower bound of the worst case.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class Worst:
         Infinite for a run that diverges.
     sample : Sample
     index : int
-        Place in the row of samples that the search has looked at.
+        Index in `looked_at`, the samples of the search in order.
     looked_at : tuple of Sample
     """
 
@@ -155,13 +155,13 @@ class Worst:
 
 
 def corners(space: Space) -> list[Point]:
-    """Every combination of the ends of the intervals; a coordinate whose ends are one stays at its start."""
+    """Every combination of the ends of the intervals; a periodic coordinate stays at its lower end."""
     ends = [(0.0, 1.0) if i in space.active and i not in space.periodic else (0.0,) for i in range(len(space.ranges))]
     return list(product(*ends))
 
 
 def neighbours(space: Space, centre: Point, span: float) -> list[Point]:
-    """Points beside a centre, one coordinate changed by a span, inside the box."""
+    """Points that differ from a centre by ±span in one coordinate, limited to the box."""
     points = []
     for i in space.active:
         for moved in (centre[i] - span, centre[i] + span):
@@ -180,17 +180,17 @@ def search(
     noise_seed: int,
     rounds: int,
 ) -> Worst:
-    """Worst sample from given starts and all corners on, by pattern search (Hooke and Jeeves 1961) in whole batches.
+    """Worst sample from given starts and all corners, by pattern search (Hooke and Jeeves 1961) in whole batches.
 
-    Every round looks at all neighbours of the worst point so far; where none is worse, the next round looks half as
-    far. The noise is the same in all samples, so that they differ by their point alone.
+    Every round computes all neighbours of the worst point so far; if none is worse, the span is halved. The noise
+    is the same in all samples, so that they differ by their point alone.
 
     Parameters
     ----------
     metric : str
-        Only handed on.
+        Name of the metric, passed to the result.
     evaluate : callable
-        How bad samples are: larger is worse, infinite ends the search.
+        Badness of samples: larger is worse; an infinite value ends the search.
     starts : sequence of sequence of float
         Points of the unit cube.
     """
