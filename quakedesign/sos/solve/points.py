@@ -117,7 +117,7 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
 
 
 def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[float], float]]:
-    """Points strictly inside with a negative value, and their distances from x in decreasing order.
+    """Points strictly inside where the polynomial is negative, with their distances from x in decreasing order.
 
     They lie in the direction in which the slowest active constraint increases fastest; none if no direction exists.
     """
