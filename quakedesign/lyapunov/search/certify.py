@@ -98,7 +98,7 @@ def closed_loop(
     ParameterError, UnknownNameError
         As `certify`.
     CertificateError
-        When the law has parts that certificates do not know.
+        When certificates do not support a part of the law.
     """
     name, model = model_of(subject)
     exact = exact_gains(subject, gains)
@@ -406,7 +406,7 @@ def largest_lipschitz(
     ParameterError, UnknownNameError
         As `certify`.
     CertificateError
-        When the law has parts that certificates do not know.
+        When certificates do not support a part of the law.
     """
     began = perf_counter()
     base = closed_loop(subject, gains, lipschitz=1, gain_range=gain_range)
