@@ -1,4 +1,4 @@
-"""Claims about closed loops, their files, and the exact decision."""
+"""Claims about closed loops, their certificate files, and their exact check."""
 
 from quakedesign.arguments import attach
 

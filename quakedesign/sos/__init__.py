@@ -1,4 +1,4 @@
-"""Positivity of polynomials with exact proofs; knows nothing of faults. What decides needs no solver."""
+"""Positivity of polynomials with exact proofs; independent of faults. The checks need no solver."""
 
 from quakedesign.arguments import attach
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# The exact decision: whether a certificate proves, or refutes, what it claims.
+# Exact check whether a certificate proves or refutes its claim.
 
 
 def check(certificate: Evidence, law: "Subject | None" = None) -> Verdict:
@@ -44,7 +44,7 @@ def _decided(certificate: Evidence, law: "Subject | None") -> Verdict:
 
 
 def _same_field(loop: Loop, law: "Subject | None") -> None:
-    """Compare the field with the law's own, derived from its expressions; a bare field has no name to compare."""
+    """Require the field derived from the law's expressions, and the law's name unless the field is bare."""
     require(
         law is not None or is_law(loop.law),
         f"the law {loop.law!r} is not one of the package, so its field cannot be derived again. "
@@ -97,7 +97,7 @@ def _check_proof(certificate: Evidence) -> None:
 
 
 def _check_witnesses(certificate: Evidence, obligations: Iterable[Obligation]) -> None:
-    """Refuse unless every different obligation has its witness, in order, and it is exact."""
+    """Require an exact witness for every different obligation, in order."""
     expected = list[str]()
     for one in different(obligations):
         expected.append(one.name)
@@ -142,7 +142,7 @@ def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
 
 
 def touching_cells(loop: Loop, point: Mapping[str, Fraction]) -> dict[str, dict[str, int]]:
-    """Sign cells whose closure holds a point, by name."""
+    """Sign cells whose closure contains a point, by name."""
     choices = [(1, -1) if point[s] == 0 else ((1,) if point[s] > 0 else (-1,)) for s in loop.states]
     return {
         "".join("+" if s > 0 else "-" for s in signs): dict(zip(loop.states, signs, strict=True))
@@ -170,7 +170,7 @@ def limit(
 
 
 # ----------------------------------------------------------------------
-# Evidence that decides itself, and goes into a file and back.
+# Evidence with its exact check and its file.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -181,7 +181,7 @@ class Certificate(Evidence):
     ----------
     loop : Loop
     lyapunov : tuple of Term
-        V; empty for a refutation.
+        Lyapunov function V; empty for a refutation.
     claims : mapping of str to Fraction
         ``positive`` and ``decrease`` or ``rate`` [1/s on `reals`].
     witnesses : mapping of str to Witness
@@ -191,34 +191,34 @@ class Certificate(Evidence):
 
     @classmethod
     def of(cls, evidence: Evidence) -> "Certificate":
-        """Certificate with the parts of evidence."""
+        """Certificate with the parts of an `Evidence`."""
         return cls(**{part.name: getattr(evidence, part.name) for part in fields(Evidence)})
 
     def check(self, law: "str | type[Law] | LoopField | None" = None) -> Verdict:
-        """Re-decide the statement from nothing but its claim, in exact arithmetic; field against law as well.
+        """Check proof or counterexample in exact arithmetic, and the field against that of the law.
 
         Parameters
         ----------
         law : str, type of Law or LoopField, optional
-            What the field must be that of; without it the law of the package that the certificate names.
+            Law that the field must belong to; by default the law of the package that the certificate names.
 
         Raises
         ------
         CertificateError
             When the proof does not hold, or the field is not that of the law.
         WorkError
-            When that takes more work than a check may (proofs/FORMAT.md): it is undecided.
+            When the check exceeds its work budget (proofs/FORMAT.md) and is undecided.
         """
         return check(self, law)
 
     def save(self, path: str | Path) -> None:
-        """Write the file of FORMAT.md, whole or not at all."""
+        """Write the file of FORMAT.md atomically."""
         save_certificate(self, path)
 
 
 @dataclass(frozen=True, slots=True)
 class _Problem:
-    """A certificate and a law, the same as another by all that they hold."""
+    """A certificate and a law, compared by contents."""
 
     digest: bytes
     law: "str | type[Law] | None"
@@ -226,14 +226,14 @@ class _Problem:
 
 
 def decided_once(certificate: Certificate, law: "str | type[Law] | LoopField | None" = None) -> Verdict:
-    """Verdict of `Certificate.check`, found once in a process for the same contents and law.
+    """Verdict of `Certificate.check`, cached per process by contents and law.
 
-    Searches that hand a certificate on ask for it; of a bare loop it is found each time.
+    The verdict on a bare loop is not cached.
 
     Raises
     ------
     CertificateError, WorkError
-        As `Certificate.check`, each time.
+        As `Certificate.check`, on every call.
     """
     if not isinstance(law, str | type | None):
         return certificate.check(law)
@@ -246,7 +246,7 @@ def _verdict(problem: _Problem) -> Verdict:
 
 
 def load_certificate(path: str | Path) -> Certificate:
-    """Read a certificate file; reading verifies nothing.
+    """Read a certificate file without checking the certificate.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def load_certificate(path: str | Path) -> Certificate:
     Raises
     ------
     CertificateError
-        When the file cannot be read or breaks a rule of FORMAT.md.
+        When the file is not readable or breaks a rule of FORMAT.md.
     """
     return Certificate.of(evidence_of(read_json(path)))
 

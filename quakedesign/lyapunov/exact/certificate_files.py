@@ -1,6 +1,6 @@
 """Certificate files (proofs/FORMAT.md): numbers, sums of terms, strict reading, writing.
 
-The last chapter reads the kind of claim of a file without loading the code that decides it.
+A further chapter reads the kind of claim of a file without loading the code that checks it.
 """
 
 import json
@@ -72,7 +72,7 @@ class LoopEntries(Entries):
     field: dict[Name, Terms]
 
     def loop(self) -> Loop:
-        """The loop, of names that differ and terms that name only these."""
+        """Loop; its names must differ, and its terms contain no other names."""
         names = [*self.gains, *self.constants, *self.states, *self.uncertain, *self.roots, *self.lifts]
         few = len(self.gains) + len(self.constants) <= LIMITS["parameters"]
         need(len(set(names)) == len(names) and few, f"names must differ, at most {LIMITS['parameters']} parameters")
@@ -95,7 +95,7 @@ class LoopEntries(Entries):
 
 
 def terms_of(entries: tuple[TermEntries, ...], loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
-    """Sum of terms with powers of the given names; parameters are all others of the loop."""
+    """Sum of terms with powers of the given names; all other names of the loop are parameters."""
     parameters = {*loop.gains, *loop.constants, *loop.ranges}
     for coefficient, names, factors in entries:
         need(coefficient != 0, "a term must not be zero")
@@ -115,7 +115,7 @@ def term_entries(terms: Iterable[Term]) -> tuple[TermEntries, ...]:
 
 
 class SquareEntries(Entries):
-    """A square, and the variables that it is multiplied by."""
+    """A square and the variables that multiply it."""
 
     times: Exponents
     basis: Annotated[tuple[Exponents, ...], Meta(max_length=LIMITS["basis"])]
@@ -132,7 +132,7 @@ class WitnessEntries(Entries):
     inequalities: Annotated[tuple[tuple[SquareEntries, ...], ...], Meta(max_length=LIMITS["lifts"])]
 
     def witness(self, loop: Loop) -> Witness:
-        """The witness, of sizes that fit the loop."""
+        """Witness; its sizes must match the loop."""
         need(
             self.multiplier != {} and len(self.multiplier) <= LIMITS["basis"], "a multiplier must not be empty or long"
         )
@@ -178,7 +178,7 @@ class RefutationEntries(Entries):
 
 
 class ProofFile(LoopEntries):
-    """All of a proof but its format."""
+    """Entries of a file with a proof, without the format."""
 
     V: Terms
     claims: Annotated[Numbers, Meta(max_length=3 + LIMITS["states"])]
@@ -186,13 +186,13 @@ class ProofFile(LoopEntries):
 
 
 class RefutationFile(LoopEntries):
-    """All of a refutation but its format."""
+    """Entries of a file with a refutation, without the format."""
 
     refutation: RefutationEntries
 
 
 # ----------------------------------------------------------------------
-# The certificate file (proofs/FORMAT.md): read strictly, written whole.
+# The certificate file (proofs/FORMAT.md): read strictly, written atomically.
 
 
 def read_json(path: str | Path) -> Any:
@@ -201,21 +201,21 @@ def read_json(path: str | Path) -> Any:
     Raises
     ------
     CertificateError
-        When it cannot be read, or is no strict JSON.
+        When the file is not readable, or is no strict JSON.
     """
     text = read_text(path, "certificate", largest=LARGEST_FILE, refusal=CertificateError, marked=False)
     return parse(text)
 
 
 def evidence_of(raw: object) -> Evidence:
-    """Evidence from a parsed file; reading verifies nothing.
+    """Evidence of a parsed file, which is not checked.
 
     Raises
     ------
     CertificateError
-        When it breaks a rule of FORMAT.md.
+        When the file breaks a rule of FORMAT.md.
     UnsupportedError
-        For a bound of outputs under inputs, which files of the kind ``guarantee`` have replaced.
+        For the obsolete bounds of outputs under inputs, now replaced by files of the kind ``guarantee``.
     """
     if isinstance(raw, dict) and {"inputs", "outputs"} <= raw.keys():
         raise UnsupportedError(
@@ -238,7 +238,7 @@ def evidence_of(raw: object) -> Evidence:
 
 
 def certificate_text(certificate: Evidence) -> str:
-    """Text of the file, the same for the same certificate."""
+    """Text of the file, reproducible for a given certificate."""
     loop, refutation = certificate.loop, certificate.refutation
     parts: Json = {
         "roots": {name: (of, *ends) for name, (of, ends) in loop.roots.items()},
@@ -271,20 +271,20 @@ def _witness_entries(name: str, witness: Witness) -> WitnessEntries:
 
 
 def save_certificate(certificate: Evidence, path: str | Path) -> None:
-    """Write a certificate file whole or not at all, and only if it can be read again.
+    """Write a certificate file atomically, and only if it can be read back.
 
     Raises
     ------
     OutputError
-        When the folder cannot be written.
+        When the folder is not writable.
     CertificateError
-        When the certificate is beyond the limits of the format, such as numbers of more than 400 digits.
+        When the certificate exceeds the limits of the format, such as 400 digits per number.
     """
     write_readable(path, certificate_text(certificate), lambda text: evidence_of(parse(text)))
 
 
 # ----------------------------------------------------------------------
-# Which claim a parsed file makes: told without loading what decides each of them.
+# The kind of claim of a parsed file, determined without loading the code that checks it.
 
 GUARANTEE, SLOW_SLIDING, STICK_SLIP, ATTRACTION = "guarantee", "slow_sliding", "stick_slip", "attraction"
 UNCERTAIN_PLANT = "uncertain_plant"
@@ -293,7 +293,7 @@ POLYNOMIAL, LOOP = "polynomial", "loop"
 
 
 def kind_of(raw: object) -> str:
-    """What a parsed file says that it is, else what its keys say: about a polynomial, or a closed loop."""
+    """Stated kind of a parsed file; without one, by its keys, about a polynomial or a closed loop."""
     if not isinstance(raw, dict):
         return LOOP
     named = next((kind for kind in _KINDS if raw.get("kind") == kind), None)
@@ -301,22 +301,22 @@ def kind_of(raw: object) -> str:
 
 
 # ----------------------------------------------------------------------
-# All that a claim about a loop that runs depends on, as lines below its sentence; those of proofs/check.py.
+# Lines with all entries on which a guarantee of a running loop depends, below its sentence; equal to proofs/check.py.
 
 _HEADED = {"format", "kind", "claims"}
-_NAMED = {"name", "states"}  # nothing depends on them
+_NAMED = {"name", "states"}  # claims do not depend on them
 _MOST_LISTED = 64
 _MOST_CHARACTERS = 24
 _DIGITS = 6
 
 
 def entry_lines(document: Json) -> list[str]:
-    """Every entry of a file of `guarantee_text` but names: a line for each of its parts, its claims and its SHA-256.
+    """Entries of a file of `guarantee_text` without names: one line per part, then the claims and the SHA-256.
 
     Parameters
     ----------
     document : mapping
-        Parsed file; a claim is worth as much as it was read from, so that its own document is the one to give.
+        Parsed file, the very document from which the claim was read.
     """
     stated = {key: _without_names(part) for key, part in document.items() if key not in _HEADED}
     claims = []
@@ -341,7 +341,7 @@ def _part(part: object) -> str:
 
 
 def _phrases(part: Json, path: tuple[str, ...]) -> list[str]:
-    """Entries that are no objects behind the path to them, then those of every object."""
+    """Path and entries that are no objects, then recursively those of every object."""
     inner = {key: entry for key, entry in sorted(part.items()) if isinstance(entry, dict)}
     own = ", ".join(f"{key} {_entry(entry)}" for key, entry in sorted(part.items()) if key not in inner)
     phrases = [" ".join((*path, own))] if own else []
@@ -361,7 +361,7 @@ def _entry(value: object) -> str:
 
 
 def _leaves(value: object) -> int:
-    """Entries of nested lists; an empty one counts as one."""
+    """Number of entries of nested lists; an empty list counts as one."""
     match value:
         case dict():
             return sum(map(_leaves, value.values()))
@@ -371,7 +371,7 @@ def _leaves(value: object) -> int:
 
 
 def _number(text: str) -> str:
-    """A rational as a decimal of at most 15 digits or a short fraction, if it is one, else rounded."""
+    """Rational as an exact decimal of at most 15 digits or short fraction if possible, otherwise rounded."""
     value = Fraction(text)
     about = Decimal(value.numerator) / Decimal(value.denominator)
     decimal = f"{float(about):.15g}"

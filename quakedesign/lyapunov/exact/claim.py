@@ -53,7 +53,7 @@ class Loop:
     field : mapping of str to tuple of Term
         Powers of states and of lifts.
     roots : mapping of str to (str, (Fraction, Fraction))
-        The gain or constant whose positive square root a name stands for, and an interval that holds it.
+        For every name, the gain or constant whose positive square root it denotes, and an enclosure of the root.
     lifts : mapping of str to tuple of Term
         Argument of every nested power.
     """
@@ -86,7 +86,7 @@ class Loop:
 
     @property
     def ranges(self) -> dict[str, Range]:
-        """Ends of everything whose value is not known exactly: uncertain parameters, then roots."""
+        """Ends of all inexact values: uncertain parameters, then roots."""
         return {**self.uncertain, **{name: ends for name, (_, ends) in self.roots.items()}}
 
     @property
@@ -140,7 +140,7 @@ class Equilibrium:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Evidence:
-    """The parts of a `Certificate`, as they stand in a file."""
+    """The parts of a `Certificate`, as in its file."""
 
     loop: Loop
     lyapunov: tuple[Term, ...] = ()
@@ -163,12 +163,12 @@ def loop_of(
     uncertain: Mapping[str, Range],
     constants: Mapping[str, Fraction] | None = None,
 ) -> Loop:
-    """Bind a closed loop, in symbols or in terms, to exact numbers.
+    """Closed loop with exact numbers for the symbols of its model.
 
     Raises
     ------
     CertificateError
-        When the law has parts that this format cannot express, such as nested powers.
+        When the format cannot express a part of the law, such as nested powers.
     """
     terms = model if isinstance(model, FieldTerms) else model.terms
     values = {**gains, **(constants or {})}
@@ -186,7 +186,7 @@ def loop_of(
 
 
 def root_enclosure(number: Fraction) -> Range:
-    """Rational interval around the square root of a number ≥ 0: a point if rational, else of relative width 2e-6.
+    """Rational enclosure of the square root of a number ≥ 0: a point if rational, else of relative width 2e-6.
 
     Raises
     ------
@@ -204,6 +204,6 @@ def root_enclosure(number: Fraction) -> Range:
 
 
 def require(condition: bool, reason: str) -> None:
-    """Refuse a certificate."""
+    """Raise CertificateError unless a condition holds."""
     if not condition:
         raise CertificateError(reason)

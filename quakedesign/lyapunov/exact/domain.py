@@ -1,9 +1,9 @@
-"""Domain of a certificate where the control itself moves the matched disturbance (ERRATA 16).
+"""Domain of a certificate if the matched disturbance depends on the control (ERRATA 16).
 
 Two ways to split h, both rigorous:
 
-- *whole*: all of h(t, e) is in e3, so |h'| ≤ L̄ must hold with the part that the errors and the control cause.
-- *split*: only h(t, 0) is in e3, so |h'| ≤ L̄ is needed along the reference alone. The rest w = h(t, e) − h(t, 0) is
+- *whole*: all of h(t, e) is in e3, so |h'| ≤ L̄ must hold including the part due to errors and control.
+- *split*: only h(t, 0) is in e3, so |h'| ≤ L̄ is needed along the reference only. The rest w = h(t, e) − h(t, 0) is
   bounded by g1|e1| + g2|e2| and must leave V' negative (`Robustness`). The control does not enter.
 """
 
@@ -42,7 +42,7 @@ _PIECES = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Domain:
-    """Largest level set found on which the premises of a certificate prove themselves."""
+    """Largest level set found on which the premises of a certificate are proved."""
 
     level: float  # Of V for the base gains; 0 when there is none
     # slip_error, slip_rate_error: Bounds on |e1| [m] and |e2| [m/s] on it; not every such pair lies in it
@@ -54,8 +54,8 @@ class Domain:
     start_slip_rate_error: LowerBound
     start_perturbation: LowerBound
     method: str  # ``"whole"`` or ``"split"``, which part of h is in e3
-    # Cause that keeps it from being larger: the largest part that grows with the errors; of an empty one the largest
-    # part that is there without them
+    # Cause that limits the level set: the largest part of h' that grows with the errors; for an empty set, the largest
+    # part at zero errors
     limited_by: str
     feedforward: str  # Name of the feed-forward of the law
 
@@ -66,7 +66,7 @@ class Domain:
 
 @dataclass(frozen=True)
 class DomainProblem:
-    """Which level sets of a certificate hold on a fault under a law."""
+    """Problem of the level sets of a certificate that are valid for a fault under a law."""
 
     fault: Fault
     controller: SlidingMode
@@ -88,18 +88,18 @@ class DomainProblem:
         return self._rate(Errors())
 
     def whole(self, level: Fraction, pieces: int = _PIECES) -> Fraction:
-        """|h'|/L̄ on {V ≤ level}, errors and control included; at most 1 where the certificate speaks."""
+        """Bound on |h'|/L̄ on {V ≤ level}, errors and control included; the certificate applies if at most 1."""
         return self._rate(self.sets.errors(level), pieces=pieces) / self.allowed
 
     def holds_whole(self, level: Fraction) -> bool:
-        """Whether `whole` is below 1; what it is, is not asked."""
+        """Whether `whole` is below 1, without its value."""
         return self._rate(self.sets.errors(level), pieces=_PIECES, limit=self.allowed) < self.allowed
 
     def split(self, level: Fraction, errors: Errors | None = None) -> dict[str, Fraction] | None:
-        """Shares of the decrease of V that the errors' part of h takes on {V ≤ level}, by error.
+        """Shares of the decrease of V that the error-dependent part of h can cancel on {V ≤ level}, by error.
 
-        The certificate speaks where they add up to less than 1. None where nothing bounds them. The sensitivities of h
-        are those for the errors of the level, or for other errors.
+        The certificate applies if their sum is below 1. None if they have no bound. The sensitivities of h are
+        evaluated for the errors of the level, or for given errors.
         """
         robustness = self.robustness
         if robustness is None or self.along_reference() > self.allowed:
@@ -127,9 +127,9 @@ def certified_lipschitz(certificate: Certificate) -> Fraction:
 
 
 def certified_domain(question: DomainProblem) -> Domain:
-    """Largest level set on which one of the two methods proves itself, rigorous but not sharp (steps of an eighth).
+    """Largest level set on which one of the two methods is proved; rigorous, but only to steps of an eighth.
 
-    It is empty where β leaves its certified range, or h' its bound with the errors zero.
+    It is empty if β leaves its certified range, or h' its bound at zero errors.
     """
     low_beta, high_beta = coefficient_range(question.fault, question.controller.divisor)
     certified = question.certificate.loop.uncertain["beta"]
@@ -152,7 +152,7 @@ def certified_domain(question: DomainProblem) -> Domain:
 
 
 def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
-    """Largest step that holds, given that the low one does."""
+    """Largest step that holds by bisection, provided that the low one holds."""
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if holds(middle) else (low, middle)
@@ -160,7 +160,7 @@ def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
 
 
 def _largest_split(question: DomainProblem) -> int | None:
-    """Largest step on which `split` proves itself: a guess with the sensitivities at rest, then downwards."""
+    """Largest step for which `split` is proved: from a guess with the sensitivities at zero errors, downwards."""
     degree = question.sets.degree
 
     def holds(step: int, errors: Errors | None = None) -> bool:
@@ -207,7 +207,7 @@ _GIVEN = {"the disturbance": (plant.phi, plant.phi_t), "the moving reference": (
 
 
 def _whole_limit(question: DomainProblem, errors: Errors) -> str:
-    """Which part of h' is largest, of those that the errors cause or, where there are none, of those that are given.
+    """Cause of the largest part of h': among the errors or, at zero errors, among disturbance and reference.
 
     For each cause the symbols of all others are set to zero.
     """
@@ -229,7 +229,7 @@ _ERRORS = {
 
 
 def _split_limit(question: DomainProblem, level: Fraction) -> str:
-    """Which error takes most of the decrease, and through what."""
+    """Error that cancels most of the decrease, and the cause of its effect."""
     parts = question.split(level) or {}
     error = max(parts, key=lambda name: parts[name])
     name, slope, rest = _ERRORS[error]

@@ -1,8 +1,8 @@
 """Rigorous bounds on ratios of forms over the orthant, by bisection of the simplex (Bernstein coefficients).
 
 A form of degree m on the simplex spanned by s_1 … s_n lies between its smallest and its largest Bernstein coefficient,
-and takes the coefficients at the corners as values there (Farin, *Curves and Surfaces for CAGD*, ch. 17). Bisecting an
-edge by de Casteljau's rule keeps everything in integers.
+and equals the corner coefficients at the corners (Farin, *Curves and Surfaces for CAGD*, ch. 17). Bisection of an edge
+by de Casteljau's algorithm needs only integers.
 """
 
 import heapq
@@ -30,7 +30,7 @@ def _exponents(variables: int, degree: int) -> tuple[tuple[int, ...], ...]:
 
 @cache
 def _lines(variables: int, degree: int, edge: Edge) -> tuple[tuple[int, ...], ...]:
-    """Places of coefficients that differ only along an edge, in order from its first end to its second."""
+    """Indices of coefficients that differ only along an edge, in order from its first to its second end."""
     order = {e: i for i, e in enumerate(_exponents(variables, degree))}
     groups: dict[tuple[int, ...], list[tuple[int, int]]] = {}
     for e, place in order.items():
@@ -43,7 +43,7 @@ Taken = Callable[[list[int]], tuple[int, ...]]
 
 
 def _taking(places: Sequence[int]) -> Taken:
-    """What takes the entries at some places out of a list."""
+    """Function that extracts the entries at given indices from a list."""
     return itemgetter(*places) if len(places) > 1 else lambda values: tuple(values[i] for i in places)
 
 
@@ -51,9 +51,9 @@ def _taking(places: Sequence[int]) -> Taken:
 def _triangle(
     variables: int, degree: int, edge: Edge
 ) -> tuple[tuple[tuple[Taken, Taken], ...], tuple[tuple[Taken, tuple[int, ...]], ...]]:
-    """De Casteljau's triangles of all lines along an edge, in a list that grows by the sums of neighbours, row by row.
+    """De Casteljau's triangles of all lines along an edge, as sums of neighbours appended to a list row by row.
 
-    Then for each half where its coefficients stand, and by how many binary digits they are to be shifted.
+    Then, for each half, the indices of its coefficients and the number of binary digits by which to shift them.
     """
     lines = _lines(variables, degree, edge)
     rows, size, sums = [list(line) for line in lines], len(_exponents(variables, degree)), []
@@ -76,7 +76,7 @@ def _triangle(
 def _halved(
     variables: int, degree: int, coefficients: tuple[int, ...], edge: Edge
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Coefficients on both halves; one form stands in the problems of many vertices, which are halved alike."""
+    """Coefficients on both halves; cached, as the problems of many vertices share forms and bisections."""
     sums, halves = _triangle(variables, degree, edge)
     values = list(coefficients)
     for before, after in sums:
@@ -107,14 +107,14 @@ class Form:
         return cls(variables, degree, whole, fmpq(shared, common))
 
     def bisected(self, edge: Edge) -> "tuple[Form, Form]":
-        """Forms on the two halves; the first keeps the first end of the edge."""
+        """Forms on the two halves; the first half contains the first end of the edge."""
         scale = self.scale / (1 << self.degree)
         parts = _halved(self.variables, self.degree, self.coefficients, edge)
         first, second = (Form(self.variables, self.degree, c, scale) for c in parts)
         return first, second
 
     def least(self) -> fmpq:
-        """Lower bound."""
+        """Lower bound on the form."""
         return min(self.coefficients) * self.scale
 
     def largest(self) -> fmpq:
@@ -142,21 +142,21 @@ def largest_ratio(
     tolerance: Fraction = Fraction(1, 20),
     pieces: int = 4000,
 ) -> Fraction | None:
-    """Rigorous upper bound of Π|f_i|^{a_i} over the standard simplex, the largest over all problems.
+    """Rigorous upper bound on Π|f_i|^{a_i} over the standard simplex and all problems.
 
     Parameters
     ----------
     problems : iterable of (forms, exponents)
-        Forms on the standard simplex; one with a negative exponent must be positive there.
+        Forms on the standard simplex; a form with a negative exponent must be positive there.
     tolerance : Fraction
-        Stop when the bound is within this share of a value that is attained.
+        Relative distance of the bound from an attained value at which the bisection stops.
     pieces : int
-        Largest number of bisections; the bound is rigorous whenever it stops.
+        Largest number of bisections; the bound is rigorous for any number.
 
     Returns
     -------
     Fraction or None
-        None when some form with a negative exponent was not shown to be positive.
+        None when a form with a negative exponent was not proved to be positive.
     """
     return _largest(tuple((tuple(forms), tuple(exponents)) for forms, exponents in problems), tolerance, pieces)
 
@@ -171,7 +171,7 @@ def _largest(problems: tuple[Problem, ...], tolerance: Fraction, pieces: int) ->
     heapq.heapify(heap)
     for _ in range(pieces):
         top, _, forms, powers, corners = heap[0]
-        # Largest value at the corners of a piece; only decides when to stop.
+        # Largest value at the corners of a piece, used only as stopping criterion.
         values = [[abs(v) for v in f.at_corners()] for f in forms]
         attained = max(
             attained,
@@ -192,7 +192,7 @@ def _largest(problems: tuple[Problem, ...], tolerance: Fraction, pieces: int) ->
 
 
 class _FormPower(NamedTuple):
-    """An exponent in all forms in which it is needed again and again."""
+    """An exponent in the representations that the bisection reuses."""
 
     ball: arb
     near: float
@@ -204,7 +204,7 @@ class _FormPower(NamedTuple):
 
 
 def _bound(forms: Sequence[Form], powers: Sequence[_FormPower]) -> float:
-    """Float not below the largest ratio on a piece; infinite when a divisor may vanish."""
+    """Upper bound on the ratio on a piece as a float; infinite if a divisor may vanish."""
     total = arb(1)
     for form, power in zip(forms, powers, strict=True):
         value = form.least() if power.divides else form.largest()
@@ -212,7 +212,7 @@ def _bound(forms: Sequence[Form], powers: Sequence[_FormPower]) -> float:
             return float("inf")
         total *= arb(value) ** power.ball
     upper = total.upper()
-    near = float(upper)  # has the digits of a float, unless it is out of range
+    near = float(upper)  # exact unless out of range of floats
     return near if upper <= near else float_above(end_of(upper))
 
 

@@ -1,4 +1,4 @@
-"""Vector field of a loop, and units of its states, in SymPy."""
+"""Vector field of a loop in SymPy, and units of its states."""
 
 from collections.abc import Mapping
 from fractions import Fraction
@@ -29,7 +29,7 @@ def full_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
 
 
 def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
-    """Interval of the error that one unit of each state stands for; one where the law says nothing else.
+    """Enclosure of the error that equals one unit of each state; 1 unless the law specifies it.
 
     The units are those of a model, or of the law of the package that the loop names.
     """
@@ -39,12 +39,12 @@ def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
 
 
 def unit_ranges(loop: Loop, units: Mapping[str, sp.Expr]) -> dict[str, Range]:
-    """Interval of the value of every unit, by the name of its state; one where there is none.
+    """Enclosure of the value of every unit, by the name of its state; 1 without a unit.
 
     Raises
     ------
     CertificateError
-        For a unit that is not positive.
+        When a unit is not positive.
     """
     values = {**{n: (v, v) for n, v in loop.parameters.items()}, **{n: ends for n, (_, ends) in loop.roots.items()}}
     ranges: dict[str, Range] = dict.fromkeys(loop.states, (Fraction(1), Fraction(1)))

@@ -1,6 +1,6 @@
 """Proof obligations of a Lyapunov function, and the witnesses that prove them.
 
-A loop and a Lyapunov function give polynomials that must be non-negative on cells (FORMAT.md, 2 to 5). A
+A loop and a Lyapunov function define polynomials that must be non-negative on cells (FORMAT.md, 2 to 5). A
 witness is a polynomial identity with sums of squares on one cell.
 """
 
@@ -24,9 +24,9 @@ from quakedesign.symbolic.terms import Term, cell_polynomial, collected, lie_ter
 class Cell:
     """Signs of states and lifts, and the conditions on the cell variables."""
 
-    name: str  # Signs as a word of + and −, states first; empty on the reals
+    name: str  # Signs as a string of + and −, states first; empty on the reals
     signs: Mapping[str, int]
-    # equalities, inequalities: Each is 0, or ≥ 0, on the cell
+    # equalities, inequalities: Polynomials that are 0, or ≥ 0, on the cell
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
 
@@ -42,7 +42,7 @@ class Obligation:
 
     @property
     def key(self) -> tuple[object, ...]:
-        """What two obligations share when one witness serves both."""
+        """Polynomial and conditions; obligations with equal keys share one witness."""
         parts = ((self.polynomial,), self.equalities, self.inequalities)
         return tuple(
             tuple(tuple(sorted((e, c.as_integer_ratio()) for e, c in p.items())) for p in part) for part in parts
@@ -51,14 +51,14 @@ class Obligation:
 
 @dataclass(frozen=True)
 class Obligations:
-    """All polynomials that decide V > 0 and V̇ < 0 for one loop and one V."""
+    """All polynomials whose signs decide V > 0 and V̇ < 0 for one loop and one V."""
 
     loop: Loop
     lyapunov: tuple[Term, ...]
 
     @cached_property
     def derivative(self) -> tuple[Term, ...]:
-        """Terms of V̇; refused unless V is C¹ and V̇ affine in everything that has a range."""
+        """Terms of V̇; raises unless V is C¹ and V̇ affine in all parameters with ranges."""
         kinks = [t for t in self.lyapunov for _, a, kind in t.factors if a < 1 or (kind == "a" and a == 1)]
         require(not kinks, "V is not continuously differentiable term by term.")
         rates = (rate for t in self.lyapunov for rate in lie_terms(t, self.loop.field))
@@ -69,7 +69,7 @@ class Obligations:
         return terms
 
     def sign_cells(self) -> Iterator[Cell]:
-        """Every sign cell of the states; one without a name on the reals."""
+        """Every sign cell of the states; on the reals, one cell without name."""
         if self.loop.domain == "reals":
             yield Cell("", dict.fromkeys(self.loop.states, 1))
             return
@@ -78,7 +78,7 @@ class Obligations:
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
-        """Every sign cell of states and lifts that may have an interior."""
+        """Every sign cell of states and lifts whose interior may be nonempty."""
         if not self.loop.lifts:
             return tuple(self.sign_cells())
         possible = (self._cell(signs) for signs in _signs((*self.loop.states, *self.loop.lifts)))
@@ -86,7 +86,7 @@ class Obligations:
 
     @cached_property
     def with_variable(self) -> tuple[str, ...]:
-        """Lifts that occur with a positive exponent somewhere, in order; refused if one occurs nowhere."""
+        """Lifts that occur with a positive exponent, in order; raises if a lift does not occur."""
         everything = [t for terms in (*self.loop.field.values(), *self.loop.lifts.values()) for t in terms]
         exponents: dict[str, list[Fraction]] = {lift: [] for lift in self.loop.lifts}
         for term in everything:
@@ -110,11 +110,11 @@ class Obligations:
         return degrees
 
     def _require_null_zeros(self, arguments: Mapping[str, Polynomial]) -> None:
-        """Refuse a lift whose argument could vanish on more than a null set, on one cell.
+        """Reject a lift whose argument could vanish on more than a null set, on one cell.
 
-        As a polynomial in those states on which no lift inside it depends, it must have a coefficient without lifts:
-        a nonzero polynomial in the other states. Else its variable could be zero on an open set, where a multiplier
-        that holds it proves nothing.
+        As a polynomial in the states on which none of its inner lifts depends, the argument must have a coefficient
+        without lifts, which is a nonzero polynomial in the other states. Otherwise the variable of the lift could be
+        zero on an open set, where a multiplier that contains it proves nothing.
         """
         states = tuple(self.loop.states)
         depends: dict[str, set[str]] = {}
@@ -131,7 +131,7 @@ class Obligations:
             depends[lift] = inside | own
 
     def _cell(self, signs: Mapping[str, int]) -> Cell | None:
-        """Cell with its conditions; None where a condition leaves it without interior."""
+        """Cell with its conditions; None if a condition excludes an interior."""
         weights = {**self.loop.states, **self.lift_degrees}
         equalities, inequalities = [], []
         whole = {lift: self._argument(lift, weights, signs) for lift in self.loop.lifts}
@@ -160,10 +160,10 @@ class Obligations:
     def _argument(
         self, lift: str, weights: Mapping[str, int], signs: Mapping[str, int]
     ) -> tuple[Polynomial, Polynomial]:
-        """Argument of a lift on a cell, with the least and with the largest coefficients that ranges of roots allow.
+        """Argument of a lift on a cell, with the smallest and the largest coefficients over the ranges of roots.
 
-        Variables and roots are not negative: the argument lies between the two. Refused where the sign of a
-        coefficient depends on the roots.
+        Variables and roots are non-negative, so the argument lies between the two. Raises if the sign of a coefficient
+        depends on the roots.
         """
         least, largest = dict[Exponents, Fraction](), dict[Exponents, Fraction]()
         for term in self._live(lift):
@@ -178,15 +178,15 @@ class Obligations:
 
     @cached_property
     def _ends(self) -> tuple[dict[str, Fraction], ...]:
-        """Values of everything that is a point, with the lower and with the upper ends of roots."""
+        """Values of all parameters with one value, with the lower and with the upper ends of roots."""
         points = {name: ends for name, ends in self.loop.uncertain.items() if ends[0] == ends[1]}
         ranges = points | {name: ends for name, (_, ends) in self.loop.roots.items()}
         return tuple({**self.loop.parameters, **{name: ends[i] for name, ends in ranges.items()}} for i in (0, 1))
 
     def _live(self, lift: str) -> tuple[Term, ...]:
-        """Terms of a lift without those that a zero parameter removes.
+        """Terms of a lift whose parameters are all nonzero.
 
-        Refused if one has a range: that of a root may, if only the sign of the lift occurs.
+        Raises if a parameter has a range; a root may have one if only the sign of the lift occurs.
         """
         parameters, (low, high) = self.loop.parameters, self._ends
         live = tuple(t for t in self.loop.lifts[lift] if all(parameters.get(p, Fraction(1)) for p in t.parameters))
@@ -200,7 +200,7 @@ class Obligations:
         return live
 
     def _of_variables(self, polynomial: Polynomial) -> dict[Exponents, Fraction]:
-        """Polynomial without the columns of lifts that have no variable."""
+        """Polynomial without the exponents of lifts that have no variable."""
         names = (*self.loop.states, *self.loop.lifts)
         places = [i for i, name in enumerate(names) if name not in self.loop.lifts or name in self.with_variable]
         return combination([(c, {tuple(e[i] for i in places): Fraction(1)}) for e, c in polynomial.items()])
@@ -213,7 +213,7 @@ class Obligations:
             yield " ".join(f"{name}={v}" for name, v in vertex.items()), vertex
 
     def function(self, claim: str = "positive") -> Iterator[tuple[str, dict[Exponents, Fraction]]]:
-        """V on every sign cell of the states; `claim` begins the names."""
+        """V on every sign cell of the states; the names begin with `claim`."""
         for cell in self.sign_cells():
             yield " ".join(filter(None, (claim, cell.name))), self.potential(cell.signs)
 
@@ -225,7 +225,7 @@ class Obligations:
         return cell_polynomial(self.lyapunov, self.loop.states, states, self.loop.parameters)
 
     def decrease(self, claim: str) -> Iterator[tuple[Cell, Obligation]]:
-        """−V̇ on every cell and vertex; `claim` begins the names."""
+        """−V̇ on every cell and vertex; the names begin with `claim`."""
         for cell in self.cells:
             for vertex, values in self.vertices():
                 name = " ".join(filter(None, (claim, cell.name, vertex)))
@@ -241,7 +241,7 @@ class Obligations:
 
 
 def _require_different(inequalities: Sequence[Polynomial], lifts: Sequence[str]) -> None:
-    """Refuse signs that are proportional to each other or to a variable of the cell: no engine takes one twice."""
+    """Reject sign conditions that are proportional to each other or to a variable: engines accept no duplicates."""
     largest = [max(map(abs, p.values())) for p in inequalities]
     scaled = {tuple(sorted((e, c / m) for e, c in p.items())) for p, m in zip(inequalities, largest, strict=True)}
     require(
@@ -260,7 +260,7 @@ def _word(signs: Mapping[str, int]) -> str:
 
 
 def different(obligations: Iterable[Obligation]) -> Iterator[Obligation]:
-    """Obligations of which no witness serves two: the first of each kind."""
+    """First obligation of every key, so that each needs its own witness."""
     seen = set[tuple[object, ...]]()
     for one in obligations:
         key = one.key
@@ -270,12 +270,12 @@ def different(obligations: Iterable[Obligation]) -> Iterator[Obligation]:
 
 
 def obligation_degree(polynomials: Sequence[Polynomial], what: str) -> int:
-    """Degree of forms that must all share it.
+    """Common degree of forms.
 
     Raises
     ------
     CertificateError
-        When there is none, or more than one.
+        When there are no forms, or their degrees differ.
     """
     degrees = {sum(exponents) for p in polynomials for exponents in p}
     require(len(degrees) == 1 and min(degrees) >= 1, f"{what} is not homogeneous of one positive degree.")
@@ -341,14 +341,14 @@ def less(polynomial: Polynomial, factor: Fraction, other: Polynomial) -> dict[Ex
 
 
 # ----------------------------------------------------------------------
-# What proves one obligation: an identity with sums of squares on a cell.
+# Proof of one obligation: an identity with sums of squares on a cell.
 
 
 def statement_of(one: Obligation, domain: str, multiplier: Polynomial | None = None) -> Statement:
     """Statement that a witness of an obligation proves.
 
-    On cells all variables are non-negative, squares may be multiplied by products of different ones and by one sign
-    condition. The degree is that of the form multiplier · P.
+    On cells all variables are non-negative, and squares may be multiplied by products of different variables and by one
+    sign condition. The degree is that of the form multiplier · P.
     """
     size = width(one)
     factor = constant(size) if multiplier is None else multiplier
@@ -381,10 +381,10 @@ def _products(variables: int, conditions: int) -> tuple[tuple[int, ...], ...]:
 
 
 def proves(one: Obligation, witness: Witness, domain: str) -> bool:
-    """Whether a witness proves an obligation; exact, and False for anything malformed.
+    """Whether a witness proves an obligation, in exact arithmetic; False for a malformed witness.
 
-    The multiplier has positive coefficients, so it is positive wherever all variables are, and that is enough
-    (FORMAT.md). On the reals, and for P = 0, it must be one, so that no number of a file is without effect.
+    The multiplier has positive coefficients, so it is positive where all variables are positive, which suffices
+    (FORMAT.md). On the reals, and for P = 0, it must be one, so that every number of a file has an effect.
     """
     factor = witness.multiplier
     if not factor or any(c <= 0 for c in factor.values()):

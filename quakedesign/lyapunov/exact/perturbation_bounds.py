@@ -1,8 +1,8 @@
 """Bounds of the matched perturbation, the input gain, sectors and equilibrium pressures of a fault.
 
 All bounds hold over the uncertainty box and are computed in ball arithmetic. Chapters: bounds of the
-matched perturbation h and its rate, with and without feed-forward; sectors and equilibrium pressures
-about any constant reference (ERRATA 6 to 12).
+matched perturbation h and its rate, with and without feed-forward; sectors and equilibrium pressures for
+any constant reference (ERRATA 6 to 12).
 """
 
 from dataclasses import dataclass
@@ -38,13 +38,13 @@ class Errors:
     acceleration: Fraction = Fraction(0)
 
     def ranges(self) -> dict[sp.Symbol, Range]:
-        """Symmetric ranges by symbol."""
+        """Symmetric ranges of the errors by symbol."""
         parts = {plant.e1: self.slip, plant.e2: self.rate, plant.acceleration_error: self.acceleration}
         return {symbol: (-v, v) for symbol, v in parts.items()}
 
 
 def friction_range(fault: Fault) -> Range:
-    """μ_res and μ_max [-], exact, confirmed by enclosure of the law."""
+    """Exact bounds μ_res and μ_max [-], confirmed by enclosure of the law."""
     bounds = friction_bounds(fault.friction)
     return bounds.least, bounds.most
 
@@ -70,7 +70,7 @@ def coefficient_range(fault: Fault, divisor: Fraction) -> Range:
 
 @lru_cache(maxsize=16)
 def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> sp.Expr:
-    """h' along a solution [unit of ν per s], in what `parameter_ranges` and the errors bound."""
+    """h' along a solution [unit of ν per s], in symbols with bounds from `parameter_ranges` and the errors."""
     bending, flat = plant.matched_rate_in_parts()
     moved = (plant.r3, plant.r2, plant.r1, plant.phi_t, plant.acceleration_error, plant.e2)
     x1, x2, push = sp.symbols("x1 x2 push", real=True)
@@ -82,9 +82,9 @@ def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -
 
 @lru_cache(maxsize=16)
 def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> tuple[sp.Expr, sp.Expr]:
-    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time; along a chord where friction has no derivative.
+    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time; slopes of chords where friction has no derivative.
 
-    They bound the part of h that the errors cause: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest
+    They bound the error-dependent part of h: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest
     absolute values g1, g2 between 0 and e.
     """
     added = feedforward.acceleration(plant.e1, plant.e2, sp.Integer(0))
@@ -95,7 +95,7 @@ def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedFo
 
 
 def _with_values(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Expr:
-    """Insert μ*, the divisor, the reference, and the growth of the disturbance where its value stands."""
+    """Expression with values of μ*, divisor and reference, and with the growth of the disturbance added to φ."""
     static = static_friction(fault)
     grown = plant.phi_1 * (plant.e1 + plant.r0) + plant.phi_2 * (plant.e2 + plant.r1)
     values = {
@@ -115,7 +115,7 @@ def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
 
 
 def parameter_ranges(fault: Fault) -> dict[sp.Symbol, Range]:
-    """Ranges of all that h' and its sensitivities depend on, but the errors: friction in its bounds and slopes."""
+    """Ranges of all symbols in h' and its sensitivities except the errors; friction by its bounds and slope bounds."""
     friction, disturbance = friction_bounds(fault.friction), fault.disturbance
     value, change = fault.disturbance_bounds
     growth = rational(disturbance.slip_growth), rational(disturbance.rate_growth)
@@ -143,8 +143,8 @@ def largest_matched_rate(
 ) -> Fraction:
     """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
 
-    Friction may be any function within its bounds and slope bounds; one that weakens with slip, where its law does. The
-    disturbance may be any function of the preset's amplitude and rate of change.
+    Friction may be any function within its bounds and slope bounds, and weakens with slip if its law does. The
+    disturbance may be any function within the preset's bounds on value and rate of change.
 
     Parameters
     ----------
@@ -153,11 +153,11 @@ def largest_matched_rate(
     errors : Errors
         Ranges of e1 [m], e2 [m/s], e2' [m/s²].
     pieces : int
-        Largest number of subdivisions; fewer give a larger bound.
+        Largest number of subdivisions; fewer yield a larger bound.
     feedforward : FeedForward
-        What the law adds to ν, and so to h.
+        Term that the law adds to ν, and thus to h.
     limit : Fraction, optional
-        As in `upper_bound`, where it is asked only whether the bound is below that [unit of ν per s].
+        As in `upper_bound`, if only the comparison of the bound with this limit is needed [unit of ν per s].
     """
     expression = rate_expression(fault, divisor, feedforward)
     return upper_bound(expression, parameter_ranges(fault) | errors.ranges(), pieces=pieces, limit=limit)
@@ -174,20 +174,20 @@ def largest_sensitivities(
 
 
 def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
-    """Bound on |h| at t = 0, x = 0: the disturbance over β, friction at its static value; no feed-forward there."""
+    """Bound on |h| at t = 0, x = 0: disturbance over β, with static friction and without feed-forward."""
     static, least = static_friction(fault), plant_ranges(fault)[plant.N_hat][0]
     return fault.disturbance_bounds[0] * divisor / (static * least)
 
 
 # ----------------------------------------------------------------------
-# Sectors and pressures of a fault about any constant reference, over its uncertainty box (ERRATA 6 to 12).
+# Sectors and pressures of a fault for any constant reference, over its uncertainty box (ERRATA 6 to 12).
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sectors:
-    """Chords of everything that depends on the state, about the equilibrium of any constant reference.
+    """Ranges of the chords of all state-dependent terms, about the equilibrium of any constant reference.
 
-    x2' = s·x1 − w·x2 + β·b·p with all three anywhere in their ranges, at every time.
+    x2' = s·x1 − w·x2 + β·b·p, where s, w and β take any values in their ranges at every time.
     """
 
     authority: Fraction  # b = μ_res·N̂_min [m²/kg] (ERRATA 9)
@@ -205,16 +205,16 @@ class Sectors:
             raise ParameterError(f"ranges must be ordered. Received {self.beta}, {self.slip}, {self.rate}.")
 
     def vertices(self) -> list[tuple[Fraction, Fraction, Fraction]]:
-        """Different corners (β, s, w) of the ranges."""
+        """Distinct corners (β, s, w) of the ranges."""
         return list(dict.fromkeys(product(self.beta, self.slip, self.rate)))
 
     def ranges(self) -> dict[str, Range]:
-        """Ranges by the names of the e-LQR's loop field."""
+        """Ranges by their names in the loop field of the e-LQR."""
         return {"beta": self.beta, "s": self.slip, "w": self.rate}
 
 
 def sectors(fault: Fault) -> Sectors:
-    """Sector bounds of a fault over its uncertainty box: the ranges of its uncertain plant, exact."""
+    """Exact sector bounds of a fault over its uncertainty box, from the ranges of its uncertain plant."""
     ranges = uncertain_plant(fault)
     nominal = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     return Sectors(
@@ -235,18 +235,18 @@ def rest_pressure(
 ) -> Range:
     """Rigorous enclosure of the pressure p* [Pa] that holds the fault at rest at a constant reference (ERRATA 8).
 
-    Ball arithmetic on pieces of the range of references.
+    The range of references is subdivided, and every piece is enclosed in ball arithmetic.
 
     Parameters
     ----------
     slip : (Fraction, Fraction)
         Range of the reference r0 [m], not negative.
     nominal : bool
-        The fault's own friction law and parameters; without, any friction and any parameters of the box.
+        Use the friction law and parameters of the fault, instead of any friction and parameters in the box.
     drift : Fraction
         Largest k̂v∞t [m/s²].
     pieces : int
-        Into which the range is cut.
+        Number of subdivisions of the range.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def rest_pressure(
     friction, start = friction_bounds(fault.friction), static_friction(fault)
     for n in range(pieces if step else 1):
         part = (slip[0] + n * step, slip[0] + (n + 1) * step)
-        most = friction.slip_slope * part[1]  # by its slope bound from the static value, and within its bounds
+        most = friction.slip_slope * part[1]  # largest change from the static value, by the slope bound
         at_rest = max(friction.least, start - most), min(friction.most, start + most)
         pressures = enclose(expression, box | {_r: part, _mu: at_rest})
         if not pressures.is_finite():
@@ -272,8 +272,8 @@ def rest_pressure(
 def equilibrium_pressure(fault: Fault, slip: Fraction) -> Range:
     """Rigorous range of the pressure [Pa] that holds the nominal fault at rest at references from 0 to a slip [m].
 
-    Without the part of the disturbance that depends on time alone. Each end is within 1e-4 of the range of what is
-    attained.
+    The part of the disturbance that depends only on time is excluded. Each end exceeds the attained range by at most
+    1e-4 of its width.
 
     Raises
     ------
@@ -297,7 +297,7 @@ _drift = sp.Symbol("drift", nonnegative=True)
 
 @cache
 def _net_stress() -> sp.Expr:
-    """σ' − p* at rest at r0 with friction μ, a disturbance that grows with slip, and a drift k̂v∞t."""
+    """σ' − p* at rest at r0, for friction μ, a disturbance that grows with slip, and a drift k̂v∞t."""
     balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: _growth * x + _drift)
     balance = balance.replace(plant.mu, lambda *_: _mu).subs({plant.x1: _r, plant.x2: 0})
     balance = sp.expand(balance)  # linear in p
@@ -305,12 +305,12 @@ def _net_stress() -> sp.Expr:
 
 
 def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:
-    """p* in symbols, written so that few of them repeat, and their ranges."""
+    """p* in symbols, with few repetitions for tight enclosures, and the ranges of the symbols."""
     values = {
         _growth: to_sympy(rational(fault.disturbance.slip_growth)),
         plant.mu_star: to_sympy(static_friction(fault)),
     }
-    expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(values) * _mu), _r) / _mu  # μ once
+    expression = plant.sigma - sp.collect(sp.expand(_net_stress().subs(values) * _mu), _r) / _mu  # μ occurs once
     ranges = plant_ranges(fault)
     if not nominal:
         return expression, {s: ranges[s] for s in (plant.k_hat, plant.N_hat, plant.sigma)}

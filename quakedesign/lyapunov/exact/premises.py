@@ -1,8 +1,8 @@
 """Premises under which a certificate applies to a given fault, reference and disturbance.
 
 Chapters: premise as a value; premises of sliding modes, in ball arithmetic; sector premises of linear
-feedback (ERRATA 6 to 12); test whether constants and ranges of a certificate cover those of a fault;
-recognition of the loop of a file independently of the names of its states.
+feedback (ERRATA 6 to 12); recognition of the plant of a loop, independently of the names of its states;
+check whether constants and ranges of a certificate cover those of a fault.
 """
 
 import math
@@ -40,23 +40,23 @@ from quakedesign.symbolic import plant
 from quakedesign.symbolic.homogeneity import relative_degree
 
 # ----------------------------------------------------------------------
-# One condition under which a certificate speaks about a given loop.
+# One condition under which a certificate applies to a given loop.
 
 _MOST_DIGITS = 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Premise:
-    """One condition under which a certificate speaks about a given loop."""
+    """One condition under which a certificate applies to a given loop."""
 
     name: str
-    required: Fraction | float  # What the loop asks for, in `unit`; a rigorous upper bound unless `measured`
-    certified: Fraction | float  # What the certificate covers, in `unit`
+    required: Fraction | float  # Value required by the loop, in `unit`; a rigorous upper bound unless `measured`
+    certified: Fraction | float  # Value covered by the certificate, in `unit`
     unit: str
-    measured: bool = False  # True if `required` was read off a simulation
-    # False if `certified` is only a limit that no certificate can exceed; the premise then never holds
+    measured: bool = False  # True if `required` was measured in a simulation
+    # False if `certified` is only an upper limit for every certificate; the premise then never holds
     proved: bool = True
-    note: str = ""  # What the number assumes
+    note: str = ""  # Assumptions of the required value
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "required", _bound(UpperBound, self.required))
@@ -64,7 +64,7 @@ class Premise:
 
     @property
     def ratio(self) -> Fraction | float | None:
-        """required/certified [-], an `UpperBound`; None where nothing is certified and something is required."""
+        """Ratio required/certified [-], an `UpperBound`; None if only `certified` is zero."""
         if self.certified == 0:
             return UpperBound(0) if self.required == 0 else None
         return _bound(UpperBound, self.required / self.certified)
@@ -76,11 +76,11 @@ class Premise:
 
     @property
     def sides(self) -> tuple[str, str]:
-        """Texts of what is required, rounded up, and certified, rounded down, with the unit; of one number, said so."""
+        """Texts of the required value (rounded up) and the certified value (rounded down), or a note on equality."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         if self.required == self.certified != 0:
             return f"at most {self.required:.4g}{unit}", "the same number"
-        for digits in range(4, _MOST_DIGITS):  # as many as it takes to see that what holds does
+        for digits in range(4, _MOST_DIGITS):  # until the rounded values satisfy the premise, too
             required, certified = (f"{side:.{digits}g}" for side in (self.required, self.certified))
             if not self.holds or Fraction(required) <= Fraction(certified):
                 return f"{required}{unit}", f"{certified}{unit}"
@@ -101,7 +101,7 @@ class Premise:
 
 
 def _bound(kind: type[UpperBound] | type[LowerBound], value: Fraction | float) -> Fraction | float:
-    """Bound on a number; one that is not finite, as of a run that diverges, stays as it is."""
+    """Bound on a number; a number that is not finite, as from a divergent run, is returned unchanged."""
     return value if isinstance(value, float) and not math.isfinite(value) else kind(value)
 
 
@@ -110,7 +110,7 @@ def _finite(value: Fraction | float | None) -> float | None:
 
 
 # ----------------------------------------------------------------------
-# What a certificate needs, against what a given fault, reference and disturbance ask for. Ball arithmetic only.
+# Ranges of a certificate, compared with those of a given fault, reference and disturbance, in ball arithmetic only.
 
 __all__ = [
     "Domain",
@@ -134,14 +134,14 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """What is certified of the same gains with one feed-forward."""
+    """Premises and domain of given gains with one feed-forward."""
 
     feedforward: FeedForward
     premises: tuple[Premise, ...]
-    domain: Domain | None  # None where the certificate has no bounds of its states, or there is none
+    domain: Domain | None  # None without a certificate, or if it has no bounds of its states
 
     def to_dict(self) -> Json:
-        """Plain values, SI; exact coefficients as texts."""
+        """Plain values in SI units; exact coefficients as texts."""
         return {
             "feedforward": self.feedforward.name,
             "coefficients": {name: str(v) for name, v in self.feedforward.coefficients.items()},
@@ -153,10 +153,10 @@ class Variant:
 def sliding_mode_premises(
     fault: Fault, controller: SlidingMode, certificate: Certificate | None
 ) -> tuple[list[Premise], Domain | None]:
-    """Premises that can be decided without a run, and the certified domain.
+    """Premises that are decided without a simulation, and the certified domain.
 
-    `along_reference` takes the errors as zero. `level_set` takes the level set of V that holds the start x = 0, ξ = 0
-    for every disturbance of the class, and the errors' own part of h on it, by the better of two methods (`Domain`).
+    `along_reference` assumes zero errors. `level_set` is about the level set of V that contains the initial state
+    x = 0, ξ = 0 for every disturbance of the class, with the better of the two methods for h (`Domain`).
 
     Raises
     ------
@@ -168,7 +168,7 @@ def sliding_mode_premises(
 
 
 def feedforward_variants(fault: Fault, controller: SlidingMode, certificate: Certificate | None) -> tuple[Variant, ...]:
-    """The same gains and certificate with every named feed-forward, the controller's own first.
+    """Premises of the same gains and certificate with every named feed-forward, the controller's own first.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def _variant(question: DomainProblem, *, bounded: bool) -> Variant:
 
 
 def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Premise:
-    """β inside the certified range; the ratio is the larger of b_M/β_M and β_m/b_m."""
+    """Premise that β is in the certified range; the ratio is the larger of b_M/β_M and β_m/b_m."""
     low, high = coefficient_range(fault, divisor)
     worst = max(high / certified[1], certified[0] / low)
     return Premise(
@@ -226,7 +226,7 @@ def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Pr
 def matched_rate_premise(
     fault: Fault, controller: SlidingMode, name: str, errors: Errors, certified: Fraction | None, note: str
 ) -> Premise:
-    """|h'| ≤ L̄ while the errors stay within bounds; without a certificate against the limit of the gains."""
+    """Premise that |h'| ≤ L̄ for bounded errors; without a certificate, L̄ is the limit of the gains."""
     required = largest_matched_rate(fault, controller.divisor, errors, feedforward=controller.feedforward)
     against = controller.lipschitz_limit if certified is None else certified * controller.scale
     note += _with(controller)
@@ -246,7 +246,7 @@ def _along_reference(fault: Fault, controller: SlidingMode, certified: Fraction 
 
 
 def _level_set(question: DomainProblem) -> Premise:
-    """Either |h'| ≤ L̄ with the errors' part, or the errors' part against the decrease of V: whichever is closer."""
+    """Premise on the level set of the initial state: method *whole* or *split*, whichever has the smaller ratio."""
     fault, law = question.fault, question.controller
     level = question.sets.level(initial_perturbation(fault, law.divisor))
     errors = question.sets.errors(level)
@@ -267,20 +267,20 @@ def _level_set(question: DomainProblem) -> Premise:
 
 
 def _with(controller: SlidingMode) -> str:
-    """What the law adds to ν, for a note."""
+    """Note on the feed-forward that the law adds to ν."""
     name = controller.feedforward.name
     return "" if name == "none" else f"; with {name} feed-forward"
 
 
 # ----------------------------------------------------------------------
-# What the linear feedback's certificate needs of a fault: sectors about any constant reference (ERRATA 6 to 12).
+# Premises of the certificate of linear feedback on a fault: sectors for any constant reference (ERRATA 6 to 12).
 
 
 def linear_premises(fault: Fault, controller: Controller, certificate: Certificate | None) -> list[Premise]:
-    """Premises of the linear feedback: sectors inside the certified ones; constant reference; vanishing disturbance.
+    """Premises of linear feedback: sectors inside the certified ones; constant reference; vanishing disturbance.
 
-    The certificate speaks about constant references and disturbances that vanish at the equilibrium. The last two
-    premises say by how much a task leaves that (ERRATA 8, 11): errors then stay bounded, as certified peaks say.
+    The certificate is about constant references and disturbances that vanish at the equilibrium. The last two premises
+    quantify the deviation of a task from both (ERRATA 8, 11); the errors are then bounded by the certified peaks.
 
     Raises
     ------
@@ -334,7 +334,7 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
 
 
 def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
-    """Whether the pressure at rest stays inside the limits of the law, for every constant reference and plant."""
+    """Premise that the pressure at rest is inside the limits of the law, for every constant reference and plant."""
     limits = getattr(controller, "limits", None)
     if limits is None:
         return []
@@ -352,19 +352,19 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
 
 
 # ----------------------------------------------------------------------
-# What a field is about, whatever a file calls its states: only what is derived counts.
+# The plant of a field, recognised by derivation, whatever the names of the states in a file.
 
 _CONTROL = "beta"
 
 
 @cache
 def slip_degree() -> int | None:
-    """Number of derivatives of the slip until the pressure appears, derived from the force balance."""
+    """Relative degree of the slip with respect to the pressure, derived from the force balance."""
     return relative_degree(plant.x1, {plant.x1: plant.x2, plant.x2: plant.shifted_acceleration()}, plant.p)
 
 
 def require_degree_of_slip(loop: Loop) -> None:
-    """Reject a loop whose control acts on another derivative of its first state than pressure on that of slip."""
+    """Reject a loop whose relative degree differs from that of the slip with respect to the pressure."""
     first, *_ = loop.states
     control = loop.symbols.get(_CONTROL, sp.Dummy())
     degree = relative_degree(loop.symbols[first], sympy_field(loop), control)
@@ -376,18 +376,18 @@ def require_degree_of_slip(loop: Loop) -> None:
 
 
 # ----------------------------------------------------------------------
-# Whether a certificate is about a fault: its constants and ranges cover those of the fault.
+# Check whether the constants and ranges of a certificate cover those of a fault.
 
 
 def covers(certificate: Certificate, fault: Fault) -> list[str]:
-    """Refuse a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min).
+    """Reject a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min).
 
-    A sliding mode's certificate is about the base gains; the scale λ that the fault needs is said.
+    The certificate of a sliding mode is about the base gains; the lines state the scale λ that the fault needs.
 
     Returns
     -------
     list of str
-        What is covered, in lines.
+        Lines about the coverage.
     """
     require_degree_of_slip(certificate.loop)
     loop, lines = certificate.loop, [f'covers {certificate.loop.law} on "{fault.name}", box {fault.box.name}']

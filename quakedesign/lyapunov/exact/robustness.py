@@ -1,7 +1,7 @@
 """Robustness of a proved decrease, and level sets of V in metres and seconds.
 
-The robustness constants depend on the certificate alone; they bound the acceleration errors |w| ≤ g1|e1|
-+ g2|e2| under which V' stays negative, for every fault and every gain scale λ.
+The robustness constants depend only on the certificate. They bound the perturbations |w| ≤ g1|e1| + g2|e2|
+of the acceleration for which V' stays negative, for every fault and every gain scale λ.
 """
 
 from collections.abc import Iterator
@@ -24,11 +24,11 @@ from quakedesign.symbolic.term_expressions import from_terms, lie_derivative, to
 from quakedesign.symbolic.terms import Term, cell_polynomial
 
 # ----------------------------------------------------------------------
-# How much a proved decrease withstands: numbers of a certificate alone, the same for every fault and every λ.
+# Robustness of a proved decrease: constants of the certificate only, equal for every fault and every λ.
 #
 # Let V have degree m along a field of degree d. A perturbation w of the acceleration, e2' = β(ν + e3 + w), adds
 # β·∂V/∂e2·w to V'. For |w| ≤ g1|e1| + g2|e2| the quotients β|∂V/∂e2||e_i| / (−V'·V^{p_i}), p_i = (r_i − r_2 − d)/m, are
-# homogeneous of degree 0, so they have largest values a_i, and V' stays negative where a1·g1·V^{p1} + a2·g2·V^{p2} < 1.
+# homogeneous of degree 0, so they have maxima a_i, and V' stays negative where a1·g1·V^{p1} + a2·g2·V^{p2} < 1.
 
 _PUSHED = 1
 """Index of e2, on which ν acts."""
@@ -36,7 +36,7 @@ _PUSHED = 1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Robustness:
-    """What V' withstands in the acceleration."""
+    """Constants that bound the perturbations of the acceleration for which V' stays negative."""
 
     # slip, rate: Upper bounds on a1 [1/s² of the scaled loop, inverse] and a2; see the head of this file
     slip: Fraction
@@ -44,11 +44,11 @@ class Robustness:
     # slip_power, rate_power: p1 and p2 [-]
     slip_power: Fraction
     rate_power: Fraction
-    source: str  # How they were bounded
+    source: str  # Method of the bounds
 
 
 class _Cells:
-    """Forms of a certificate on the sign cells, in coordinates that make {V ≤ 1} about the unit box."""
+    """Forms of a certificate on the sign cells, in coordinates in which {V ≤ 1} is about the unit box."""
 
     def __init__(self, certificate: Certificate, model: LoopField | None = None) -> None:
         self.model = model
@@ -56,7 +56,7 @@ class _Cells:
         self.obligations = Obligations(certificate.loop, certificate.lyapunov)
         self.weights = list(self.loop.states.values())
         self.m = obligation_degree([p for _, p in self.obligations.function()], "V")
-        # e1' = e2 gives the degree of the whole field
+        # e1' = e2 determines the degree of the field
         self.degree = self.weights[_PUSHED] - self.weights[0]
         self.fallen = self.m + self.degree
         self.sizes = [_size(certificate.claims.get(f"bound_{s}"), self.m) for s in self.loop.states]
@@ -65,12 +65,12 @@ class _Cells:
         return Form.of(polynomial, len(self.weights), total, self.sizes)
 
     def functions(self) -> Iterator[tuple[dict[str, int], Form]]:
-        """Signs of every cell and V on it."""
+        """Signs of every cell, and V on it."""
         for cell in self.obligations.sign_cells():
             yield dict(cell.signs), self.form(self.obligations.potential(cell.signs), self.m)
 
     def decreases(self, signs: dict[str, int]) -> Iterator[tuple[dict[str, Fraction], Form]]:
-        """Uncertain values at every vertex and −V' there on a cell."""
+        """Uncertain values at every vertex, and −V' there on a cell."""
         require(not self.loop.lifts, "V' is no polynomial in the states where powers are nested.")
         for _, values in self.obligations.vertices():
             parameters = {**self.loop.parameters, **values}
@@ -78,7 +78,7 @@ class _Cells:
             yield values, self.form({e: -c for e, c in rate.items()}, self.fallen)
 
     def power(self, index: int) -> Fraction:
-        """p_i = (r_i − r_2 − d)/m with d from the field's own degree."""
+        """Exponent p_i = (r_i − r_2 − d)/m, where d is the degree of the field."""
         return Fraction(self.weights[index] - self.weights[_PUSHED] - self.degree, self.m)
 
     def slope(self) -> tuple[Term, ...]:
@@ -89,7 +89,7 @@ class _Cells:
         return to_terms(derivative, [symbols[s] for s in self.loop.states])
 
     def push(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
-        """β·∂V/∂e2·|e_i| on a cell, e_i at most a unit times the state; e2 is a unit times its state, too."""
+        """Bound β·∂V/∂e2·|e_i| on a cell, from the enclosures of the units of e_i and e2 in their states."""
         weight = self.weights[index]
         bare = cell_polynomial(slope, self.loop.states, signs, {})
         units = list(error_units(self.loop, self.model).values())
@@ -99,14 +99,14 @@ class _Cells:
 
 
 def _size(gamma: Fraction | None, m: int) -> Fraction:
-    """Short rational near γ^{−1/m}; any positive number is right, this one makes the bisection quick."""
+    """Short rational near γ^{−1/m}; any positive number is valid, but this one speeds up the bisection."""
     return Fraction(float(gamma) ** (-1 / m)).limit_denominator(1000) if gamma else Fraction(1)
 
 
 def robustness(certificate: Certificate, model: LoopField | None = None) -> Robustness | None:
-    """Bounds on what V' withstands, for all uncertain values of the certificate.
+    """Robustness constants of V', for all uncertain values of the certificate.
 
-    On polynomial cells V' itself is compared; elsewhere −κV^{(m+d)/m} with the κ that the certificate claims.
+    On polynomial cells the quotients contain V' itself; elsewhere −κV^{(m+d)/m} with the claimed κ.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def robustness(certificate: Certificate, model: LoopField | None = None) -> Robu
     Returns
     -------
     Robustness or None
-        None where no bound was found, as where V is not polynomial on its cells.
+        None if no bound was found, for example because V is not polynomial on its cells.
     """
     try:
         cells = _Cells(certificate, model)
@@ -140,7 +140,7 @@ def robustness(certificate: Certificate, model: LoopField | None = None) -> Robu
 
 
 def _against_decrease(cells: _Cells, slope: tuple[Term, ...], index: int) -> list[Problem]:
-    """β|∂V/∂e2||e_i| / (−V'·V^p) on every cell and vertex."""
+    """Quotients β|∂V/∂e2||e_i| / (−V'·V^p) on every cell and vertex."""
     powers = (Fraction(1), Fraction(-1), -cells.power(index))
     return [
         ((cells.push(slope, index, signs, values["beta"]), decrease, function), powers)
@@ -150,7 +150,7 @@ def _against_decrease(cells: _Cells, slope: tuple[Term, ...], index: int) -> lis
 
 
 def _against_function(cells: _Cells, slope: tuple[Term, ...], index: int) -> list[Problem]:
-    """β|∂V/∂e2||e_i| / V^{1 + …} on every cell, with the largest β."""
+    """Quotients β|∂V/∂e2||e_i| / V^{1 + …} on every cell, with the largest β."""
     beta = cells.loop.uncertain["beta"][1]
     return [
         ((push, function), (Fraction(1), -Fraction(push.degree, cells.m)))
@@ -171,12 +171,12 @@ class LevelSets:
 
     certificate: Certificate  # For the base gains (λ = 1), with bounds of all states
     scale: Fraction  # λ; the scaled loop has the errors λe of the base loop at the same time
-    # Loop of the law, for the units of its states; that of the law of the package by the certificate's name
+    # Loop of the law, for the units of its states; by default that of the law that the certificate names
     model: LoopField | None = None
 
     @property
     def degree(self) -> Fraction:
-        """m, the degree of V."""
+        """Degree m of V."""
         loop, (term, *_) = self.certificate.loop, self.certificate.lyapunov
         return sum((exponent * loop.states[state] for state, exponent, _ in term.factors), Fraction(0))
 
@@ -217,7 +217,7 @@ class LevelSets:
         )
 
     def starts(self, level: Fraction) -> tuple[Fraction, ...]:
-        """Largest size of every state for which {V ≤ level} surely holds it while the other states are zero."""
+        """Largest |e_i|, rounded down, for which {V ≤ level} contains the state whose other errors are zero."""
         loop = self.certificate.loop
         function, sizes = from_terms(self.certificate.lyapunov, loop.symbols), []
         for state, weight in loop.states.items():

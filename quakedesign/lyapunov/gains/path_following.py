@@ -2,8 +2,8 @@
 
 Bilinear inequalities are linearised about the current gains and V (Hassibi, How and Boyd, American
 Control Conference 1999). Chapters: linearised programme, decay rate as a convex programme, scaling
-exponents of the gains, state and objective of the search, trust region. All numbers are floating point;
-nothing is proved here.
+exponents of the gains, state and objective of the search, trust region. All numbers are floating point,
+without proof.
 """
 
 import math
@@ -41,9 +41,9 @@ from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.symbolic.terms import Term
 
 # ----------------------------------------------------------------------
-# One set of gains and its neighbourhood as polynomials, affine in the coefficients of V and in changes of the gains.
+# Polynomials of V and −V̇ near one set of gains, affine in the coefficients of V and in changes of the gains.
 #
-# Floating point throughout: for a search, which proves nothing.
+# All numbers are floating point, for a search without proof.
 
 Form = dict[tuple[int, ...], Any]
 """Polynomial with floats."""
@@ -53,30 +53,30 @@ _GRID = 1 << 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pace:
-    """A rate κ to prove, by −w^{m−n}V̇ ≥ κ((n/m)V + (1 − n/m)w^m), which is linear in V and implies V̇ ≤ −κV^{n/m}.
+    """Required rate κ, by −w^{m−n}V̇ ≥ κ((n/m)V + (1 − n/m)w^m), which is linear in V and implies V̇ ≤ −κV^{n/m}.
 
-    By Young's inequality V^{n/m} ≤ (n/m)V/w^{m−n} + (1 − n/m)w^n for every w > 0, an equality at w = V^{1/m}; an error
-    ε of w costs a share of order ε².
+    By Young's inequality V^{n/m} ≤ (n/m)V/w^{m−n} + (1 − n/m)w^n for every w > 0, with equality at w = V^{1/m}. A
+    relative error ε of w causes a relative loss of order ε².
     """
 
     rate: float  # κ > 0
     degrees: tuple[int, int]  # m and n, of V and V̇
-    forms: Mapping[str, Form]  # w on every cell of the states, by its signs: linear with coefficients > 0
+    forms: Mapping[str, Form]  # w on every sign cell of the states, by name: linear with coefficients > 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Neighbourhood:
-    """Demands on a_j and on shares of given changes of the gains."""
+    """Demands on the coefficients a_j of V and on shares of given changes of the gains."""
 
     # monomials, sizes: V = Σ a_j·monomial_j/size_j
     monomials: tuple[Term, ...]
     sizes: tuple[Fraction, ...]
     program: JointProgram  # For the demands
-    demands: tuple[Demand, ...]  # Parts: those of a_j, then those of the changes, with V as it is now
-    fixed: tuple[Form, ...]  # Parts without a decision
+    demands: tuple[Demand, ...]  # Parts of the a_j, then of the changes with the current V
+    fixed: tuple[Form, ...]  # Constant parts
 
     def function(self, decision: Sequence[float]) -> tuple[Term, ...]:
-        """V of a decision, to 2^−40 in the scaled variables."""
+        """V of a decision, rounded to multiples of 2^−40 in the scaled variables."""
         return sum_of(self.monomials, self.sizes, decision[: len(self.monomials)], _GRID)
 
 
@@ -89,19 +89,19 @@ def neighbourhood(
     lyapunov: tuple[Term, ...] = (),
     changed: Sequence[Loop] = (),
 ) -> Neighbourhood:
-    """Demands V > 0 and V̇ < 0 (or the faster decrease of a pace) around one set of gains.
+    """Demands V > 0 and V̇ < 0 (or the faster decrease of a pace) near one set of gains.
 
     Parameters
     ----------
     degree : int
-        Of V.
+        Degree of V.
     scale : tuple of Fraction
-        Of the variables.
+        Scale of the variables.
     lyapunov : tuple of Term
-        V as it is now, which the changes act on.
+        Current V, with which the changes of the gains are linearised.
     changed : sequence of Loop
-        The loop with one gain changed each; its difference to `loop` is one part, exact where the field is affine in
-        the gain. Conditions on cells are kept as they are, so that a search must look again at the gains it finds.
+        Loops with one changed gain each. The difference to `loop` is one part, exact if the field is affine in the
+        gain. Conditions on cells do not change with the gains, so a search must re-check its resulting gains.
     """
     monomials = signed_monomials(loop.states, degree, loop.domain)
     sizes = tuple(Fraction(_power(scale, exponents_of(term, loop.states))) for term in monomials)
@@ -133,7 +133,7 @@ def _power(base: Sequence[Fraction], exponents: Sequence[int]) -> Fraction | int
 def _columns(
     row: FormRow, j: int | None, values: Mapping[str, float], weights: Sequence[float] = ()
 ) -> tuple[Form, Form]:
-    """V and −V̇ of one monomial, or of all with weights."""
+    """V and −V̇ of one monomial, or of all monomials with weights."""
     columns: tuple[Form, Form] = ({}, {})
     for total, parts in zip(columns, (row.function, row.fall), strict=True):
         for k, e, names, c in parts:
@@ -151,7 +151,7 @@ def _faster(
     factor: float,
     weights: Sequence[float] = (),
 ) -> Form:
-    """Part of a row that V decides: V, −V̇, or −w^{m−n}V̇ − κ(n/m)V."""
+    """Part of a row that depends on V: V, −V̇, or −w^{m−n}V̇ − κ(n/m)V."""
     function, fall = _columns(row, j, values, weights)
     if not row.fall:
         form = function
@@ -171,14 +171,14 @@ def _faster(
 def _moved(
     row: FormRow, present: Sequence[float], values: Mapping[str, float], other: Mapping[str, float], pace: Pace | None
 ) -> Form:
-    """What changed numbers add to a row for V as it is."""
+    """Change of a row with the current V when the numbers of the loop change."""
     before = _faster(row, None, values, pace, 1.0, present)
     after = _faster(row, None, other, pace, 1.0, present)
     return {e: after.get(e, 0.0) - before.get(e, 0.0) for e in {**before, **after}}
 
 
 def _rest(row: FormRow, pace: Pace | None) -> Form:
-    """Part of a row without V: −κ(1 − n/m)w^m."""
+    """Part of a row that does not depend on V: −κ(1 − n/m)w^m."""
     if pace is None or not row.fall:
         return {}
     m, n = pace.degrees
@@ -204,7 +204,7 @@ def _times(left: Form, right: Form) -> Form:
 
 @lru_cache(maxsize=32)
 def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> tuple[Template, ...]:
-    """Every row with its set and monomials in scaled variables, and the scale of all of these."""
+    """Every row with its set and monomials in scaled variables, and the scale of all variables."""
     templates = []
     loop = kin.loop
     for row in float_rows(kin):
@@ -247,25 +247,25 @@ def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -
 
 
 # ----------------------------------------------------------------------
-# How fast V̇ ≤ −κV^{n/m} settles a loop, and the linear forms w ≈ V^{1/m} that make the search for κ a programme.
+# Settling speed from V̇ ≤ −κV^{n/m}, and the linear forms w ≈ V^{1/m} with which the search for κ is convex.
 
 _POINTS, _SEED = 400, 5
 
 
 def box(loop: Loop, units: Mapping[str, sp.Expr]) -> tuple[float, ...]:
-    """Largest u_i where all errors are at most L̄ in size, for x_i = ±u_i^{r_i}.
+    """Largest u_i for x_i = ±u_i^{r_i} if all errors satisfy |e_i| ≤ L̄.
 
     Parameters
     ----------
     units : mapping of str to Expr
-        Error that one unit of a state stands for, see `LoopField.units`.
+        Error that equals one unit of each state, see `LoopField.units`.
     """
     bound, ranges = loop.uncertain["d"][1], unit_ranges(loop, units)
     return tuple(float(bound / ranges[state][0]) ** (1 / weight) for state, weight in loop.states.items())
 
 
 def on_box(lyapunov: Sequence[Term], states: Mapping[str, int], sizes: Sequence[float]) -> float:
-    """Σ |α_j|·|monomial_j| at the far corner of a box: V is at most that within."""
+    """Upper bound on V in a box: Σ |α_j|·|monomial_j| at its far corner."""
     return sum(abs(float(term.coefficient)) * _at(exponents_of(term, states), sizes) for term in lyapunov)
 
 
@@ -277,7 +277,7 @@ def _at(exponents: Sequence[int], sizes: Sequence[float]) -> float:
 
 
 def rounded(lyapunov: Sequence[Term], bits: int, divisor: float = 1.0) -> tuple[Term, ...]:
-    """V divided by a number, every coefficient with so many binary digits."""
+    """V divided by a number, with coefficients rounded to a number of binary digits."""
     terms = []
     for term in lyapunov:
         value = float(term.coefficient) / divisor
@@ -287,15 +287,15 @@ def rounded(lyapunov: Sequence[Term], bits: int, divisor: float = 1.0) -> tuple[
 
 
 def degrees_of(obligations: Obligations) -> tuple[int, int]:
-    """m and n, of V and V̇."""
+    """Degrees m of V and n of V̇."""
     m = obligation_degree([p for _, p in obligations.function()], "V")
     return m, obligation_degree([one.polynomial for _, one in obligations.decrease("")], "V̇")
 
 
 def pace_of(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: int) -> Pace:
-    """Pace at which a V ≤ 1 of a degree settles within T = 1/speed, κ = speed·m/(m−n); for loops that settle, n < m.
+    """Pace with which V ≤ 1 of degree m = `power` settles within T = 1/speed: κ = speed·m/(m−n), for n < m.
 
-    w is fitted to V^{1/m} on every cell for a V nearby, of whatever degree.
+    w is fitted on every cell to the root V^{1/m} of a nearby V, whose degree may differ.
     """
     obligations = Obligations(loop, lyapunov)
     m, n = degrees_of(obligations)
@@ -304,7 +304,7 @@ def pace_of(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: int) ->
 
 
 def least_margins(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> tuple[float, float]:
-    """Largest t with V ≥ tΣu_i^m and t with −V̇ ≥ tΣu_i^n that the solver finds, not above what the cone allows."""
+    """Largest t found with V ≥ tΣu_i^m, and largest t found with −V̇ ≥ tΣu_i^n, both by the conic solver."""
     obligations = Obligations(loop, lyapunov)
     function = [Obligation(name, p) for name, p in obligations.function()]
     decrease = [one for _, one in obligations.decrease("")]
@@ -330,7 +330,7 @@ def _margin(one: Obligation, loop: Loop, scale: Sequence[Fraction]) -> float:
 
 
 def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
-    """Smallest −V̇/V^{n/m} over sampled points: an estimate of κ from above."""
+    """Smallest −V̇/V^{n/m} over sampled points, which estimates κ from above."""
     obligations = Obligations(loop, lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")
     least = [np.inf]
@@ -345,7 +345,7 @@ def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
 
 
 def _lifted(points: np.ndarray, one: Obligation) -> tuple[np.ndarray, np.ndarray]:
-    """Points with the variables of nested powers, and which of them are in the cell."""
+    """Points extended by the variables of nested powers, and a mask of the points in the cell."""
     inside = np.full(len(points), True)
     for equality in one.equalities:
         position = points.shape[1]
@@ -361,7 +361,7 @@ def _lifted(points: np.ndarray, one: Obligation) -> tuple[np.ndarray, np.ndarray
 
 
 def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
-    """Linear form with coefficients ≥ 0 next to the m-th root of a form, in the mean of the squared shares."""
+    """Linear form with coefficients > 0 near the m-th root of a form, by least squares of relative errors."""
     points = _points(potential, m)
     wanted = np.maximum(_values(potential, points), 1e-300) ** (1 / m)
     coefficients, _ = nnls(points / wanted[:, None], np.ones(len(points)))
@@ -371,7 +371,7 @@ def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
 
 
 def _points(potential: Polynomial, m: int) -> np.ndarray:
-    """Directions spread over a cell (k × n), every variable in the unit in which V is one on its axis."""
+    """Points in the directions of a cell (k × n), each variable in the unit for which V is 1 on its axis."""
     size = len(next(iter(potential)))
     corners = [abs(float(potential.get(tuple(m * (i == j) for j in range(size)), 0))) for i in range(size)]
     units = np.array([c ** (-1 / m) if c > 0 else 1.0 for c in corners])
@@ -386,26 +386,26 @@ def _values(polynomial: Polynomial, points: np.ndarray) -> np.ndarray:
 
 
 # ----------------------------------------------------------------------
-# How gains change when a loop is stretched: exponents that its terms leave no choice about.
+# Scaling of the gains with the uncertain parameters: exponents that the terms of the loop determine.
 
 
 def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fraction]:
-    """Exponents p with which gains k → s^p·k and states x → s^q·x undo a stretch of the uncertain parameters.
+    """Exponents p and q with which gains k → s^p·k and states x → s^q·x compensate scaled uncertain parameters.
 
-    Every term of a rate must grow like its state, and every term of a nested argument like the others. With d → s·d
-    this is the λ-scaling of a sliding mode (⅔, ½, 1, 1 for the 2-CTA), so that k/L̄^p is a set of gains for L̄ = 1.
+    Every term of a rate must scale like its state, and all terms of a nested argument alike. With d → s·d this is the
+    λ-scaling of a sliding mode (⅔, ½, 1, 1 for the 2-CTA), so that k/L̄^p is a set of gains for L̄ = 1.
 
     Parameters
     ----------
     loop : Loop
-        Its numbers do not matter.
+        Only its structure is used.
     sizes : mapping of str to int
-        Exponent of s in every uncertain parameter that grows, such as ``{"d": 1}``.
+        Exponent of s in every scaled uncertain parameter, such as ``{"d": 1}``.
 
     Returns
     -------
     dict of str to Fraction
-        Of every gain and every state.
+        Exponent of every gain and every state.
 
     Raises
     ------
@@ -434,13 +434,13 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
 
 
 def scaled_norm(loop: Loop, exponents: Mapping[str, Fraction]) -> float:
-    """‖(k_i/L̄^{p_i})‖₂ of a loop's gains; no λ changes it. L̄ is the upper end of d."""
+    """Norm ‖(k_i/L̄^{p_i})‖₂ of a loop's gains, invariant under λ-scaling; L̄ is the upper end of d."""
     bound = float(loop.uncertain["d"][1])
     return float(sum((float(k) / bound ** float(exponents[name])) ** 2 for name, k in loop.gains.items()) ** 0.5)
 
 
 # ----------------------------------------------------------------------
-# What a search for gains knows: its setting, the states that it passes, and what makes one better than another.
+# Setting of a search for gains, its states, and its objective.
 
 MARGIN, FAINT = 1e-6, 1e-9
 _ROOM = 1e-3
@@ -448,25 +448,25 @@ _ROOM = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathSetting:
-    """What does not change during a search."""
+    """Constants of a search."""
 
     objective: "Objective"
-    exponents: Mapping[str, Fraction]  # Of gains and states, see `stretch_exponents`
-    degree: int  # Of V
+    exponents: Mapping[str, Fraction]  # Exponents of gains and states, see `stretch_exponents`
+    degree: int  # Degree of V
     units: Mapping[str, sp.Expr] = field(default_factory=dict)  # See `LoopField.units`
-    least: float = MARGIN  # Margin that counts; a search over gains steers clear of the edge of what a solver can tell
+    least: float = MARGIN  # Least accepted margin; well above the accuracy of the solver
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class State:
-    """Gains with a V that a solver believes in.
+    """Gains with a V whose margin is positive in floating point.
 
     Attributes
     ----------
     loop : Loop
-        With the ranges that the level asks for.
+        Closed loop with the ranges that the level requires.
     level : float
-        Of the objective.
+        Level of the objective.
     """
 
     loop: Loop
@@ -477,7 +477,7 @@ class State:
 
 @dataclass(frozen=True, kw_only=True)
 class Objective(ABC):
-    """One way in which gains can be better than others."""
+    """Objective of a search, which ranks gains by a level."""
 
     name: ClassVar[str]
     unit: ClassVar[str]
@@ -493,15 +493,15 @@ class Objective(ABC):
         return level > other if self.larger else level < other
 
     def improved(self, level: float, share: float) -> float:
-        """Level that is better by a share."""
+        """Level improved by a relative share."""
         return level * (1 + share if self.larger else 1 - share)
 
     def at(self, loop: Loop, level: float) -> Loop:
-        """Loop with the ranges that a level asks for."""
+        """Loop with the ranges that a level requires."""
         return loop
 
     def speed(self, level: float) -> float | None:
-        """1/T that a level asks for, see `pace_of`."""
+        """Speed 1/T that a level requires, see `pace_of`; None without a pace."""
         return None
 
     def norm_bound(self, level: float) -> float | None:
@@ -509,67 +509,67 @@ class Objective(ABC):
         return self.bound
 
     def clipped(self, gains: Mapping[str, float], loop: Loop, exponents: Mapping[str, Fraction]) -> dict[str, float]:
-        """Gains drawn back to the bound on their norm, if they are beyond."""
+        """Gains scaled down to the bound on their norm if they exceed it."""
         scale = float(loop.uncertain["d"][1])
         norm = sum((k / scale ** float(exponents[name])) ** 2 for name, k in gains.items()) ** 0.5
         factor = 1.0 if self.bound is None else min(1.0, self.bound * (1 - _ROOM) / norm)
         return {name: k * factor for name, k in gains.items()}
 
     def reached(self, level: float, loop: Loop, exponents: Mapping[str, Fraction]) -> float:
-        """Level of gains that a step for a level has led to."""
+        """Level of the gains that result from a step towards a level."""
         return level
 
     @abstractmethod
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
-        """First state at given gains; None where the search has nothing to begin with."""
+        """Initial state at given gains; None if no V is found."""
 
     def proved(self, setting: PathSetting, state: State, subject: Subject) -> Certificate | None:
-        """Exact certificate at the gains of a state, or None."""
+        """Exact certificate for the gains of a state; None if none is found."""
         return find_certificate(state.loop, setting.degree, subject=subject)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Proof of given gains by another way than a climb, to be beaten by that if V is paced; None without one."""
+        """Proof of given gains without a climb; a paced objective compares it with a climb. None without one."""
         return None
 
     @abstractmethod
     def figure(self, certificate: Certificate, setting: PathSetting) -> float:
-        """What a certificate proves, in terms of the objective."""
+        """Value of the objective that a certificate proves."""
 
 
 # ----------------------------------------------------------------------
-# Gains and V improved together: steps along the bilinear inequalities, each looked at again at the gains it finds.
+# Joint improvement of gains and V by steps of linearised inequalities, each re-checked at its resulting gains.
 #
-# At gains k0 with V0 the products of changes of V and of k are left out, so that V and k move in one programme with the
-# largest margin (the path-following of Hassibi, How and Boyd, American Control Conference 1999). What a step finds
-# counts only after a programme with these gains fixed has a margin too. Nothing here is proved.
+# At gains k0 with V0 the products of changes of V and of k are omitted, so that one programme with the largest margin
+# changes both V and k (the path-following of Hassibi, How and Boyd, American Control Conference 1999). A step is
+# accepted only if a programme with the resulting gains fixed has a margin, too. Nothing here is proved.
 
-_ROUNDS = 100  # programmes of steps to solve at most
+_ROUNDS = 100  # largest number of steps
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrustRegion:
-    """How far the bilinear products that a step omits are trusted; a step is a share by which the level improves."""
+    """Step sizes for which the linearisation is trusted; a step is the share by which the level improves."""
 
-    # First share. What a step leaves out is of second order, about (`gains` times the share)²: a tenth of what is kept.
+    # First share. The omitted terms are of second order, about (`gains` times the share)²: a tenth of the linear terms
     initial: float = 0.1
-    largest: float = 0.35  # Share at which what is left out is as large as what is kept
-    # Share below which the search centres instead: gains are rounded to four digits, ten of which it is
+    largest: float = 0.35  # Share at which the omitted terms are as large as the linear terms
+    # Share below which the search centres instead: ten units of the fourth digit, to which gains are rounded
     least: float = 1e-3
-    # grow, shrink: What the share is multiplied by after a step that was found, and divided by after one that was not:
-    # up slowly and down fast, since a programme that fails takes as long as one that succeeds
+    # grow, shrink: Factor of the share after a successful step, and its divisor after a failed one; increases are slow
+    # and decreases fast, since a failed programme takes as long as a successful one
     grow: float = 1.5
     shrink: float = 3.0
-    # Largest change of a gain over the share: a level asks for changes of several gains larger than its own
+    # Largest relative change of a gain per share, as several gains must change more than the level
     gains: float = 3.0
-    again: float = 0.03  # Share after centring, below the initial one, which had failed
-    # Share by which the level must have improved since the last centring for another: three of the least steps
+    again: float = 0.03  # Share after centring, below the initial share, which failed
+    # Improvement of the level since the last centring that justifies another one: three least shares
     worthwhile: float = 3e-3
-    # Factor by which centring must raise the margin; less leaves no room for a step, and the search ends
+    # Factor by which centring must increase the margin; otherwise no step is possible and the search ends
     margin: float = 1.2
-    under_root: float = 0.5  # Largest change of a gain under a root over the gain, so that the root stays real
+    under_root: float = 0.5  # Largest relative change of a gain under a root, so that the root stays real
 
     def longer(self, share: float) -> float:
-        """Share after a step that was found."""
+        """Share after a successful step."""
         return min(self.largest, self.grow * share)
 
 
@@ -577,14 +577,14 @@ TRUST = TrustRegion()
 
 
 def with_gains(loop: Loop, gains: Mapping[str, Fraction]) -> Loop:
-    """Loop with other gains and the roots that belong to them."""
+    """Loop with other gains and their roots."""
     parameters = {**loop.constants, **gains}
     roots = {name: (of, root_enclosure(parameters[of])) for name, (of, _) in loop.roots.items()}
     return replace(loop, gains=dict(gains), roots=roots)
 
 
 def short(loop: Loop, gains: Mapping[str, float]) -> dict[str, Fraction]:
-    """Gains with four digits; those under a root as squares of numbers with four digits, so that the root is exact."""
+    """Gains rounded to four digits; a gain under a root is the square of such a number, so its root is exact."""
     rooted = {of for of, _ in loop.roots.values()}
     return {name: _digits(math.sqrt(max(k, 0.0))) ** 2 if name in rooted else _digits(k) for name, k in gains.items()}
 
@@ -594,14 +594,14 @@ def _digits(number: float) -> Fraction:
 
 
 def climb(setting: PathSetting, state: State, *, free: bool = True, until: float | None = None) -> list[State]:
-    """States in the order in which they were found, each better than the one before; the given one first.
+    """States of increasing quality, beginning with the given one.
 
     Parameters
     ----------
     free : bool
-        Whether the gains may move.
+        Whether the gains may change.
     until : float, optional
-        Level at which to stop.
+        Level at which the climb stops.
     """
     states, share, centred = [state], TRUST.initial, None
     objective = setting.objective
@@ -626,14 +626,14 @@ def climb(setting: PathSetting, state: State, *, free: bool = True, until: float
 
 
 def _level(setting: PathSetting, state: State, share: float) -> State | None:
-    """The same gains at a better level."""
+    """State with the same gains at a better level; None if none is found."""
     level = setting.objective.improved(state.level, share)
     level = setting.objective.reached(level, state.loop, setting.exponents)
     return look(setting, state.loop, level, state.lyapunov, state.level)
 
 
 def _step(setting: PathSetting, state: State, share: float) -> State | None:
-    """State that is better by a share; for the share zero, one about as good with the largest margin."""
+    """State improved by a share; for a zero share, a state of similar level with the largest margin."""
     objective = setting.objective
     level = objective.improved(state.level, share)
     loop = objective.at(state.loop, level)
@@ -658,7 +658,7 @@ def _step(setting: PathSetting, state: State, share: float) -> State | None:
 
 
 def _changes(setting: PathSetting, loop: Loop, trust: float) -> dict[str, dict[str, Fraction]]:
-    """For every gain that may move, the gains with this one larger; none that is zero moves."""
+    """Gains with one gain increased, for every gain that may change; zero gains do not change."""
     norm = scaled_norm(loop, setting.exponents)
     bound = float(loop.uncertain["d"][1])
     rooted = {of for of, _ in loop.roots.values()}
@@ -687,7 +687,7 @@ def _around(
 def _limits(
     setting: PathSetting, loop: Loop, level: float, around: Neighbourhood, sizes: Mapping[str, float]
 ) -> DecisionBounds:
-    """|a_j| and shares of the changes at most one, the norm of the gains as the objective asks."""
+    """Bounds: |a_j| and shares of the changes at most one, and the norm of the gains within the objective's bound."""
     count = len(around.monomials)
     bound = setting.objective.norm_bound(level)
     rows, bounds = [], []
@@ -703,7 +703,7 @@ def _limits(
 
 
 def _shares(setting: PathSetting, loop: Loop, around: Neighbourhood) -> list[float]:
-    """Largest size of every a_j-th part of V on the box, where a rate is asked for: then V ≤ 1 there."""
+    """Bounds on the terms of V on the box per unit of a_j, which ensure V ≤ 1 there; empty without a pace."""
     if not setting.objective.paced:
         return []
     sizes = box(loop, setting.units)
@@ -719,14 +719,14 @@ def look(
     beyond: float | None = None,
     least: float | None = None,
 ) -> State | None:
-    """State at fixed gains and level with the largest margin; None without one, or where it is no better than `beyond`.
+    """State at fixed gains and level with the largest margin; None if none exists or it is not better than `beyond`.
 
     Parameters
     ----------
     lyapunov : tuple of Term
-        V of a state nearby; only a rate needs it.
+        V of a nearby state, needed only for a pace.
     least : float, optional
-        Margin that counts; that of the setting unless given.
+        Least accepted margin; by default that of the setting.
     """
     objective = setting.objective
     if beyond is not None and not objective.better(level, beyond):

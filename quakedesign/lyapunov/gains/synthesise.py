@@ -53,7 +53,7 @@ from quakedesign.parallel import Crew, Here, crew_or_here
 from quakedesign.sos.solve.conic import handing_back
 
 # ----------------------------------------------------------------------
-# What gains can be best in: an order of levels, what a level asks of a loop, the proof and the figure at the end.
+# Objectives: order of levels, requirements of a level on a loop, the final proof and its value.
 
 _HALVINGS = 8
 _BITS = (16, 24, 34)
@@ -61,7 +61,7 @@ _BITS = (16, 24, 34)
 
 @dataclass(frozen=True, kw_only=True)
 class SmallestNorm(Objective):
-    """Smallest ‖k_i/L̄^{p_i}‖₂, p_i from homogeneity: (k1L̄^{−2/3}, k2L̄^{−1/2}, k3/L̄, k4/L̄) for the 2-CTA."""
+    """Smallest ‖k_i/L̄^{p_i}‖₂ with p_i from homogeneity: (k1L̄^{−2/3}, k2L̄^{−1/2}, k3/L̄, k4/L̄) for the 2-CTA."""
 
     name: ClassVar[str] = "norm"
     unit: ClassVar[str] = "-"
@@ -78,7 +78,7 @@ class SmallestNorm(Objective):
         return scaled_norm(loop, exponents)
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
-        """State at the gains."""
+        """State at given gains."""
         return look(setting, loop, scaled_norm(loop, setting.exponents), least=FAINT)
 
     def figure(self, certificate: Certificate, setting: PathSetting) -> float:
@@ -88,10 +88,10 @@ class SmallestNorm(Objective):
 
 @dataclass(frozen=True, kw_only=True)
 class LargestDecay(Objective):
-    """Largest κ in V̇ ≤ −κV^{n/m}, told as one over the settling time T = m/((m−n)κ)·C^{(m−n)/m} that it certifies.
+    """Largest κ in V̇ ≤ −κV^{n/m}, measured by 1/T with the certified settling time T = m/((m−n)κ)·C^{(m−n)/m}.
 
-    T holds for all starts |e_i| ≤ L̄, where V ≤ C. κ alone would compare neither two V, which may be multiplied by any
-    number, nor two degrees m; T does. No λ changes it.
+    T is valid for all initial errors |e_i| ≤ L̄, where V ≤ C. Unlike κ, it is independent of the scaling of V and
+    comparable between degrees m, and it is invariant under λ-scaling.
     """
 
     name: ClassVar[str] = "decay"
@@ -104,7 +104,7 @@ class LargestDecay(Objective):
         return level
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
-        """State at half of what a V without a rate seems to reach, or less."""
+        """State at half the estimated speed of a V that was computed without a pace, or a smaller speed."""
         first = look(replace(setting, objective=SmallestNorm()), loop, scaled_norm(loop, setting.exponents))
         if first is None:
             return None
@@ -120,7 +120,7 @@ class LargestDecay(Objective):
         return None
 
     def proved(self, setting: PathSetting, state: State, subject: Subject) -> Certificate | None:
-        """Certificate with V of the state and the largest κ that the solver finds for it."""
+        """Certificate with the V of the state and the largest κ that the solver finds for it."""
         scale = balance(state.loop)
         for bits in _BITS:
             function = rounded(state.lyapunov, bits)
@@ -135,7 +135,7 @@ class LargestDecay(Objective):
         return None
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate with the V of the largest margins, which is the better one where the forms w fit badly."""
+        """Certificate with the V of the largest margins, which is better if the forms w fit poorly."""
         bound, beta = loop.uncertain["d"][1], loop.uncertain.get("beta", (Fraction(1), Fraction(1)))
         gains = tuple(loop.gains.values())
         settling = fastest_settling(subject, gains, lipschitz=bound, gain_range=beta, start=bound, degrees=degrees)
@@ -152,7 +152,7 @@ class LargestDecay(Objective):
 
 @dataclass(frozen=True, kw_only=True)
 class LargestRange(Objective):
-    """Largest ρ for β ∈ [b/ρ, bρ] around the geometric middle b of the requested range."""
+    """Largest ρ with β ∈ [b/ρ, bρ] about the geometric mean b of the requested range."""
 
     name: ClassVar[str] = "beta"
     unit: ClassVar[str] = "-"
@@ -168,11 +168,11 @@ class LargestRange(Objective):
         return replace(loop, uncertain={**loop.uncertain, "beta": ends})
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
-        """State with the requested range, or a hundredth to either side."""
+        """State with the requested range, which is widened to at least 1 % on either side."""
         return look(setting, loop, self.first, least=FAINT)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate of the largest range to four digits, in one number along which the programme is affine."""
+        """Certificate of the largest range to four digits, by a search over one number in which V̇ is affine."""
         gains, bound = tuple(loop.gains.values()), loop.uncertain["d"][1]
         reach = largest_gain_range(
             subject, gains, lipschitz=bound, nominal=self.middle, symmetric=True, degrees=tuple(degrees)
@@ -190,13 +190,13 @@ OBJECTIVES = tuple(_OBJECTIVES)
 
 
 def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
-    """Objective of a name for the ranges of a loop.
+    """Objective of a given name for the ranges of a loop.
 
     Raises
     ------
     UnknownNameError
     ParameterError
-        For a bound that is missing or not positive, or a loop that is not uncertain in what the objective is about.
+        When the bound is missing or not positive, or the loop lacks the uncertain parameter of the objective.
     """
     require_known(name, _OBJECTIVES, "objective", UnknownNameError)
     chosen = _OBJECTIVES[name]
@@ -215,21 +215,21 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
 
 
 # ----------------------------------------------------------------------
-# The problem of a synthesis of gains, and the loops at which its search begins.
+# The problem of a synthesis of gains, and the initial loops of its search.
 
 _SPREAD, _WIDTH = 0.4, 3.0
-_HIGHEST = 12  # beyond, one programme takes minutes
+_HIGHEST = 12  # for higher degrees, one programme takes minutes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisProblem:
-    """Problem of a synthesis, read and checked."""
+    """Problem of a synthesis with checked arguments."""
 
     subject: Subject
-    loop: Loop  # With gains of one
-    setting: PathSetting  # With the lowest degree
+    loop: Loop  # Loop with all gains 1
+    setting: PathSetting  # Setting with the lowest degree
     degrees: tuple[int, ...]
-    published: tuple[Loop, ...]  # With gains from the literature, scaled to the same ranges
+    published: tuple[Loop, ...]  # Loops with gains from the literature, scaled to the same ranges
 
 
 def question(
@@ -241,7 +241,7 @@ def question(
     bound: float | None = None,
     degrees: Iterable[int] | None = None,
 ) -> SynthesisProblem:
-    """Read and check the arguments of `synthesise`.
+    """Problem from the checked arguments of `synthesise`.
 
     Raises
     ------
@@ -270,7 +270,7 @@ def question(
 
 
 def _literature(name: str, loop: Loop, exponents: Mapping[str, Fraction]) -> list[dict[str, Fraction]]:
-    """Gains that are known for a law, scaled to the loop's L̄ and to the least β."""
+    """Gains from the literature for a law, scaled to the L̄ of the loop and to its least β."""
     try:
         sets = [one for one in family(name) if one.literature]
     except UnknownNameError:
@@ -283,7 +283,7 @@ def _literature(name: str, loop: Loop, exponents: Mapping[str, Fraction]) -> lis
 def _scaled(
     loop: Loop, gains: Mapping[str, float], bound: float, exponents: Mapping[str, Fraction]
 ) -> dict[str, Fraction]:
-    """Gains for |d| ≤ bound and β = 1 carried over to the loop's ranges, with four digits."""
+    """Gains for |d| ≤ bound and β = 1, scaled to the ranges of the loop and rounded to four digits."""
     beta = float(loop.uncertain["beta"][0]) if "beta" in loop.uncertain else 1.0
     of_beta = stretch_exponents(loop, {"beta": 1})
     ratio = float(loop.uncertain["d"][1]) / bound
@@ -292,9 +292,9 @@ def _scaled(
 
 
 def begin_with(problem: SynthesisProblem, seed: int) -> Iterator[Loop]:
-    """Gains from the literature, the nearest to the bound on the norm first, then random ones around them.
+    """Loops with gains from the literature, nearest to the norm bound first, then with random gains near them.
 
-    Random ones of any size where there are none in the literature.
+    Without gains in the literature, random gains of any size.
     """
     yield from sorted(problem.published, key=lambda one: _beyond(problem.setting, one))
     loop, rng = problem.loop, np.random.default_rng(seed)
@@ -309,13 +309,13 @@ def begin_with(problem: SynthesisProblem, seed: int) -> Iterator[Loop]:
 
 
 def _beyond(setting: PathSetting, loop: Loop) -> tuple[bool, float]:
-    """Order of gains: those within the bound on the norm before those beyond, the nearest to it first."""
+    """Sort key: gains within the norm bound before those beyond it, and by distance from the bound."""
     bound, norm = setting.objective.bound, scaled_norm(loop, setting.exponents)
     return (False, 0.0) if bound is None else (norm > bound * (1 + 1e-9), abs(bound - norm))
 
 
 # ----------------------------------------------------------------------
-# Gains and Lyapunov function found together for an objective; gains without a proof are never returned.
+# Joint search for gains and a Lyapunov function; gains without a proof are never returned.
 
 _STRETCHES = (1.0, 1.5, 4.0)
 _DRAWS = 12
@@ -327,29 +327,29 @@ _SHARES = (1.0, 0.9, 0.7)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComparedGains:
-    """What gains from elsewhere reach in the same objective."""
+    """Proved value of the objective for gains from the literature."""
 
     gains: Mapping[str, Fraction]  # Scaled to the same L̄ and β
-    value: float | None  # Proved; None where no proof was found
+    value: float | None  # Proved value; None without a proof
     norm: float  # ‖k_i/L̄^{p_i}‖₂
-    ratio: float | None  # By which factor the gains found are better
-    certificate: Certificate | None = None  # Of the value, V being the best that was found for these gains
+    ratio: float | None  # Factor by which the synthesised gains are better
+    certificate: Certificate | None = None  # Proof of the value, with the best V found for these gains
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Synthesis:
-    """Gains with a proof, and how good they are."""
+    """Gains with a proof, and their value of the objective."""
 
     law: str
     objective: str
     unit: str
     gains: Mapping[str, Fraction]
     certificate: Certificate  # Checked in exact arithmetic
-    # In terms of the objective: what the certificate proves, rounded down where more is better; for `sampled` what was
-    # measured
+    # Value of the objective that the certificate proves, rounded down if larger is better; for `sampled` the measured
+    # value
     value: float
     norm: float  # ‖k_i/L̄^{p_i}‖₂ of the gains
-    # Gains from the literature, where there are any for the law
+    # Gains from the literature, if any are known for the law
     compared: tuple[ComparedGains, ...] = field(default=())
 
 
@@ -368,9 +368,9 @@ def synthesise(
     executor: Executor | None = None,
     compare: bool = True,
 ) -> Synthesis | None:
-    """Find gains with a proof that are best in one respect.
+    """Find gains with a proof that optimise one objective.
 
-    Several starts climb with a V of the lowest degree; the best goes on with the higher ones.
+    Several climbs start with a V of the lowest degree; the best climb continues with higher degrees.
 
     Parameters
     ----------
@@ -383,22 +383,22 @@ def synthesise(
         L̄ > 0.
     gain_range : tuple of two
     bound : float, optional
-        Largest ‖k_i/L̄^{p_i}‖₂, for all objectives but ``"norm"``; the smallest of the gains known from the literature
-        unless given.
+        Largest ‖k_i/L̄^{p_i}‖₂ for all objectives except ``"norm"``; by default the smallest norm of the gains from the
+        literature.
     degrees : iterable of int, optional
-        Of V; the two lowest of `candidate_degrees` unless given. Higher ones find better gains and take longer.
+        Degrees of V; by default the two lowest of `candidate_degrees`. Higher degrees yield better gains, more slowly.
     starts : int
-        The gains from the literature come first, then random ones.
+        Number of initial gains: first those from the literature, then random ones.
     seed : int
-        Of the random starts; the answer is the same for the same seed, however many workers.
+        Seed of the random gains; the result does not depend on the number of workers.
     workers : int
-        Processes; 1 computes in this one.
+        Number of processes; 1 computes in the calling process.
     scheduler : str, optional
         Address of a dask.distributed scheduler that is used instead.
     executor : Executor, optional
         Any other executor of `concurrent.futures` that is used instead.
     compare : bool
-        Whether to ask the same question about the gains from the literature.
+        Whether to compute the objective for the gains from the literature, too.
 
     Returns
     -------
@@ -408,11 +408,11 @@ def synthesise(
     Raises
     ------
     ParameterError
-        For input out of range, a bound that is missing, or a law whose gains do not scale.
+        For an argument out of range, a missing bound, or a law whose gains do not scale.
     UnknownNameError
         For an unknown law or objective.
     SimulationError
-        When the workers cannot be reached, or do not live.
+        When the workers are not reachable, or die.
     """
     problem = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
     require_count(_MOST_STARTS, starts=starts)
@@ -437,7 +437,7 @@ def _synthesis(problem: SynthesisProblem, certificate: Certificate, value: float
 
 
 def _beside(problem: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
-    """Gains found beside known ones, which take their place where they are better within the same bound on the norm."""
+    """Synthesis compared with gains from the literature, which replace it if they are better within the norm bound."""
     objective = problem.setting.objective
     compared = [given(problem, one) for one in problem.published]
     for one in compared:
@@ -463,7 +463,7 @@ def _covers(proved: Loop, wanted: Loop) -> bool:
 
 
 def _climbed(setting: PathSetting, first: Sequence[Loop], wanted: int, crew: Crew) -> list[list[State]]:
-    """Climbs from as many starts as wanted, of those that can begin; in the order of the starts."""
+    """Climbs from the requested number of feasible starts, in the order of the starts."""
     done: list[list[State]] = []
     for at in range(0, len(first), crew.width):
         climbs = dict(crew.answers(attempt, [(setting, loop) for loop in first[at : at + crew.width]]))
@@ -474,9 +474,9 @@ def _climbed(setting: PathSetting, first: Sequence[Loop], wanted: int, crew: Cre
 
 
 def attempt(setting: PathSetting, loop: Loop) -> list[State]:
-    """States of a climb from some gains, or from the same stretched; empty where there is no beginning.
+    """States of a climb from given gains, or from these scaled up; empty without an initial state.
 
-    As far as the gains go by themselves, then with the gains moving.
+    The level is improved first with fixed gains, then with free gains.
     """
     begin = next(filter(None, (_begin(setting, _stretched(setting, loop, s)) for s in _STRETCHES)), None)
     if begin is None:
@@ -486,7 +486,7 @@ def attempt(setting: PathSetting, loop: Loop) -> list[State]:
 
 
 def _begin(setting: PathSetting, loop: Loop) -> State | None:
-    """State that meets the bound on the norm, after a climb for the norm alone where the gains exceed it."""
+    """Initial state within the norm bound; gains that exceed it are first reduced by a climb for the norm."""
     bound = setting.objective.bound
     if bound is not None and scaled_norm(loop, setting.exponents) > bound * (1 + 1e-9):
         smaller = replace(setting, objective=SmallestNorm())
@@ -499,7 +499,7 @@ def _begin(setting: PathSetting, loop: Loop) -> State | None:
 
 
 def _stretched(setting: PathSetting, loop: Loop, factor: float) -> Loop:
-    """Loop with the gains for a larger L̄."""
+    """Loop with the gains scaled to a larger L̄."""
     if factor == 1:
         return loop
     gains = {n: float(k) * factor ** float(setting.exponents[n]) for n, k in loop.gains.items()}
@@ -507,7 +507,7 @@ def _stretched(setting: PathSetting, loop: Loop, factor: float) -> Loop:
 
 
 def _best(problem: SynthesisProblem, climbs: Sequence[Sequence[State]]) -> tuple[Certificate, float] | None:
-    """Best proof, the best climb going on with higher degrees."""
+    """Best proof over all degrees; the best climb continues with higher degrees."""
     best = _in_order(problem.setting, climbs)
     stages = [(problem.setting, best)]
     for degree in problem.degrees[1:] if best else ():
@@ -522,7 +522,7 @@ def _best(problem: SynthesisProblem, climbs: Sequence[Sequence[State]]) -> tuple
 
 
 def _carried(higher: PathSetting, state: State) -> State | None:
-    """State of a lower degree looked at with a higher one, at its level or a lower one."""
+    """State with a V of higher degree for the gains of a state, at its level or a lower one."""
     objective = higher.objective
     levels = [objective.reached(state.level * share, state.loop, higher.exponents) for share in _SHARES]
     states = (look(higher, state.loop, level, state.lyapunov, least=FAINT) for level in dict.fromkeys(levels))
@@ -530,7 +530,7 @@ def _carried(higher: PathSetting, state: State) -> State | None:
 
 
 def _in_order(setting: PathSetting, climbs: Sequence[Sequence[State]]) -> list[State]:
-    """Best state first."""
+    """All states of the climbs, best first."""
     states = [state for states in climbs for state in states]
     return sorted(states, key=lambda s: s.level, reverse=setting.objective.larger)
 
@@ -538,7 +538,7 @@ def _in_order(setting: PathSetting, climbs: Sequence[Sequence[State]]) -> list[S
 def _proved(
     setting: PathSetting, states: Sequence[State], subject: Subject, tries: int = _TRIES
 ) -> tuple[Certificate, float] | None:
-    """Proof of one of the best states, each try twice as far down the order."""
+    """Proof of one of the best states, tried at ranks 1, 2, 4, …, and its value."""
     for k in range(tries):
         if (1 << k) - 1 >= len(states):
             break
@@ -549,12 +549,12 @@ def _proved(
 
 
 def given(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
-    """The same question about given gains, whatever their norm, with V of every degree; its ratio is left open.
+    """Objective for given gains of any norm, with V of every degree; without the ratio.
 
     Parameters
     ----------
     loop : Loop
-        With the gains.
+        Loop with the gains.
     """
     objective = replace(problem.setting.objective, bound=None)
     setting = replace(problem.setting, objective=objective, least=FAINT)
@@ -567,7 +567,7 @@ def given(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
         states = [s for s in states if all(objective.better(s.level, value) for _, value in proofs)]
         reached = _proved(at, states, problem.subject, _FEW if proofs else _TRIES)
         proofs += [reached] if reached else []
-        if proofs and not objective.bounded:  # then V does not matter
+        if proofs and not objective.bounded:  # then V has no effect on the value
             break
     certificate, value = (max if objective.larger else min)(proofs, key=lambda item: item[1], default=(None, None))
     norm = scaled_norm(loop, problem.setting.exponents)

@@ -1,7 +1,7 @@
 """Map of certified gains over a grid of two gains.
 
-One compiled problem screens the grid in worker processes; the edges and a sample of points are proved
-exactly.
+One compiled problem screens the grid in worker processes. The edges and a random sample of points are
+proved exactly.
 """
 
 import threading
@@ -29,7 +29,7 @@ from quakedesign.parallel import Crew, Here, crew_or_here
 from quakedesign.sos.solve.conic import handing_back
 
 # ----------------------------------------------------------------------
-# Who computes the points of a map: what is asked at each, and workers that keep their compiled sweeps.
+# Computation of the points of a map, by workers that cache their compiled sweeps.
 
 Place = tuple[int, int]
 _FAST = 1e-8
@@ -37,17 +37,17 @@ _FAST = 1e-8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """What a map is about."""
+    """Definition of a map: law, gains, axes, levels and degree."""
 
     subject: Subject
-    loop: Loop  # With the base gains
+    loop: Loop  # Loop with the base gains
     over: tuple[str, str]  # Gains that vary
     axes: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]  # Their values
-    levels: tuple[Fraction, ...]  # L̄, rising
-    degree: int  # Of V
+    levels: tuple[Fraction, ...]  # L̄, increasing
+    degree: int  # Degree of V
 
     def at(self, place: Place, level: int) -> Loop:
-        """Loop at a point, for the bound of a level (from 1)."""
+        """Loop at a point, for the bound of a level (counted from 1)."""
         gains = {**self.loop.gains, **{n: axis[i] for n, axis, i in zip(self.over, self.axes, place, strict=True)}}
         roots = {name: (of, root_enclosure(gains[of])) for name, (of, _) in self.loop.roots.items()}
         bound = self.levels[level - 1]
@@ -55,7 +55,7 @@ class Sheet:
 
     @property
     def rows(self) -> list[list[Place]]:
-        """All points in rows along a gain that keeps the structure of the loop, if one does."""
+        """All points in rows along a gain that does not change the structure of the loop, if there is one."""
         nested = {name for terms in self.loop.lifts.values() for term in terms for name in term.parameters}
         first, second = (range(len(axis)) for axis in self.axes)
         if self.over[0] in nested:
@@ -64,7 +64,7 @@ class Sheet:
 
 
 class Screener:
-    """Compiled sweeps of one sheet, one for every structure that its points have."""
+    """Compiled sweeps of one sheet, one per structure of its points."""
 
     def __init__(self, sheet: Sheet) -> None:
         self.sheet = sheet
@@ -74,7 +74,7 @@ class Screener:
         self._answered = 0
 
     def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
-        """Limit and number of levels found at every point, beginning each at the level of its neighbour; and solves."""
+        """Limit and number of feasible levels of every point, each begun at its neighbour's level; number of solves."""
         limits, start, before = [], len(self.sheet.levels), self._solves()
         self._followed.clear()
         for place in places:
@@ -104,7 +104,7 @@ class Screener:
         return _solved(sweep, loop) if answer is None else answer
 
     def _follow(self, sweep: Sweep, loop: Loop) -> bool | None:
-        """Answer from the neighbours in the row, in the units of the first of them; None where that gives none."""
+        """Feasibility from the neighbours in the row, in the units of the first neighbour; None if undecided."""
         path = self._followed.get(sweep) or self._path(sweep, sweep.frame(loop))
         answer = path.feasible(loop)
         if answer is None:
@@ -115,14 +115,14 @@ class Screener:
         return answer
 
     def _path(self, sweep: Sweep, frame: Frame) -> Path:
-        """Path without neighbours."""
+        """Path for a frame without cached neighbours."""
         key = sweep, frame.scale
         if key not in self._paths:
             self._paths[key] = Path(sweep, frame)
         return self._paths[key].begin(frame)
 
     def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
-        """Text of a certificate of a point at a level, or None; and solves."""
+        """Point, level, text of a certificate for both (None without one), and number of solves."""
         before, loop = self._solves(), self.sheet.at(place, level)
         sweep = self._sweep(loop)
         answer = None if sweep is None else sweep.solve(loop, anew=True)
@@ -153,25 +153,25 @@ def _solved(sweep: Sweep, loop: Loop) -> bool:
 
 
 class Screeners:
-    """Screeners of a sheet, wherever a crew computes."""
+    """Screeners of a sheet on the workers of a crew."""
 
     def __init__(self, sheet: Sheet, crew: Crew) -> None:
         self._sheet, self._crew = sheet, crew
 
     def answers(self, question: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
-        """Answers of one method of `Screener` to many arguments, in any order.
+        """Results of one method of `Screener` for many arguments, in any order.
 
         Raises
         ------
         SimulationError
-            When processes die again and again; one that was killed from outside is replaced.
+            When processes die repeatedly; a single killed process is replaced.
         """
         tasks = [(self._sheet, question, one) for one in arguments]
         return (answer for _, answer in self._crew.answers(_answer, tasks))
 
 
 class _Cached(threading.local):
-    """Screener of the last sheet that a thread was asked about: compiled sweeps have one place for their parameters."""
+    """Cached screener of the last sheet, one per thread, as compiled sweeps store their parameters in place."""
 
     screener: Screener | None = None
 
@@ -186,7 +186,7 @@ def _answer(sheet: Sheet, question: str, arguments: tuple[object, ...]) -> Any:
 
 
 # ----------------------------------------------------------------------
-# Where two gains are certified: a grid screened with one compiled problem, its edges and a sample proved exactly.
+# Certified region of two gains: a grid screened with one compiled problem; its edges and a sample proved exactly.
 
 SHARES = tuple(Fraction(s, 100) for s in (25, 50, 75, 90, 99))
 """Levels of L̄ as shares of the necessary limit of the base gains, unless levels are given."""
@@ -197,25 +197,25 @@ _NEIGHBOURS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 class GainMap:
     """Largest level of L̄ at every point of a grid of two gains, as screened and as proved."""
 
-    sheet: Sheet  # What was asked: law, gains, axes, levels
+    sheet: Sheet  # Law, gains, axes, levels
     limits: Mapping[Place, Fraction | None]  # Necessary limit of L̄
-    # Number of levels at which the search in floating point finds a Lyapunov function; proves nothing
+    # Number of levels at which the floating-point search finds a Lyapunov function, without proof
     screened: Mapping[Place, int]
-    # Number of levels that a certificate, checked in exact arithmetic, covers; only for points that were tried
+    # Number of levels covered by a certificate, checked in exact arithmetic; only for points with an attempted proof
     proved: Mapping[Place, int]
-    edges: frozenset[Place]  # Points with a neighbour of a lower level; all of them were tried
-    certificates: Mapping[Place, str]  # Text of the certificate for the highest level proved
+    edges: frozenset[Place]  # Points with a neighbour of a lower level, all with an attempted proof
+    certificates: Mapping[Place, str]  # Text of the certificate for the highest proved level
     solves: int
-    seconds: Mapping[str, float] = field(default_factory=dict)  # Of ``"screening"`` and ``"proving"``
+    seconds: Mapping[str, float] = field(default_factory=dict)  # Wall time of ``"screening"`` and ``"proving"``
 
     def role(self, place: Place) -> str:
-        """``"edge"``, ``"interior"`` (drawn at random) or nothing for a point that was only screened."""
+        """``"edge"``, ``"interior"`` (drawn at random), or an empty text for a point that was only screened."""
         if place in self.edges:
             return "edge"
         return "interior" if place in self.proved else ""
 
     def counts(self, level: int) -> dict[str, int]:
-        """Points screened and proved at a level (from 1), and among them those on its own edge."""
+        """Number of points screened and proved at a level (counted from 1), in total and on its edge."""
         inside = {p for p, reached in self.screened.items() if reached >= level}
         edge = {p for p in inside if _at_edge(p, inside, self.sheet)}
         proved = {p for p, reached in self.proved.items() if reached >= level}
@@ -242,46 +242,46 @@ def gain_map(
     """Certified region over two gains, at one or more levels of L̄.
 
     Every point is screened. All points at the edge of a level, and `interior` random points inside, are then proved
-    exactly; where no proof can be finished the point counts as screened only, and its neighbours are tried for it.
+    exactly. A point without a proof loses its level, and its neighbours become edge points.
 
     Parameters
     ----------
     subject : str, type of Law or LoopField
         See `certify`.
     gains : tuple of number or text
-        Values of the gains that do not vary, in the order of the law.
+        Base gains, in the order of the law; those that vary take the values of the axes instead.
     over : tuple of two str
         Names of the gains that vary.
     ranges : sequence of two pairs, optional
-        Ends of both axes; a quarter to four times the base gain unless given. Positive ranges are divided in equal
+        Ends of both axes; by default a quarter to four times the base gain. Positive ranges are divided in equal
         ratios.
     points : int
-        Along each axis.
+        Number of points along each axis.
     levels : sequence of number or text, optional
-        L̄; the shares `SHARES` of the necessary limit of the base gains unless given.
+        Values of L̄; by default the shares `SHARES` of the necessary limit of the base gains.
     gain_range : tuple of two
         b_m and b_M [-].
     degree : int, optional
-        Of V; the lowest that clearly finds the base gains at the lowest level unless given.
+        Degree of V; by default the lowest with a clear margin for the base gains at the lowest level.
     interior : int
-        Number of points inside to prove.
+        Number of interior points to prove.
     seed : int
-        Of their choice.
+        Seed of the choice of interior points.
     workers : int
-        Number of processes; 1 computes in this one. No digit depends on who computes.
+        Number of processes; 1 computes in the calling process. Results are bitwise independent of it.
     scheduler : str, optional
         Address of a dask.distributed scheduler that is used instead.
     executor : Executor, optional
         Any other executor of `concurrent.futures` that is used instead.
     tell : callable
-        Progress.
+        Called with a text and the share done, to report progress.
 
     Raises
     ------
     ParameterError, UnknownNameError, CertificateError
-        For unknown gains, empty ranges or levels, and as `certify`.
+        For unknown gains, empty ranges or levels, and as in `certify`.
     SimulationError
-        When the workers cannot be reached, or do not live.
+        When the workers are not reachable, or die.
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
@@ -328,7 +328,7 @@ def _sheet(
 
 
 def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[Fraction, ...]:
-    """Values from low to high: decimals of four or more digits, in equal ratios where both ends are positive.
+    """Values from low to high: decimals of four or more digits, in equal ratios if both ends are positive.
 
     Raises
     ------
@@ -363,7 +363,7 @@ def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tu
 
 
 def _lowest_degree(loop: Loop, bound: Fraction) -> int:
-    """First degree that finds the base gains with a clear margin, or the first of all."""
+    """Lowest degree with a clear margin for the base gains; the lowest candidate if there is none."""
     bounded, degrees = replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), candidate_degrees(loop)
     for degree in degrees:
         answer = Sweep(bounded, degree).solve(bounded)
@@ -375,7 +375,7 @@ def _lowest_degree(loop: Loop, bound: Fraction) -> int:
 def _screen(
     sheet: Sheet, screeners: Screeners, tell: Callable[[str, float], None]
 ) -> tuple[dict[Place, Fraction | None], dict[Place, int], int]:
-    """Limit and screened level of every point, and solves."""
+    """Limit and screened level of every point, and number of solves."""
     limits: dict[Place, Fraction | None] = {}
     screened: dict[Place, int] = {}
     rows, solves = sheet.rows, 0
@@ -396,9 +396,9 @@ def _prove(
     seed: int,
     tell: Callable[[str, float], None],
 ) -> tuple[dict[Place, int], dict[Place, str], frozenset[Place], int]:
-    """Proved level of the points at edges and of random ones, certificates, edges, and solves.
+    """Proved level of edge points and random points, certificates, edges, and number of solves.
 
-    Levels are taken from the highest down. A point that cannot be proved leaves its level, which moves the edge.
+    Levels are proved from the highest down. A point without a proof drops to the next level, which moves the edge.
     """
     proved: dict[Place, int] = {}
     texts: dict[Place, str] = {}
@@ -430,14 +430,14 @@ def _prove(
 
 
 def _drawn(reached: Mapping[Place, int], proved: Mapping[Place, int], count: int, seed: int) -> list[tuple[Place, int]]:
-    """Random points that were not tried yet, each with its own level."""
+    """Random points without an attempted proof, each with its level."""
     inside = sorted(p for p, k in reached.items() if k and p not in proved)
     chosen = np.random.default_rng(seed).permutation(len(inside))[:count]
     return [(inside[i], reached[inside[i]]) for i in sorted(chosen.tolist())]
 
 
 def _at_edge(place: Place, inside: set[Place], sheet: Sheet) -> bool:
-    """Whether a neighbour on the grid is not inside."""
+    """Whether a neighbour on the grid is outside."""
     sizes = tuple(len(axis) for axis in sheet.axes)
     around = ((place[0] + a, place[1] + b) for a, b in _NEIGHBOURS)
     return any(0 <= i < sizes[0] and 0 <= j < sizes[1] and (i, j) not in inside for i, j in around)

@@ -1,8 +1,8 @@
 """Sweeps of one law over many gains: one compiled conic programme with parameters.
 
 Chapters: the programme in cvxpy; V and −V̇ as functions of gains and ranges; a central path that follows
-the margin from point to point with two-sided bounds. A sweep screens in floating point; `prove` finishes
-a point exactly.
+the margin from point to point with two-sided bounds. A sweep screens in floating point; `prove` makes
+the result at a point exact.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,20 +31,20 @@ from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.symbolic.terms import Term
 
 # ----------------------------------------------------------------------
-# The programme of a sweep in cvxpy: stated and compiled once, its numbers replaced between points.
+# The programme of a sweep in cvxpy: stated and compiled once, with new numbers at every point.
 
 
 class Cones:
     """Minimise μ subject to Σ L(N) = 1, Σ L(P_j) = μ·mean(V_j) for every j, and L ≥ 0 on the cone of every row.
 
-    The multipliers of the equations are the margin and a_j.
+    The multipliers of the equations are the margin and the a_j.
 
     Parameters
     ----------
     monomials : sequence of Term
-        V_j.
+        Monomials V_j.
     scale : tuple of Fraction
-        Of the states; the conditions of the rows are in these units.
+        Units of the states, in which the conditions of the rows are expressed.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Cones:
         self.compiled = Compiled(cp.Problem(cp.Minimize(level), constraints))
 
     def table(self, parts: np.ndarray) -> np.ndarray:
-        """What every moment (row) is multiplied by in ΣL(N) and in every ΣL(P_j) (columns)."""
+        """Coefficients of every moment (row) in ΣL(N) and in every ΣL(P_j) (columns)."""
         count = len(self.means)
         values = np.bincount(self.columns * count + self.parts, parts, minlength=len(self.margin) * count)
         return np.column_stack([self.margin, values.reshape(-1, count)])
@@ -81,7 +81,7 @@ class Cones:
     def solve(
         self, parts: np.ndarray, accuracy: float, *, anew: bool = False
     ) -> tuple[float, np.ndarray, np.ndarray] | None:
-        """Margin, a_j and L for the values of all parts, in the order of the rows; None if the solver fails twice."""
+        """Margin, a_j and L for values of all parts in the order of the rows; None if the solver fails twice."""
         self._numbers.value = np.bincount(self.slots, parts)
         if not self.compiled.solve(accuracy, anew=anew) and not self.compiled.solve(accuracy):
             return None
@@ -89,7 +89,7 @@ class Cones:
 
 
 def means(monomials: Sequence[Term], weights: Mapping[str, int]) -> list[float]:
-    """Mean of every V_j over all cells and Σu_i = 1, that of u^m being one; zero where signs alternate."""
+    """Mean of every V_j over all cells and Σu_i = 1, relative to that of u^m; zero if signs alternate."""
     means = []
     for term in monomials:
         even = all(kind == "a" for _, _, kind in term.factors)
@@ -113,8 +113,8 @@ def _template(row: FormRow, loop: Loop, scale: Sequence[Fraction]) -> Statement:
 #
 #     maximise t  subject to  V − t·N_m  and  −V̇ − t·N_n  in the cone on every cell and vertex,  mean of V = 1,
 #
-# so that t goes on below zero beyond the largest disturbance, and its derivatives in gains and bounds follow from the
-# multipliers. All numbers are floating point: a sweep screens, it proves nothing.
+# so that t is negative beyond the largest disturbance, and its derivatives in gains and bounds follow from the
+# multipliers. All numbers are floating point: a sweep screens without proof.
 
 ACCURACY = 1e-10
 """Tolerance of the solver by default."""
@@ -124,25 +124,25 @@ CLEAR = 1e-6
 """Margins above this decide what is chosen once for many points, such as a degree, on every processor alike: kernels of
 linear algebra move margins near zero by up to 2e-9."""
 _TOO_FAR = "the gains are too far apart for a search in floating point."
-_MOST_SCALES = 64  # scales whose numbers are kept
+_MOST_SCALES = 64  # number of scales with cached coefficients
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """Units in which a point is solved, so that its numbers are about one."""
+    """Units in which the numbers of a point are about one."""
 
     scale: tuple[Fraction, ...]  # Powers of two, u_i = scale_i·ũ_i
-    pace: float  # What −V̇ is divided by
+    pace: float  # Divisor of −V̇
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Screened:
-    """Floating-point answer at one point; proves nothing."""
+    """Floating-point solution at one point, without proof."""
 
     margin: float  # Largest t
-    decision: list[float]  # a_j, in the units of the frame
+    decision: list[float]  # Coefficients a_j, in the units of the frame
     frame: Frame
-    # Derivative of the margin in every number that V̇ depends on, by the names of `rows_of`
+    # Derivative of the margin in every parameter of V̇, by the names of `rows_of`
     slopes: Mapping[str, float]
 
     @property
@@ -157,14 +157,14 @@ class Sweep:
     Parameters
     ----------
     loop : Loop
-        Any point of the sweep. Which ranges are points, and the parameters inside nested powers, are the same at all.
+        Any point of the sweep. All points have the same degenerate ranges and parameters inside nested powers.
     degree : int
-        Of V.
+        Degree of V.
 
     Raises
     ------
     CertificateError
-        When there are no candidates of this degree, or the law has parts that certificates do not know.
+        When there are no candidates of this degree, or certificates do not support a part of the law.
     """
 
     def __init__(self, loop: Loop, degree: int) -> None:
@@ -193,7 +193,7 @@ class Sweep:
         return ends_of(loop) == ends_of(self.loop) and _nested(loop) == _nested(self.loop)
 
     def frame(self, loop: Loop) -> Frame:
-        """Units that suit one point."""
+        """Units of one point."""
         scale = balance(loop)
         return Frame(scale=scale, pace=self._in_units(scale).pace(self._features(values_of(loop))))
 
@@ -205,18 +205,18 @@ class Sweep:
         Parameters
         ----------
         frame : Frame, optional
-            Units; those of the point unless given. Margins in different units share their sign only.
+            Units; by default those of the point. Margins in different units are comparable only in sign.
         accuracy : float
-            That the solver is asked for.
+            Tolerance of the solver.
         anew : bool
-            Whether no digit may depend on what was solved before.
+            Whether the result must be bitwise independent of earlier solutions.
 
         Raises
         ------
         ValueError
             When the point has another structure.
         CertificateError
-            When its numbers are too far apart for floating point.
+            When the magnitudes of its numbers differ too much for floating point.
         """
         if not self.covers(loop):
             raise ValueError("the point has another structure. Compile a sweep for it.")
@@ -245,7 +245,7 @@ class Sweep:
         return self._in_units(frame.scale).cones
 
     def parts_at(self, loop: Loop, frame: Frame) -> np.ndarray:
-        """Values of all parts at a point, as `Cones` takes them."""
+        """Values of all parts at a point, as required by `Cones`."""
         features = self._features(values_of(loop))
         numbers = self._in_units(frame.scale)
         return np.asarray(numbers.weights(frame.pace) * features[numbers.products])
@@ -263,11 +263,11 @@ class Sweep:
         return self._numbers[scale]
 
     def _features(self, values: Mapping[str, float]) -> np.ndarray:
-        """Value of every product of names."""
+        """Value of every product of parameters."""
         return np.array([_product(values, names) for names in self.products])
 
     def _slopes(self, values: Mapping[str, float], per_product: np.ndarray) -> dict[str, float]:
-        """Derivative of the margin in every name, from that in every product."""
+        """Derivative of the margin in every parameter, from that in every product."""
         slopes = {name: 0.0 for names in self.products for name in names}
         for names, slope in zip(self.products, per_product.tolist(), strict=True):
             for i, name in enumerate(names):
@@ -276,13 +276,13 @@ class Sweep:
 
 
 def prove(sweep: Sweep, loop: Loop, answer: Screened, subject: Subject | None = None) -> Certificate | None:
-    """Certificate of a screened point, checked in exact arithmetic; None when none could be finished."""
+    """Certificate of a screened point, checked in exact arithmetic; None without an exact proof."""
     family, proposal = sweep.family(answer.frame), Proposal(answer.decision, answer.margin)
     return finished(loop, family, proposal, answer.frame.scale, subject)
 
 
 class _Numbers:
-    """The coefficients of a sweep in the units of one scale; without conditions all scales share a programme."""
+    """Coefficients of a sweep in the units of one scale; without conditions, all scales share one programme."""
 
     def __init__(self, sweep: Sweep, scale: tuple[Fraction, ...], cones: Cones | None) -> None:
         self.cones = cones or Cones(sweep.rows, sweep.loop, sweep.monomials, scale)
@@ -307,13 +307,13 @@ class _Numbers:
         return float(np.abs(merged).max(initial=0.0)) or 1.0
 
     def weights(self, pace: float) -> np.ndarray:
-        """What the products are multiplied by in every part."""
+        """Coefficient of the product of parameters in every part."""
         return np.asarray(np.where(self.rate, self.coefficients / pace, self.coefficients))
 
     def solve(
         self, features: np.ndarray, pace: float, accuracy: float, *, anew: bool
     ) -> tuple[float, list[float], np.ndarray, float] | None:
-        """Margin, decision, derivative of the margin in every product, and seconds; None if the solver fails."""
+        """Margin, decision, derivative of the margin in every product, and solver time; None if the solver fails."""
         weights = self.weights(pace)
         solution = self.cones.solve(weights * features[self.products], accuracy, anew=anew)
         if solution is None:
@@ -325,7 +325,7 @@ class _Numbers:
 
 
 def _exponents(values: Sequence[Fraction]) -> np.ndarray:
-    """n of 2^n within a factor of two, exact where the values are powers of two: numbers of any size have one."""
+    """Binary exponents n with 2^n within a factor of two, for values of any magnitude; exact for powers of two."""
     return np.array([v.numerator.bit_length() - v.denominator.bit_length() for v in values])
 
 
@@ -337,7 +337,7 @@ def _product(values: Mapping[str, float], names: tuple[str, ...]) -> float:
 
 
 def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
-    """Gains and constants inside nested powers, which shape the cells; those of terms that vanish do not."""
+    """Gains and constants inside nested powers, on which the cells depend; zero for terms that vanish."""
     parameters = loop.parameters | {name: loop.parameters[of] for name, (of, _) in loop.roots.items()}
     terms = [term for terms in loop.lifts.values() for term in terms]
     values = [tuple(parameters[name] for name in term.parameters) for term in terms]
@@ -345,31 +345,30 @@ def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
 
 
 # ----------------------------------------------------------------------
-# Whether Lyapunov functions are found, followed from one point of a sweep to the next by bounds of their margin.
+# Feasibility at successive points of a sweep, from two-sided bounds on the margin.
 #
-# The programme of a sweep (`parametric_cones`) has a centre for every τ > 0, where μ/τ − Σ log det S is least over the
-# functionals L, with S = L(b bᵀ) of all blocks. Newton's step towards it bounds the margin from both sides:
+# The programme of a sweep (`Cones`) has a centre for every τ > 0, the minimum of μ/τ − Σ log det S over the functionals
+# L, with S = L(b bᵀ) of all blocks. Newton's step towards the centre bounds the margin from both sides:
 #
-# - where S + ΔS ≻ 0, the moved functional satisfies all equations, so that no margin is above its μ;
-# - where S − ΔS ≻ 0, the multipliers t and a_j of the equations and the Gram matrices Z = τ·S⁻¹(S − ΔS)S⁻¹ satisfy
-#   Σ a_j P_j − t·N = Σ bᵀZb, so that the margin t is reached.
+# - if S + ΔS ≻ 0, the moved functional satisfies all equations, so that no margin exceeds its μ;
+# - if S − ΔS ≻ 0, the multipliers t and a_j of the equations and the Gram matrices Z = τ·S⁻¹(S − ΔS)S⁻¹ satisfy
+#   Σ a_j P_j − t·N = Σ bᵀZb, so that the margin t is attained.
 #
-# Only the sign is asked for: the first bound that has one ends the search, some steps after the neighbour's centre.
-# All
-# numbers are floating point: a path screens, it proves nothing.
+# Only the sign is needed: the search ends with the first bound that determines it, a few steps from the centre of the
+# neighbouring point. All numbers are floating point: a path screens without proof.
 
-_FIRST = 1e-3  # τ, margins being far smaller
-_NEAR, _FAR = 0.9, 2.0  # sizes of a step that ends near a centre, and of one from a place that is of no use
-_REACH = 1.3  # size that a smaller τ may give a step, estimated from above
-_APART = 0.3  # ratio of τ of centres that are kept
+_FIRST = 1e-3  # first τ, far larger than margins
+_NEAR, _FAR = 0.9, 2.0  # size below which a step ends near a centre, and size above which its place is useless
+_REACH = 1.3  # largest size of a step after a reduction of τ, estimated from above
+_APART = 0.3  # largest ratio of τ between cached centres
 _MOST = 60
 _ROUNDS = 5
-_ROOM = 10.0  # a bound counts where it is that many times what its equations are missed by
+_ROOM = 10.0  # least ratio of a valid bound to the residual of its equations
 
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Functionals of all kinds of rows, about the centre of one τ."""
+    """Functionals of all kinds of rows, near the centre of one τ."""
 
     tau: float
     functionals: Sequence[np.ndarray]
@@ -380,30 +379,30 @@ class _Step:
     """Newton's step towards the centre of one τ."""
 
     tau: float
-    # moves, multipliers, bound: ΔL, those of the equations over τ, and μ
+    # moves, multipliers, bound: ΔL, the multipliers of the equations over τ, and μ
     moves: Sequence[np.ndarray]
     multipliers: np.ndarray
     bound: float
-    # least, most: Eigenvalues of ΔS beside S
+    # least, most: Extreme eigenvalues of ΔS relative to S
     least: float
     most: float
-    missed: float  # By how much the equations are missed at most, for rounding errors
+    missed: float  # Largest residual of the equations, by rounding errors
 
     @property
     def size(self) -> float:
-        """Below one where both bounds hold."""
+        """Size of the step relative to S; both bounds are valid below 1."""
         return max(-self.least, self.most)
 
     @property
     def feasible(self) -> bool | None:
-        """Whether the margin is above `SURE`; None where the bounds do not tell."""
+        """Whether the margin is above `SURE`; None if the bounds do not decide."""
         if self.most < 1 and -self.tau * self.multipliers[0] > max(SURE, _ROOM * self.missed):
             return True
         return False if self.least > -1 and self.bound < -_ROOM * self.missed else None
 
 
 class Path:
-    """Answers at points of one sweep after each other, quick where they are near each other.
+    """Feasibility at successive points of one sweep, fast for points near each other.
 
     Parameters
     ----------
@@ -423,13 +422,13 @@ class Path:
         self._places = [_Place(_FIRST, begun)]
 
     def begin(self, frame: Frame) -> "Path":
-        """Forget all neighbours, so that no answer depends on them; units of the same scale."""
+        """Path without cached neighbours, on which results could depend; the frame must have the same scale."""
         self.frame = frame
         del self._places[1:]
         return self
 
     def feasible(self, loop: Loop) -> bool | None:
-        """Whether there is a Lyapunov function with a margin above `SURE`; None where that was not decided."""
+        """Whether there is a Lyapunov function with a margin above `SURE`; None if undecided."""
         table = self.sweep.cones(self.frame).table(self.sweep.parts_at(loop, self.frame))
         tables = [kind.of(table) for kind in self._kinds]
         place, at_neighbour = self._places[-1], True
@@ -453,7 +452,7 @@ class Path:
         return None
 
     def _moved(self, place: _Place, step: _Step) -> _Place:
-        """Where a step leads, or nine tenths of the way to the border; kept in the place of smaller τ if centred."""
+        """Place after a step, or after 90 % of the way to the boundary; a centred place replaces those of smaller τ."""
         share = min(1.0, 0.9 / step.size)
         moved = _Place(step.tau, [f + share * d for f, d in zip(place.functionals, step.moves, strict=True)])
         if step.size < _NEAR:
@@ -470,12 +469,12 @@ class _Newton:
     Parameters
     ----------
     tables : sequence of array
-        C, of every kind of rows.
+        Coefficients C of every kind of rows.
 
     Raises
     ------
     LinAlgError
-        Where a functional is not inside its cone.
+        When a functional is not inside its cone.
     """
 
     def __init__(
@@ -495,14 +494,14 @@ class _Newton:
     def _solve(
         self, free: Sequence[np.ndarray], rest: np.ndarray, slope: float
     ) -> tuple[list[np.ndarray], np.ndarray, float]:
-        """ΔL, λ and Δμ, from H⁻¹a."""
+        """Solution ΔL, λ and Δμ, from H⁻¹a."""
         side = np.append(sum(map(_sum, self._tables, free)) - rest, slope)
         answer = np.linalg.solve(self._system, side)
         moves = [one - solved @ answer[:-1] for one, solved in zip(free, self._solved, strict=True)]
         return moves, answer[:-1], float(answer[-1])
 
     def _changes(self, moves: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """ΔS beside S."""
+        """ΔS relative to S, as triangles of F⁻¹ΔS F⁻ᵀ with F Fᵀ = S."""
         return [(move[:, None] @ one)[:, 0] for move, one in zip(moves, self._forms, strict=True)]
 
     def _ends(self, changes: Sequence[np.ndarray]) -> tuple[float, float]:
@@ -510,12 +509,12 @@ class _Newton:
         return min(ends), max(ends)
 
     def step(self) -> _Step:
-        """Step towards the centre of the τ of the place."""
+        """Newton's step towards the centre for the τ of the place."""
         rest = self._rest(self._place.functionals, 0.0)
         return self._refined(self._place.tau, *self._solve(self._free, rest, 1 / self._place.tau))
 
     def further(self, step: _Step) -> _Step:
-        """Step towards the centre of a smaller τ that is small enough, from one for the τ of the place."""
+        """Step of limited size towards the centre for a smaller τ, from the step for the τ of the place."""
         moves, multipliers, bound = self._solve([0.0 * one for one in step.moves], 0.0 * self._means, 1.0)
         more = (_REACH - step.size) / max(map(_longest, self._kinds, self._changes(moves)))
         return self._refined(
@@ -526,13 +525,13 @@ class _Newton:
         )
 
     def _rest(self, functionals: Sequence[np.ndarray], bound: float) -> np.ndarray:
-        """By how much the equations of the functionals are missed."""
+        """Residual of the equations of the functionals."""
         rest = bound * self._means - sum(map(_sum, self._tables, functionals))
         rest[0] += 1.0
         return rest
 
     def _refined(self, tau: float, moves: Sequence[np.ndarray], multipliers: np.ndarray, bound: float) -> _Step:
-        """Step whose equations hold as well as its bounds need."""
+        """Step refined until the residual of its equations is small against its bounds."""
         for _ in range(_ROUNDS):
             changes = self._changes(moves)
             falls = [
@@ -558,17 +557,17 @@ def _kind(shape: MomentProgram) -> tuple[int | tuple[int, ...], ...]:
 
 
 def _sum(tables: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Σ over rows and unknowns."""
+    """Sum over rows and unknowns."""
     return np.tensordot(tables, vectors, axes=((0, 1), (0, 1)))
 
 
 class _Rows:
-    """Rows whose programmes have one shape, in coordinates in which the relations hold.
+    """Rows whose programmes have equal shapes, in coordinates that satisfy the relations.
 
     Parameters
     ----------
     rows : sequence of (MomentProgram, int)
-        Shapes, and where their moments begin among those of all.
+        Shapes, and the index of their first moment among all moments.
     """
 
     def __init__(self, rows: Sequence[tuple[MomentProgram, int]]) -> None:
@@ -597,11 +596,11 @@ class _Rows:
         self.firsts = np.cumsum([0, *map(len, units[:-1])])
 
     def of(self, table: np.ndarray) -> np.ndarray:
-        """What all moments are multiplied by in the equations, in the coordinates of every row."""
+        """Coefficients of all moments in the equations, in the coordinates of every row."""
         return np.asarray(self._bases.transpose(0, 2, 1) @ table[self._places])
 
     def interior(self, margin: np.ndarray) -> np.ndarray:
-        """Functional of every row inside its cone, with L(N) = 1."""
+        """Functional in the interior of the cone of every row, with L(N) = 1."""
         centres = (one.alone().solve({}) for one in self._shapes)
         nothing = np.full(self._places.shape[1], np.nan)  # outside of every cone
         values = np.array([nothing if c is None else list(c.functional.values()) for c in centres])
@@ -635,18 +634,18 @@ class _Rows:
 
 
 def _longest(kind: _Rows, triangles: np.ndarray) -> float:
-    """Largest norm of a matrix, at least its largest eigenvalue."""
+    """Largest Frobenius norm of the matrices, an upper bound on their eigenvalues."""
     return float(np.sqrt(np.add.reduceat(triangles**2, kind.firsts, axis=1).max()))
 
 
 def _corners(size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rows and columns of an upper triangle, and what makes its length that of the matrix."""
+    """Rows and columns of an upper triangle, and factors that make its norm equal that of the matrix."""
     rows, columns = pairs(size)
     return rows, columns, np.where(rows == columns, 1.0, np.sqrt(2.0))
 
 
 def _matrices(triangle: np.ndarray, size: int) -> np.ndarray:
-    """Matrices (size × unknowns × size) with an upper triangle, column by column."""
+    """Symmetric matrices (size × unknowns × size) from their upper triangles, column by column."""
     rows, columns = pairs(size)
     full = np.zeros((size, triangle.shape[1], size))
     full[rows, :, columns] = full[columns, :, rows] = triangle

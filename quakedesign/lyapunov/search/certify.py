@@ -1,7 +1,7 @@
 """Verdict on given gains of a homogeneous law, and proved margins of these gains.
 
 The limits are the largest disturbance bound, the largest range of β, and the decay rate. Each is located
-by Newton's rule on the margin of the conic programme, kept inside a bracket.
+by Newton's method on the margin of the conic programme, safeguarded by a bracket.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -23,7 +23,7 @@ from quakedesign.symbolic.terms import Term
 from quakedesign.symbolic.terms import value as coefficient
 
 # ----------------------------------------------------------------------
-# The verdict on given gains of any homogeneous law, of the package or of a user's own.
+# Verdict on given gains of any homogeneous law, of the package or user-defined.
 
 Number = str | float | Fraction
 
@@ -33,15 +33,15 @@ def certify(
 ) -> tuple[Verdict, Certificate | None]:
     """Decide whether gains make the origin stable for |d| ≤ lipschitz and all β of a range.
 
-    Globally asymptotically, and in finite time where the field has a negative degree.
+    Stability is global and asymptotic, and in finite time if the field has a negative degree.
 
     Parameters
     ----------
     subject : str, type of Law or LoopField
-        Name of a law of the package, a class of the user's own, or a bare closed loop; uncertain in ``beta`` and ``d``
-        or one of them. A certificate for one from outside the package is checked again with ``check(subject)``.
+        Name of a law of the package, a user-defined class, or a bare closed loop; uncertain in ``beta`` or ``d`` or
+        both. A certificate for a law from outside the package is re-checked with ``check(subject)``.
     gains : tuple of number or text
-        Exact: decimals, exponents or p/q; order of the law.
+        Exact numbers (decimals, exponents or p/q) in the order of the law.
     lipschitz : number or text
         L̄ [unit of ν per s], not negative.
     gain_range : tuple of two
@@ -56,10 +56,10 @@ def certify(
     Raises
     ------
     ParameterError
-        For gains or ranges that are no numbers, a range that is empty or not positive, a law with other uncertainty, or
-        one that is not homogeneous in its weights.
+        For gains or ranges that are no numbers, a range that is empty or not positive, a law with other uncertain
+        parameters, or a law that is not homogeneous in its weights.
     CertificateError
-        For a law with parts that certificates do not know, such as a squared uncertain parameter.
+        When certificates do not support a part of the law, such as a squared uncertain parameter.
     UnknownNameError
         For the name of an unknown law.
     """
@@ -69,12 +69,12 @@ def certify(
 
 
 def proof(loop: Loop, subject: Subject) -> Certificate | None:
-    """Proof of a loop without a counterexample, or None."""
+    """Proof of a loop that has no known counterexample; None if none is found."""
     return find_certificate(loop, subject=subject) or _swept(loop, subject)
 
 
 def _swept(loop: Loop, subject: Subject) -> Certificate | None:
-    """What the search along a line would find here; its V has a fixed mean, which serves better at the edges."""
+    """Proof by the programme of a sweep, whose V has a fixed mean, which is more accurate near the limits."""
     for degree in candidate_degrees(loop):
         try:
             sweep = Sweep(loop, degree)
@@ -98,7 +98,7 @@ def closed_loop(
     ParameterError, UnknownNameError
         As `certify`.
     CertificateError
-        When the law has parts that certificates do not know.
+        When certificates do not support a part of the law.
     """
     name, model = model_of(subject)
     exact = exact_gains(subject, gains)
@@ -115,7 +115,7 @@ def closed_loop(
 
 
 def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fraction]]) -> None:
-    """Refuse numbers that a symbol's declaration excludes: SymPy has simplified the field by it."""
+    """Reject numbers outside the assumptions of their symbol, with which SymPy has simplified the field."""
     inside: dict[sp.Symbol, set[sp.Expr]] = {}
     for symbol in (*model.gains, *model.uncertain):
         low, high = ranges[str(symbol)]
@@ -134,7 +134,7 @@ def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fra
 
 
 def _require_homogeneous(loop: Loop) -> None:
-    """Refuse a field or an argument of a nested power with terms of different degrees in the weights of the loop."""
+    """Reject a field, or argument of a nested power, whose terms differ in degree in the weights of the loop."""
     weights: dict[str, Fraction] = {state: Fraction(weight) for state, weight in loop.states.items()}
     for lift, terms in loop.lifts.items():
         degrees = _degrees(loop, terms, weights)
@@ -147,7 +147,7 @@ def _require_homogeneous(loop: Loop) -> None:
 
 
 def _degrees(loop: Loop, terms: tuple[Term, ...], weights: Mapping[str, Fraction]) -> dict[Fraction, str]:
-    """Degrees of the terms that do not vanish, each with the factors of one such term."""
+    """Degrees of the nonzero terms, each with the factors of one term of this degree."""
     zero = {name for name, v in loop.parameters.items() if not v}
     zero |= {name for name, ends in loop.ranges.items() if not any(ends)}
     live = (t for t in terms if not zero & set(t.parameters))
@@ -174,7 +174,7 @@ def exact_gains(subject: Subject, gains: tuple[Number, ...]) -> dict[str, Fracti
     Raises
     ------
     ParameterError
-        When their number is wrong, or the law refuses them.
+        When their number is wrong, or the law rejects them.
     """
     if not isinstance(subject, LoopField):
         chosen = law(subject) if isinstance(subject, str) else subject
@@ -205,26 +205,26 @@ def _ranges(
 
 
 # ----------------------------------------------------------------------
-# The last number for which a search succeeds, from margins and their slopes, in as few solves as possible.
+# Largest number for which a search succeeds, from margins and their slopes, with few solves.
 
 TOLERANCE = Fraction(1, 10_000)
 """Relative width of a bracket: the search succeeds at x and not at x(1 + TOLERANCE)."""
-_BELOW, _ABOVE = TOLERANCE / 2, TOLERANCE / 5  # where the ends of the bracket are wanted
+_BELOW, _ABOVE = TOLERANCE / 2, TOLERANCE / 5  # intended distances of the bracket's ends from the root
 _MOST = 40
 _STRIDE = 8
-_BELIEVED = 6  # questions; after them tangents are no longer believed alone
+_BELIEVED = 6  # evaluations after which tangents are combined with bisection
 _NEAR = 3 * TOLERANCE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bracket:
-    """Where the search succeeds, and where it does not."""
+    """Numbers at which a search succeeds and fails."""
 
-    low: Fraction | None = None  # Largest number at which it succeeded
-    # Smallest number at which it did not; None where none was tried, as a limit makes it needless
+    low: Fraction | None = None  # Largest number at which the search succeeded
+    # Smallest number at which it failed; None if none was tried, as a limit makes a trial unnecessary
     high: Fraction | None = None
-    best: Screened | None = None  # Answer at `low`
-    answers: int = 0  # How many answers it was given
+    best: Screened | None = None  # Solution at `low`
+    answers: int = 0  # Number of evaluations
 
     def closed(self, limit: Fraction | None) -> bool:
         """Whether `low` is within the tolerance of `high` or of a limit."""
@@ -232,7 +232,7 @@ class Bracket:
         return self.low is not None and any(end <= self.low * (1 + TOLERANCE) for end in ends)
 
     def updated(self, x: Fraction, answer: Screened | None) -> "Bracket":
-        """The bracket after one more answer."""
+        """Bracket after one more evaluation."""
         if answer is not None and answer.feasible:
             return Bracket(low=x, high=self.high, best=answer, answers=self.answers + 1)
         return Bracket(low=self.low, high=x, best=self.best, answers=self.answers + 1)
@@ -247,27 +247,27 @@ def last_success(
     most: Fraction | None = None,
     only_above: bool = False,
 ) -> Bracket:
-    """Bracket around the last number at which a search succeeds, by Newton's rule kept inside what is known.
+    """Bracket of the largest number at which a search succeeds, by Newton's method inside the bracket.
 
     Parameters
     ----------
     ask : callable
-        Answer at a number, and the slope of its margin there.
+        Solution at a number, and the slope of its margin there.
     first : Fraction
-        Where to begin; the floor is a good place where nothing is known.
+        Initial number; the floor if no better guess is known.
     floor : Fraction
-        Smallest number that makes sense.
+        Smallest admissible number.
     limit : Fraction, optional
-        No search can succeed there or beyond, so none is made.
+        Number from which on no search can succeed, so none is tried.
     most : Fraction, optional
-        Success there is enough.
+        Number at which success ends the search.
     only_above : bool
-        Stop where the search does not succeed at `first`.
+        Stop if the search fails at `first`.
 
     Returns
     -------
     Bracket
-        Without `low` when the search does not even succeed at the floor.
+        Without `low` if the search fails even at the floor.
     """
     bracket, x = Bracket(), first
     for _ in range(_MOST):
@@ -277,19 +277,19 @@ def last_success(
         if bracket.closed(limit) or enough or bracket.high == floor or (only_above and bracket.low is None):
             break
         step = _next(bracket, x, _root(x, answer, slope), floor, limit)
-        x = max(floor, Fraction(f"{float(step):.7e}"))  # eight digits are enough
+        x = max(floor, Fraction(f"{float(step):.7e}"))  # eight digits suffice
     return bracket
 
 
 def _root(x: Fraction, answer: Screened | None, slope: float) -> Fraction | None:
-    """Where the tangent says that the search just succeeds; None where there is none."""
+    """Number at which the tangent of the margin reaches `SURE`; None without a falling tangent."""
     if answer is None or not slope < 0:
         return None
     return Fraction(float(x) - (answer.margin - SURE) / slope)
 
 
 def _next(bracket: Bracket, x: Fraction, root: Fraction | None, floor: Fraction, limit: Fraction | None) -> Fraction:
-    """Number to ask about: near the tangent's root, on the side that is still open; else halfway."""
+    """Next number to try: near the root of the tangent, on the side of the missing end; else the middle."""
     low, high = bracket.low, bracket.high
     astray = root is None or root <= floor or bracket.answers > _BELIEVED
     if low is None and bracket.answers > 1 and astray:
@@ -318,50 +318,50 @@ def _middle(
 
 
 def first_below(limit: Fraction) -> Fraction:
-    """Number so near to a limit that the search need not go on if it succeeds there."""
+    """Number so close to a limit that success there ends the search."""
     return limit * (1 - _BELOW - _ABOVE)
 
 
 # ----------------------------------------------------------------------
-# How far given gains reach: the largest disturbance, range of β or decay that is proved, and what limits it.
+# Proved limits of given gains: the largest disturbance, range of β or decay, and its upper bound.
 
 _STEPS_BACK = (Fraction(0), TOLERANCE / 4, TOLERANCE / 2, 10 * TOLERANCE, 100 * TOLERANCE)
 _FAR = Fraction(10) ** 12
-_WIDE = 10**6  # a range of β that is wide enough
-_HAIR = Fraction(1, 10**9)  # so that a range of β has two ends even where it is asked to be a point
+_WIDE = 10**6  # factor of β at which the search stops
+_HAIR = Fraction(1, 10**9)  # least relative width of a range of β, so that it always has two ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CertifiedLimit:
-    """How far gains reach in one number, with the proof."""
+    """Largest proved value of one quantity for given gains, with the proof."""
 
     quantity: str  # ``"lipschitz"``, ``"beta"`` (upper end b_M) or ``"beta-factor"`` (range [b/f, b·f])
-    value: Fraction | None  # Proved exactly; None where the search finds nothing at all
-    # Smallest number at which the search found nothing, at most value·(1 + 1e-4) unless a proof could not be finished;
-    # None where `limit` is as near, or where there seems to be no end
+    value: Fraction | None  # Proved exactly; None if the search finds no proof
+    # Smallest number at which the search failed, at most value·(1 + 1e-4) unless an exact proof failed; None if `limit`
+    # is as close, or no upper end was found
     beyond: Fraction | None
-    limit: Fraction | None  # No Lyapunov function of any kind exists there; None where no such value is known
-    degrees: tuple[int, ...]  # Degrees of V that were tried, all sums of squares on cells without multiplier
-    degree: int | None  # That of the certificate
-    # Proof for the value; where there is none, the exact counterexample, if one is known
+    limit: Fraction | None  # Value at which no Lyapunov function of any kind exists; None if unknown
+    degrees: tuple[int, ...]  # Degrees of V that were tried, all with sums of squares on cells without multiplier
+    degree: int | None  # Degree of V in the certificate
+    # Proof for the value; without a proof, the exact counterexample, if one is known
     certificate: Certificate | None
-    counterexample: str  # What speaks against the gains where nothing is found, see `against`; else ``"none"``
+    counterexample: str  # Kind of counterexample if nothing is proved, see `against`; else ``"none"``
     solves: int
     seconds: float
 
     @property
     def sharp(self) -> bool:
-        """Whether the value is the largest of its family to four digits, or within 1e-4 of the limit."""
+        """Whether the value is the largest for its family of V to four digits, or within 1e-4 of the limit."""
         ends = [end for end in (self.beyond, self.limit) if end is not None]
         return self.value is not None and any(end <= self.value * (1 + TOLERANCE) for end in ends)
 
     def smallest_scale(self, lipschitz: Number) -> Fraction | None:
-        """Smallest λ for which the scaled gains are proved for a needed bound L̄: needed/value; None without a proof.
+        """Smallest λ for which the scaled gains are proved for a required L̄, equal to L̄/value; None without a proof.
 
         Raises
         ------
         ParameterError
-            When the bound is not positive, or this is the reach in another quantity.
+            When the bound is not positive, or this is the limit of another quantity.
         """
         needed = rational(lipschitz, "lipschitz")
         if needed <= 0 or self.quantity != "lipschitz":
@@ -371,7 +371,7 @@ class CertifiedLimit:
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """Loops along one number x ≥ floor, and the derivative of every name of a sweep in x."""
+    """Loops as a function of one number x ≥ floor, and the derivatives of the sweep's parameters in x."""
 
     quantity: str
     at: Callable[[Fraction], Loop]
@@ -399,14 +399,14 @@ def largest_lipschitz(
     gain_range : tuple of two
         b_m and b_M [-].
     degrees : int or iterable of int, optional
-        Degrees of V to try; those that `certify` tries unless given.
+        Degrees of V to try; by default those of `certify`.
 
     Raises
     ------
     ParameterError, UnknownNameError
         As `certify`.
     CertificateError
-        When the law has parts that certificates do not know.
+        When certificates do not support a part of the law.
     """
     began = perf_counter()
     base = closed_loop(subject, gains, lipschitz=1, gain_range=gain_range)
@@ -438,14 +438,14 @@ def largest_gain_range(
         See `largest_lipschitz`.
     lipschitz : number or text
     nominal : number or text
-        b: the lower end of the range, or its middle.
+        Lower end b of the range, or its geometric middle if symmetric.
     symmetric : bool
-        Ask for the largest f with range [b/f, b·f] instead of the largest b_M with [b, b_M].
+        Compute the largest f with range [b/f, b·f] instead of the largest b_M with range [b, b_M].
 
     Returns
     -------
     CertifiedLimit
-        Its value is b_M, or f.
+        Limit whose value is b_M or f.
 
     Raises
     ------
@@ -475,7 +475,7 @@ def largest_gain_range(
 
 
 def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
-    """Bound on |d| from which on nothing can be proved of these gains, known from the law or a refuting equilibrium."""
+    """Bound on |d| from which on the gains have no proof, known from the law or a refuting equilibrium."""
     chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
     limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
     limits = [] if limit is None else [max(Fraction(0), limit)]
@@ -487,9 +487,9 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
 
 
 def against(loop: Loop, refuted: Certificate | None) -> str:
-    """What speaks against a loop without a proof, of which a counterexample is known or none.
+    """Kind of counterexample to a loop without a proof.
 
-    ``"exact"`` for an equilibrium away from the origin, ``"simulated"`` for a run that grows, else ``"none"``.
+    ``"exact"`` for a given equilibrium away from the origin, ``"simulated"`` for a growing run, else ``"none"``.
     """
     if refuted is not None:
         return "exact"
@@ -533,7 +533,7 @@ def _reach(line: _Line, subject: Subject, degrees: tuple[int, ...], began: float
 
 
 class _Search:
-    """The search along a line with one degree of V."""
+    """Search along a line with one degree of V."""
 
     def __init__(self, line: _Line, subject: Subject, degree: int) -> None:
         self.line, self.subject = line, subject
@@ -542,14 +542,14 @@ class _Search:
         self.frame = self.sweep.frame(reference)
 
     def ask(self, x: Fraction) -> tuple[Screened | None, float]:
-        """Answer at x, and the slope of its margin."""
+        """Solution at x, and the slope of its margin."""
         answer = self.sweep.solve(self.line.at(x), self.frame)
         if answer is None:
             return None, 0.0
         return answer, sum(answer.slopes.get(n, 0.0) * step for n, step in self.line.direction(float(x)).items())
 
     def above(self, value: Fraction | None) -> Bracket:
-        """Bracket, with `low` only where it exceeds what is proved."""
+        """Bracket of the largest number; has `low` only if it exceeds the proved value."""
         first = self.line.first if value is None else value * (1 + TOLERANCE * Fraction(9, 10))
         return last_success(
             self.ask,
@@ -561,7 +561,7 @@ class _Search:
         )
 
     def proved(self, bracket: Bracket) -> tuple[Fraction, Certificate] | None:
-        """Number at or below that of a bracket, and its certificate."""
+        """Number at or just below the lower end of a bracket, and its certificate; None without a proof."""
         assert bracket.low is not None
         answer = bracket.best
         for step in _STEPS_BACK:
@@ -581,7 +581,7 @@ def _chosen(degrees: int | Iterable[int] | None, loop: Loop) -> tuple[int, ...]:
 
 
 def _reachable(loop: Loop) -> Fraction:
-    """Half of what all other terms of the rates that d acts on amount to."""
+    """Half the sum of the magnitudes of all other terms in the rates that contain d."""
     rates = [terms for terms in loop.field.values() if any("d" in t.parameters for t in terms)]
     ends = {name: max(map(abs, range_)) for name, range_ in loop.ranges.items()}
     values = {**loop.parameters, **ends}

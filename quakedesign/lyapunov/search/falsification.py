@@ -1,4 +1,4 @@
-"""Simulations against a homogeneous loop without a proof: disturbances under which its state grows."""
+"""Falsification of a homogeneous loop without a proof, by simulated disturbances under which its state grows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -10,29 +10,29 @@ from quakedesign.lyapunov.exact.claim import Loop
 from quakedesign.symbolic.terms import Term
 
 _STARTS = 6
-_GROWTH = 1.0  # e-foldings worth a second look
-_AGAIN = 1.4  # so many times more in twice the time with half the steps, or it was chatter, or passes
-_UNCOUNTED = 0.25  # share of a run at its beginning
+_GROWTH = 1.0  # e-foldings from which a run is repeated with smaller steps
+_AGAIN = 1.4  # least ratio of growth in twice the time with half the step; less is chatter or a transient
+_UNCOUNTED = 0.25  # initial share of a run whose growth is not counted
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Escape:
-    """A run that grows without end, since the loop is homogeneous; floating point."""
+    """A growing run in floating point, whose growth never ends since the loop is homogeneous."""
 
     growth: float  # e-foldings of Σ|x_i|^{1/r_i} over the run
-    strategy: str  # What the uncertain parameters follow
+    strategy: str  # Signs that the uncertain parameters follow
 
 
 def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
-    """Run that grows for parameters that jump between their ends, at two step sizes alike; None if none is found.
+    """Run that grows at two step sizes, for parameters that switch between their ends; None if none is found.
 
-    Every uncertain parameter follows a sign: of a state or its rate where it must change with the state's sign, of a
-    product of two where it must not.
+    Every uncertain parameter follows a sign: of a state or a rate if its terms are even in the states, of a product of
+    two if they are odd.
 
     Parameters
     ----------
     steps : int
-        Of the first runs; every step moves the state by at most 1/200 of its size.
+        Number of steps of the first runs; a step moves the state by at most 1/200 of its size.
     """
     field = _FloatField(loop)
     plays = list(product(*(_choices(loop, name) for name in loop.uncertain)))
@@ -49,7 +49,7 @@ def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
 
 @dataclass(frozen=True, slots=True)
 class _Play:
-    """The sign that a parameter follows: that of a product of states and of rates at the middle of all ranges."""
+    """Sign that a parameter follows: that of a product of states and rates, at the middle of all ranges."""
 
     names: tuple[str, ...]
     sign: int
@@ -72,14 +72,14 @@ def _choices(loop: Loop, name: str) -> list[_Play]:
 
 
 class _FloatField:
-    """The field of a loop in floating point, for many columns of states and parameters at once."""
+    """Field of a loop in floating point, vectorised over columns of states and parameters."""
 
     def __init__(self, loop: Loop) -> None:
         self.loop, self.states = loop, list(loop.states)
         self.weights = np.array(list(loop.states.values()), dtype=float)[:, None]
 
     def rates(self, x: np.ndarray, parameters: Mapping[str, np.ndarray | float]) -> np.ndarray:
-        """x' for states of shape (n, columns)."""
+        """Rates x' for states of shape (n, columns)."""
         values = dict(zip(self.states, x, strict=True))
         for lift, terms in self.loop.lifts.items():
             values[lift] = self._sum(terms, values, parameters)
@@ -104,7 +104,7 @@ class _FloatField:
         return total
 
     def growths(self, plays: Sequence[tuple[_Play, ...]], steps: int, pace: float) -> np.ndarray:
-        """Largest growth in e-foldings of every play over all starts, the beginning of the run left out."""
+        """Largest growth of every play in e-foldings over all initial states, without the initial share of the run."""
         x = np.tile(np.random.default_rng(0).normal(size=(len(self.states), _STARTS)), len(plays))
         middle, ends = self._parameters()
         growth = np.zeros(x.shape[1])
@@ -124,13 +124,13 @@ class _FloatField:
         return np.asarray(growth.reshape(len(plays), _STARTS).max(axis=1))
 
     def _followed(self, plays: Sequence[_Play]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows of the two signs that every column multiplies, in states, rates and a one; and the sign before them."""
+        """Rows (of states, rates and a one) of the two signs multiplied in every column, and the sign of the play."""
         rows = {name: i for i, name in enumerate((*self.states, *(f"{s}'" for s in self.states), ""))}
         pairs = np.array([[rows[name] for name in (*play.names, "")[:2]] for play in plays])
         return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([play.sign for play in plays], _STARTS))
 
     def _parameters(self) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
-        """All numbers with ranges at their middle, and the ends of the ranges."""
+        """All parameters, those with ranges at their middle, and the ends of the ranges."""
         ends = {name: (float(low), float(high)) for name, (low, high) in self.loop.uncertain.items()}
         middle = {name: float(v) for name, v in self.loop.parameters.items()}
         middle |= {name: middle[of] ** 0.5 for name, (of, _) in self.loop.roots.items()}

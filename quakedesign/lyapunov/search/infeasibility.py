@@ -1,4 +1,4 @@
-"""Exact proofs that a family contains no Lyapunov function, by points and weights (exact duals)."""
+"""Exact proofs that a family contains no Lyapunov function, by weighted points (exact dual solutions)."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.symbolic.terms import Term
 
-_GRID = 4096  # denominator of the points, before they are scaled by powers of two
+_GRID = 4096  # denominator of the points before scaling by powers of two
 _ROUNDS, _FIRST, _MORE = 12, 40, 400
 _SURE = 1e-9
 
@@ -27,26 +27,26 @@ _SURE = 1e-9
 class Atom:
     """One point of one obligation."""
 
-    obligation: str  # Name, as in a certificate
+    obligation: str  # Name as in a certificate
     point: tuple[Fraction, ...]  # u ≥ 0 in the variables of the states, not all zero
     weight: Fraction  # Positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dual:
-    """Σ weight·P_o(point) = 0 for V and −V̇ of every V of a family, so that none has P_o > 0 at all these points.
+    """Proof by Σ weight·P_o(point) = 0 for every V of a family, so that no V has P_o > 0 at all these points.
 
-    The family are all sums of even C¹ signed monomials of one degree (`signed_monomials`). That excludes positivity
-    itself, not only sums of squares of some level.
+    P_o are V and −V̇ on cells. The family contains all sums of even C¹ signed monomials of one degree
+    (`signed_monomials`). The proof excludes positivity itself, not only sums of squares of some level.
     """
 
     loop: Loop
-    degree: int  # Of V
+    degree: int  # Degree of V
     atoms: tuple[Atom, ...]
 
     @property
     def holds(self) -> bool:
-        """Whether it proves what it says, decided anew in exact arithmetic."""
+        """Whether the proof is valid, re-checked in exact arithmetic."""
         if not _sharp(self.loop):
             return False
         monomials = signed_monomials(self.loop.states, self.degree, self.loop.domain)
@@ -62,17 +62,17 @@ class Dual:
 
 
 def dual(loop: Loop, degree: int) -> Dual | None:
-    """Exact proof that no V of a degree serves a loop, or None when none is found.
+    """Exact proof that no V of a degree proves a loop; None if none is found.
 
-    None says nothing. None also for nested powers of positive exponents, whose cells hold few rational points, and for
-    roots of gains that are irrational: no end of their enclosure is a value that the loop takes.
+    None implies nothing. It is also returned for nested powers with positive exponents, whose cells contain few
+    rational points, and for irrational roots of gains, as the ends of their enclosures are no values of the loop.
 
     Parameters
     ----------
     loop : Loop
-        On `cells`.
+        Closed loop with the domain `cells`.
     degree : int
-        Of V in the weights of the loop.
+        Degree of V in the weights of the loop.
     """
     monomials = signed_monomials(loop.states, degree, loop.domain)
     try:
@@ -85,12 +85,12 @@ def dual(loop: Loop, degree: int) -> Dual | None:
 
 
 def _sharp(loop: Loop) -> bool:
-    """Whether the loop takes every vertex of its ranges."""
+    """Whether every vertex of the ranges is attained by the loop."""
     return all(low == high for _, (low, high) in loop.roots.values())
 
 
 def _rows(loop: Loop, monomials: Sequence[Term]) -> Iterator[tuple[Obligation, ...]]:
-    """V_j, then −V̇_j of all monomials on every different cell and vertex."""
+    """Rows of all V_j, then of all −V̇_j, on every different cell and vertex."""
     columns = [Obligations(loop, (term,)) for term in monomials]
     functions = zip(*([Obligation(n, p) for n, p in c.function()] for c in columns), strict=True)
     rates = zip(*([one for _, one in c.decrease("decrease")] for c in columns), strict=True)
@@ -111,12 +111,12 @@ def _value(polynomial: Polynomial, point: Sequence[Fraction]) -> Fraction:
 
 
 def _admits(one: Obligation, point: Sequence[Fraction]) -> bool:
-    """Whether points inside the cell lie about this one, by continuity; where a condition is zero, they may not."""
+    """Whether interior points of the cell exist near this point; where a condition is zero, they may not."""
     return not one.equalities and all(_value(g, point) > 0 for g in one.inequalities)
 
 
 class _PointSearch:
-    """Points at which a linear programme over V fails, collected until it has no solution."""
+    """Cutting-plane search: points are added to a linear programme over V until it has no solution."""
 
     def __init__(
         self, loop: Loop, degree: int, monomials: Sequence[Term], rows: Sequence[tuple[Obligation, ...]]
@@ -148,7 +148,7 @@ class _PointSearch:
                 self.lines.append(line)
 
     def draw(self) -> tuple[Fraction, ...]:
-        """Point in the scaled variables, some of them on faces."""
+        """Random point in the scaled variables, in some draws on a face."""
         count = len(self.scale)
         parts = self.random.exponential(size=count) * 2.0 ** self.random.uniform(-5, 0, size=count)
         parts *= self.random.random(count) > 0.15
@@ -157,7 +157,7 @@ class _PointSearch:
         return self.rounded(parts)
 
     def near(self, point: Sequence[Fraction]) -> tuple[Fraction, ...]:
-        """Point next to another one, on the same faces."""
+        """Random point near another one, on the same faces."""
         parts = np.array([float(p / s) for p, s in zip(point, self.scale, strict=True)])
         return self.rounded(parts * 2.0 ** self.random.normal(scale=0.2, size=len(parts)))
 
@@ -166,13 +166,13 @@ class _PointSearch:
         return tuple(s * Fraction(n, _GRID) for s, n in zip(self.scale, whole, strict=True))
 
     def line(self, row: int, point: Sequence[Fraction]) -> list[float]:
-        """Values of all V_j or −V̇_j at a point, V_j divided by their sizes, the largest about one."""
+        """Values of all V_j or −V̇_j at a point, over the sizes of V_j, scaled to a largest value of one."""
         values = [v / s for v, s in zip(_values(self.rows[row], point), self.sizes, strict=True)]
         largest = max(map(abs, values)) or Fraction(1)
         return [float(v / largest) for v in values]
 
     def best(self) -> tuple[float, np.ndarray]:
-        """Largest margin t with line·a ≥ t on all lines and |a_j| ≤ 1, and a."""
+        """Largest margin t with line·a ≥ t on all lines and |a_j| ≤ 1, and its a."""
         A = np.hstack([-np.array(self.lines), np.ones((len(self.lines), 1))])
         count = A.shape[1] - 1
         cost = [*[0.0] * count, -1.0]
@@ -180,7 +180,7 @@ class _PointSearch:
         return (float(solution.x[-1]), solution.x[:-1]) if solution.status == 0 else (1.0, np.zeros(count))
 
     def refine(self, decision: np.ndarray) -> bool:
-        """Add the worst of many new points; False where none is worse than those at hand."""
+        """Add the most violated of many new points; False if none is violated."""
         count = len(self.lines)
         tight = np.argsort(np.array(self.lines) @ decision)[: 2 * len(decision)]
         for i in range(_MORE):
@@ -196,7 +196,7 @@ class _PointSearch:
         return bool(violated)
 
     def exact(self) -> Dual | None:
-        """Weights of a basic solution, solved for exactly."""
+        """Dual with exact weights of a basic solution; None if it is not valid."""
         A = np.vstack([np.array(self.lines).T, np.ones(len(self.lines))])
         b = np.array([*[0.0] * (len(A) - 1), 1.0])
         solution = linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=b, bounds=(0, None), method="highs-ds")
@@ -215,7 +215,7 @@ class _PointSearch:
 
 
 def _null_vector(rows: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:
-    """Positive w with Σ w_i row_i = 0, where it is unique up to its size."""
+    """Positive w with Σ w_i row_i = 0, if it is unique up to a factor; else None."""
     entries = [[fmpq(v.numerator, v.denominator) for v in column] for column in zip(*rows, strict=True)]
     reduced, rank = fmpq_mat(entries).rref()
     if rank != len(rows) - 1:

@@ -1,8 +1,8 @@
-"""Search for a Lyapunov function of given gains, finished by an exact certificate.
+"""Search for a Lyapunov function of given gains, completed by an exact certificate.
 
 One pipeline for every law: candidates, scaling by powers of two, conic programme, claims with a margin,
 and rounding to exact witnesses. Further chapters: quadratic functions in floating point, and cached
-results of the presets; a cached certificate counts only after its exact check.
+results of the presets; a cached certificate is used only after its exact check.
 """
 
 import math
@@ -57,7 +57,7 @@ DECAY_LEVEL = 2
 def finish(
     loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fraction], subject: Subject | None = None
 ) -> Certificate | None:
-    """Find exact witnesses for every obligation of a given V; None when one is missing."""
+    """Certificate with exact witnesses for every obligation of a given V; None if one is not found."""
     witnesses: dict[str, Witness] = {}
     try:
         for one in different(claimed(loop, lyapunov, claims)):
@@ -73,7 +73,7 @@ def finish(
 
 
 def witness_of(one: Obligation, domain: str) -> Witness | None:
-    """Exact witness of one obligation, with the lowest power of the sum of all variables that works as multiplier."""
+    """Exact witness of one obligation; the multiplier is the lowest sufficient power of the sum of all variables."""
     size = width(one)
     if not one.polynomial:
         empty: tuple[dict[Any, Any], ...] = tuple({} for _ in one.equalities)
@@ -93,20 +93,20 @@ def witness_of(one: Obligation, domain: str) -> Witness | None:
 
 
 def power_of_sum(size: int, power: int) -> dict[tuple[int, ...], Fraction]:
-    """(Σ u_i)^power."""
+    """Polynomial (Σ u_i)^power."""
     total = {tuple(int(i == j) for j in range(size)): Fraction(1) for i in range(size)}
     return product(size, [total] * power)
 
 
 # ----------------------------------------------------------------------
-# Powers of two that make a loop's numbers about one before a solver sees them.
+# Scaling by powers of two, which makes the numbers of a loop about one for a solver.
 
 
 def balance(loop: Loop) -> tuple[Fraction, ...]:
     """Powers of two 2^n_i that make the terms of every state's rate about equally large, for u_i = 2^n_i·ũ_i.
 
-    Least squares on the logarithms; the first state keeps its scale. A nested power counts as that of each of its
-    terms.
+    They solve a least-squares problem in logarithms; the first state keeps its scale. A nested power is replaced by the
+    powers of the terms of its argument.
     """
     states = tuple(loop.states)
     rows, sides = [], []
@@ -124,7 +124,7 @@ def balance(loop: Loop) -> tuple[Fraction, ...]:
 
 
 def _without_lifts(term: Term, loop: Loop) -> Iterator[Term]:
-    """The term with its nested power replaced by the power of each of its arguments' terms, sizes left out."""
+    """Terms whose nested power is replaced by the power of each term of its argument, without its coefficients."""
     lift = next((f for f in term.factors if f[0] in loop.lifts), None)
     if lift is None:
         yield term
@@ -155,7 +155,7 @@ def _size(term: Term, loop: Loop) -> Fraction:
 
 
 def lifted_scale(equalities: Sequence[Polynomial], scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Scale of all variables, given that of the first ones: each equality t·w^n = P fixes that of its w in turn."""
+    """Scales of all variables from those of the first: each equality t·w^n = P determines the scale of its w."""
     scales = list(scale)
     for equality in equalities:
         position = len(scales)
@@ -168,7 +168,7 @@ def lifted_scale(equalities: Sequence[Polynomial], scale: Sequence[Fraction]) ->
 
 
 def below(number: float) -> Fraction:
-    """Positive number rounded down to about three digits, as a short rational; zero stays zero."""
+    """Short rational: a positive number rounded down to about three digits; zero for any other number."""
     if not number > 0 or not math.isfinite(number):
         return Fraction(0)
     shift = Fraction(2) ** (9 - math.floor(math.log2(number)))
@@ -176,12 +176,12 @@ def below(number: float) -> Fraction:
 
 
 def scaled(polynomial: Polynomial, scale: Sequence[Fraction], factor: Fraction = Fraction(1)) -> Polynomial:
-    """factor · P(scale ∘ ũ)."""
+    """Polynomial factor · P(scale ∘ ũ)."""
     return {e: c * factor * monomial(scale, e) for e, c in polynomial.items()}
 
 
 def normal(polynomial: Polynomial, scale: Sequence[Fraction]) -> Polynomial:
-    """P(scale ∘ ũ) over its largest coefficient."""
+    """Polynomial P(scale ∘ ũ) divided by its largest coefficient."""
     moved = scaled(polynomial, scale)
     size = max(abs(c) for c in moved.values())
     return {e: c / size for e, c in moved.items()}
@@ -194,11 +194,11 @@ def exponents_of(term: Term, weights: Mapping[str, int]) -> tuple[int, ...]:
 
 
 # ----------------------------------------------------------------------
-# Quadratic Lyapunov functions as matrices, in floating point: proposals, no proofs.
+# Quadratic Lyapunov functions as matrices in floating point: proposals without proof.
 
 
 def quadratic_terms(states: Sequence[str], coefficient: Callable[[int, int], Fraction]) -> tuple[Term, ...]:
-    """Σ c_ij·x_i·x_j over i ≤ j as terms, without zeros."""
+    """Nonzero terms of Σ c_ij·x_i·x_j over i ≤ j."""
     squares = ((left, Fraction(2), "a") for left in states)
     return tuple(
         Term(value, (), (square,) if i == j else ((left, Fraction(1), "s"), (right, Fraction(1), "s")))
@@ -209,7 +209,7 @@ def quadratic_terms(states: Sequence[str], coefficient: Callable[[int, int], Fra
 
 
 def quadratic_matrix(loop: Loop, lyapunov: tuple[Term, ...]) -> np.ndarray:
-    """Matrix of a quadratic V, as floats (n × n)."""
+    """Matrix of a quadratic V in floating point (n × n)."""
     return _matrix(next(iter(Obligations(loop, lyapunov).function()))[1], len(loop.states))
 
 
@@ -249,14 +249,14 @@ def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
 
 
 # ----------------------------------------------------------------------
-# How much is claimed of a Lyapunov function: margins, decay rate and bounds, with room to spare for exact proofs.
+# Claims of a Lyapunov function: margins, decay rate and bounds, reduced so that exact proofs succeed.
 
 GIVE_AWAY = Fraction(1, 2)
 _DECAY_SHARE = 0.99
 
 
 def claims_of(loop: Loop, lyapunov: tuple[Term, ...], margins: tuple[Fraction, Fraction]) -> dict[str, Fraction]:
-    """Claims with room to spare: half of the margins, and on the reals 99 % of the decay rate of V."""
+    """Reduced claims: half of the margins, and on the reals 99 % of the decay rate of V."""
     if loop.domain == "cells":
         return {"positive": margins[0] * GIVE_AWAY, "decrease": margins[1] * GIVE_AWAY}
     return {"positive": margins[0] * GIVE_AWAY, "rate": below(0.99 * quadratic_rate(loop, lyapunov))}
@@ -280,7 +280,7 @@ def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction])
 def with_largest_decay(
     certificate: Certificate, scale: Sequence[Fraction], subject: Subject | None = None
 ) -> Certificate | None:
-    """The same certificate with V̇ ≤ −κV^{n/m} claimed, κ 1 % below the largest that the solver finds; None if none."""
+    """Certificate that also claims V̇ ≤ −κV^{n/m}, with κ 1 % below the largest of the solver; None without one."""
     loop, lyapunov = certificate.loop, certificate.lyapunov
     obligations = Obligations(loop, lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")
@@ -297,7 +297,7 @@ def with_largest_decay(
 
 
 def _largest(one: Obligation, direction: Polynomial, domain: str, scale: Sequence[Fraction], level: int) -> float:
-    """Largest g for which the solver finds P − g·direction in the cone, 0 if it finds none; proves nothing."""
+    """Largest g for which the solver finds P − g·direction in the cone, without proof; 0 if it finds none."""
     whole = lifted_scale(one.equalities, scale)
     size = max(abs(c) for c in scaled(one.polynomial, whole).values())
     moved = Obligation(
@@ -317,11 +317,11 @@ def _largest(one: Obligation, direction: Polynomial, domain: str, scale: Sequenc
 
 
 # ----------------------------------------------------------------------
-# Searches that every comparison of the presets asks for again, with what they have found: it is decided anew.
+# Stored results of the searches that every comparison of the presets repeats; they are re-checked when used.
 #
-# The folder `found` has a certificate for each such question, or ``null`` where nothing was found, by a digest of the
-# question; what else was searched for on this machine is in `quakedesign.cache`. A certificate counts after its exact
-# check only, so that a wrong file costs time and proves nothing.
+# The folder `found` has one file per search, named by a digest of the problem: a certificate, or ``null`` if none was
+# found. The results of all other searches on this machine are in `quakedesign.cache`. A certificate is used only after
+# its exact check, so a wrong file costs time but proves nothing.
 
 FOLDER = Path(__file__).parent / "stored"
 _NOTHING = "null\n"
@@ -330,7 +330,7 @@ Search = Callable[[Loop, int, Subject | None], Certificate | None]
 
 
 def cached(search: Search) -> Search:
-    """Take what a search has found before from the folder; search where it has nothing that holds."""
+    """Search that reads stored results from the folder or the cache, and runs if no valid one exists."""
 
     @wraps(search)
     def stored(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
@@ -358,27 +358,27 @@ def cached(search: Search) -> Search:
 
 
 def place(loop: Loop, degree: int) -> Path:
-    """File of a question: a loop with all its numbers, and the degree of V."""
+    """File of the search for a loop with all its numbers and a degree of V."""
     key = repr([degree, *((field.name, getattr(loop, field.name)) for field in fields(loop))])
     return FOLDER / f"{loop.law}_{sha256(key.encode()).hexdigest()[:16]}.json"
 
 
 def keep(loop: Loop, degree: int, certificate: Certificate | None) -> None:
-    """Write what a search has found."""
+    """Store the result of a search in its file."""
     write_whole(place(loop, degree), _NOTHING if certificate is None else certificate_text(certificate))
 
 
 # ----------------------------------------------------------------------
-# Search for a Lyapunov function of given gains, finished in exact arithmetic. One pipeline for every law.
+# Search for a Lyapunov function of given gains, completed in exact arithmetic. One pipeline for every law.
 
 _WORTH_A_PROOF = 1e-9
 """Margins above this are worth a proof in exact arithmetic, which decides."""
 _DIGITS = (1 << 14, 1 << 20, 1 << 30)
-_HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # beyond, rounding errors or seconds of search outweigh what is gained
+_HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # higher degrees gain less than rounding or time cost
 
 
 def candidate_degrees(loop: Loop) -> tuple[int, ...]:
-    """Degrees of V to try in turn: the lowest that couples the heaviest states, then even ones up to 8, in 2-D 10."""
+    """Degrees of V to try: the lowest that couples the heaviest states, then even ones up to 8 (10 in 2-D)."""
     lowest = lowest_degree(loop.states.values(), loop.domain)
     if loop.domain == "reals":
         return (lowest,)
@@ -389,19 +389,19 @@ def candidate_degrees(loop: Loop) -> tuple[int, ...]:
 def find_certificate(
     loop: Loop, degrees: int | Iterable[int] | None = None, *, subject: Subject | None = None
 ) -> Certificate | None:
-    """Lyapunov function with an exact proof, or None when the search finds none.
+    """Certificate of a Lyapunov function with an exact proof; None if the search finds none.
 
     Parameters
     ----------
     degrees : int or iterable of int, optional
-        Of V in the weights of the loop, tried in turn; `candidate_degrees` unless given.
+        Degrees of V in the weights of the loop, tried in order; by default `candidate_degrees`.
     subject : str, type of Law or LoopField, optional
-        What the loop is one of; needed for a law from outside the package.
+        Law of the loop; required for a law from outside the package.
 
     Returns
     -------
     Certificate or None
-        Already checked in exact arithmetic. None says nothing about the loop.
+        Certificate that was checked in exact arithmetic. None implies nothing about the loop.
     """
     if degrees is None:
         degrees = candidate_degrees(loop)
@@ -424,9 +424,9 @@ def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate 
 def finished(
     loop: Loop, family: "Family", proposal: Proposal, scale: Sequence[Fraction], subject: Subject | None = None
 ) -> Certificate | None:
-    """Certificate from a proposal of a family in scaled variables, with the shortest rounding that has a proof.
+    """Certificate from a proposal of a family in scaled variables, with the coarsest rounding that has a proof.
 
-    Roundings that are coarser than the margin are not tried.
+    Roundings coarser than the margin are not tried.
     """
     degree = sum(exponents_of(family.monomials[0], loop.states))
     for digits in [d for d in _DIGITS if d * proposal.margin > 1] or _DIGITS[-1:]:
@@ -444,12 +444,12 @@ def finished(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """Lyapunov functions Σ a_j V_j with the monomials of one degree, as demands on a_j."""
+    """Lyapunov functions Σ a_j V_j with the monomials of one degree, as demands on the a_j."""
 
     monomials: tuple[Term, ...]  # V_j·size_j
-    sizes: tuple[Fraction, ...]  # What a monomial is divided by, so that all are about one in the scaled variables
+    sizes: tuple[Fraction, ...]  # Divisors that make the monomials about one in the scaled variables
     demands: tuple[Demand, ...]  # V and −V̇ on every different cell and vertex, scaled
-    pace: Fraction  # What −V̇ was divided by
+    pace: Fraction  # Divisor of −V̇
     fallen: int  # Degree of V̇
 
     def function(self, decision: Sequence[float], digits: int) -> tuple[Term, ...]:
@@ -460,7 +460,7 @@ class Family:
 def sum_of(
     monomials: Sequence[Term], sizes: Sequence[Fraction], decision: Sequence[float], digits: int
 ) -> tuple[Term, ...]:
-    """Σ a_j·monomial_j/size_j with every a_j rounded to a multiple of 1/digits."""
+    """Terms of Σ a_j·monomial_j/size_j with every a_j rounded to a multiple of 1/digits."""
     chosen = [nearest(a, digits) for a in decision]
     return tuple(
         Term(a / size, t.parameters, t.factors) for a, size, t in zip(chosen, sizes, monomials, strict=True) if a
@@ -468,7 +468,7 @@ def sum_of(
 
 
 def family_of(loop: Loop, degree: int, scale: Sequence[Fraction]) -> Family | None:
-    """Demands of all Lyapunov functions of one degree; None where there are no candidates."""
+    """Family of all Lyapunov functions of one degree; None without candidates."""
     monomials = signed_monomials(loop.states, degree, loop.domain)
     sizes = tuple(monomial(scale, exponents_of(term, loop.states)) for term in monomials)
     columns = [Obligations(loop, (term,)) for term in monomials]
@@ -490,13 +490,13 @@ def family_of(loop: Loop, degree: int, scale: Sequence[Fraction]) -> Family | No
 
 
 def _rows(columns: list[list[Obligation]]) -> list[list[Obligation]]:
-    """Obligations (rows) without repetitions, each for every candidate."""
+    """Different obligations (rows), each with one entry per candidate."""
     rows = {tuple(one.key for one in row): list(row) for row in zip(*columns, strict=True)}
     return list(rows.values())
 
 
 def _moved(one: Obligation, scale: Sequence[Fraction], factor: Fraction) -> Obligation:
-    """Obligation in scaled variables, its polynomial times a factor; no scale leaves the variables."""
+    """Obligation in scaled variables with its polynomial times a factor; an empty scale keeps the variables."""
     if not scale:
         return Obligation(
             one.name, {e: c * factor for e, c in one.polynomial.items()}, one.equalities, one.inequalities
@@ -519,7 +519,7 @@ def _demand(row: Sequence[Obligation], loop: Loop, power: int) -> Demand:
 
 
 def refute(loop: Loop, subject: Subject) -> Certificate | None:
-    """Counterexample suggested by the law, checked in exact arithmetic, or None; a bare loop suggests none."""
+    """Counterexample proposed by the law and checked in exact arithmetic; None without one, as for a bare loop."""
     if isinstance(subject, LoopField):
         return None
     chosen = law(subject) if isinstance(subject, str) else subject

@@ -18,7 +18,7 @@ from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.symbolic.terms import Term, cell_polynomial
 
 # ----------------------------------------------------------------------
-# V_j and −V̇_j on every different cell and vertex, with gains and ranges left as names.
+# V_j and −V̇_j on every different cell and vertex, with symbolic gains and ranges.
 
 Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
 """j, exponents, names multiplied, coefficient."""
@@ -26,19 +26,19 @@ Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FormRow:
-    """V, or −V̇ beside V, on one cell (and vertex): a form Σ_j a_j P_j that must be non-negative there."""
+    """V, or −V̇ with its V, on one cell (and vertex): a form Σ_j a_j P_j that must be non-negative there."""
 
     cell: str  # Signs of the states
-    # function, fall: Terms of all V_j, and of all −V̇_j; the latter is empty for the row of V itself
+    # function, fall: Terms of all V_j and of all −V̇_j; `fall` is empty in a row of V
     function: tuple[Part, ...]
     fall: tuple[Part, ...] = ()
-    # equalities, inequalities: Conditions on the variables, besides u ≥ 0
+    # equalities, inequalities: Conditions on the variables in addition to u ≥ 0
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
 
     @property
     def rate(self) -> bool:
-        """Whether P_j is −V̇_j; else V_j."""
+        """Whether P_j is −V̇_j instead of V_j."""
         return bool(self.fall)
 
     @property
@@ -48,13 +48,13 @@ class FormRow:
 
     @property
     def margin(self) -> Polynomial:
-        """N = Σ u_i^n over the states, n the degree of the form."""
+        """Margin N = Σ u_i^n over the states, where n is the degree of the form."""
         states, width = (len(parts[0][1]) for parts in (self.function, self.parts))
         return power_sum(states, max(sum(e) for _, e, _, _ in self.parts), width)
 
 
 def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
-    """Ends of every range: ±name where it is [−x, x], name where it is a point, else name- and name+."""
+    """Symbolic ends of every range: ±name for [−x, x], name for a point, otherwise name- and name+."""
     ends: dict[str, tuple[tuple[str, int], ...]] = {}
     for name, (low, high) in loop.uncertain.items():
         if low == -high:
@@ -65,7 +65,7 @@ def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
 
 
 def values_of(loop: Loop) -> dict[str, float]:
-    """Numbers that the names stand for, roots included (their enclosures are narrow)."""
+    """Values of all names, including roots (whose enclosures are narrow)."""
     values = {name: float(v) for name, v in loop.parameters.items()}
     for name, (of, _) in loop.roots.items():
         values[name] = values[of] ** 0.5
@@ -75,12 +75,12 @@ def values_of(loop: Loop) -> dict[str, float]:
 
 
 def rows_of(loop: Loop, monomials: Sequence[Term], *, beside: bool = False) -> tuple[FormRow, ...]:
-    """Every different form of V, then of −V̇; two that differ in the V beside them alone are one by default.
+    """Every different form of V, then of −V̇; with `beside`, equal forms of −V̇ with different V are kept apart.
 
     Raises
     ------
     CertificateError
-        When the law has nested powers that certificates do not know.
+        When certificates do not support the nested powers of the law.
     """
     columns = [Obligations(loop, (term,)) for term in monomials]
     rows: dict[tuple[object, ...], FormRow] = {}
@@ -124,18 +124,18 @@ def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
 
 
 def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) -> tuple[tuple[int, ...], Fraction]:
-    """Exponents and coefficient of one term on a cell, its parameters left out."""
+    """Exponents and coefficient of one term on a cell, without its parameters."""
     polynomial = cell_polynomial((Term(term.coefficient, (), term.factors),), weights, signs, {})
     return next(iter(polynomial.items()))
 
 
 # ----------------------------------------------------------------------
-# V and −V̇ on every different cell and vertex in floats, kept for all loops of one structure.
+# V and −V̇ on every different cell and vertex in floating point, cached for all loops of one structure.
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """All of a loop that the rows depend on, to tell whether they can be used again."""
+    """All properties of a loop on which its rows depend, as key of the cache."""
 
     loop: tuple[object, ...]
     inside: tuple[tuple[str, Fraction], ...]
@@ -144,7 +144,7 @@ class Structure:
 
     @classmethod
     def of(cls, loop: Loop, degree: int) -> "Structure":
-        """Structure of a loop and a degree of V; numbers count only inside nested powers."""
+        """Structure of a loop and a degree of V; numbers are included only inside nested powers."""
         names = {p for terms in loop.lifts.values() for term in terms for p in term.parameters}
         values = {**loop.parameters, **{name: low for name, (low, _) in loop.ranges.items()}}
         fixed = (loop.law, tuple(loop.states.items()), tuple(loop.field.items()), tuple(loop.lifts.items()))
@@ -153,7 +153,7 @@ class Structure:
 
 
 class Kin:
-    """A loop, the same as any other one of its structure."""
+    """A loop that equals every other loop of its structure."""
 
     def __init__(self, loop: Loop, degree: int) -> None:
         self.loop, self.structure = loop, Structure.of(loop, degree)
@@ -167,7 +167,7 @@ class Kin:
 
 @lru_cache(maxsize=32)
 def float_rows(kin: Kin) -> tuple[FormRow, ...]:
-    """Every different row of the monomials of V, each −V̇ with the V beside it."""
+    """Every different row of the monomials of V in floating point, each −V̇ with its V."""
     monomials = signed_monomials(kin.loop.states, kin.structure.degree, kin.loop.domain)
     rows = rows_of(kin.loop, monomials, beside=True)
     return tuple(replace(row, function=_floats(row.function), fall=_floats(row.fall)) for row in rows)

@@ -21,16 +21,16 @@ _BASE = sp.Symbol("V", positive=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settling:
-    """T ≤ factor·V(0)^power, exact, from V̇ ≤ −κV^{n/m}: power = 1 − n/m, factor = 1/(κ·power).
+    """Exact bound T ≤ factor·V(0)^power from V̇ ≤ −κV^{n/m}: power = 1 − n/m, factor = 1/(κ·power).
 
     Attributes
     ----------
     decay : Fraction
-        κ, proved; it belongs to this V.
+        Proved κ for this V.
     start : Fraction
-        Size of every |e_i| at the start.
+        Bound on every initial error |e_i|.
     seconds : float
-        Bound on the settling time from every such start [s], rounded up.
+        Bound on the settling time from all these initial errors [s], rounded up.
     """
 
     decay: Fraction
@@ -41,16 +41,16 @@ class Settling:
 
 
 def settling(certificate: Certificate, start: Number = 1, model: LoopField | None = None) -> Settling | None:
-    """Bound on the settling time from all |e_i| ≤ start; None without a claimed decay or without finite time.
+    """Bound on the settling time from all |e_i| ≤ start; None without a claimed decay or finite time.
 
     Parameters
     ----------
     certificate : Certificate
-        Checked already.
+        Certificate that was already checked.
     start : number or text
-        Largest size of every error, whatever the states of the loop (`LoopField.units`).
+        Bound on the size of every error, in units that do not depend on the states (`LoopField.units`).
     model : LoopField, optional
-        Loop of the law, for the units of its states; that of the law of the package by the certificate's name.
+        Loop of the law, for the units of its states; by default that of the law that the certificate names.
     """
     if "decay" not in certificate.claims:
         return None
@@ -80,18 +80,18 @@ def fastest_settling(
     start: Number = 1,
     degrees: int | Iterable[int] | None = None,
 ) -> tuple[Certificate, Settling] | None:
-    """Certificate with the largest κ that is found for its V, by the degree of V that settles first; None if none.
+    """Certificate with the largest κ found for its V, for the degree of V that settles fastest; None if none.
 
-    κ is 1 % below the largest for that V, which itself is the one with the largest margins, not the fastest one.
+    κ is 1 % below the largest for this V, which has the largest margins but not the fastest decay of its degree.
 
     Parameters
     ----------
     subject, gains, lipschitz, gain_range
         See `certify`.
     start : number or text
-        Size of every |e_i| from which the settling times are compared.
+        Initial bound on every |e_i| for which the settling times are compared.
     degrees : int or iterable of int, optional
-        Those that `certify` tries, up to two that succeed, unless given.
+        Degrees of V; by default those of `certify`, up to two successful ones.
 
     Raises
     ------

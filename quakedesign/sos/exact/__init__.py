@@ -1,1 +1,1 @@
-"""The part of the engine that decides: rational arithmetic only, no solver, no floats."""
+"""Exact part of the engine, which decides in rational arithmetic without solver or floats."""

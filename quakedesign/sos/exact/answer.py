@@ -14,7 +14,7 @@ from quakedesign.sos.exact.work_budget import limited
 
 
 class Positivity(Enum):
-    """Outcome of a question about a polynomial."""
+    """Verdict on the positivity of a polynomial."""
 
     SOS = "sos"
     NOT_SOS = "not-sos"
@@ -35,7 +35,7 @@ class Answer:
     Attributes
     ----------
     statement : Statement
-        What was decided, including the multiplier and the degree that were used.
+        The decided statement, with the multiplier and the degree that were used.
     proof : SumOfSquares, Functional, Point or None
     blocks : mapping of str to list of int
         Sizes of the Gram matrices before and after reduction.
@@ -44,7 +44,7 @@ class Answer:
     versions : mapping of str to str
         Solver and arithmetic used.
     remark : str
-        What is to be said beside the verdict, such as what became of a given Gram matrix; empty otherwise.
+        Note that is reported with the verdict, such as whether a given Gram matrix was used; may be empty.
     """
 
     statement: Statement
@@ -61,10 +61,10 @@ class Answer:
 
     @property
     def set_is_empty(self) -> bool:
-        """Whether a set is seen to have no point, so that a proof on it is about nothing.
+        """Whether the set is evidently empty, so that a proof of positivity on it is vacuous.
 
-        A negative number is proved to be non-negative on it, an inequality has negative coefficients and even exponents
-        alone with a constant among them, or an equality has such coefficients of one sign.
+        It is if a negative constant is proved to be non-negative on it, or if a constraint has only even exponents and
+        a constant term, and all coefficients are negative (inequality) or of one sign (equality).
         """
         statement = self.statement
         below = [
@@ -78,18 +78,18 @@ class Answer:
     def check(self) -> bool:
         """Whether the proof decides the statement, in exact arithmetic and without a solver.
 
-        An undecided answer claims nothing and is True.
+        True for an undecided answer, which claims nothing.
 
         Raises
         ------
         WorkError
-            When that takes more work than a check may (proofs/FORMAT.md): it is undecided.
+            When the check exceeds its work budget (proofs/FORMAT.md) and is undecided.
         """
         with limited():
             return self.proof is None or holds(self.statement, self.proof)
 
     def save(self, path: str | Path) -> None:
-        """Write the file of FORMAT.md, whole or not at all.
+        """Write the file of FORMAT.md atomically.
 
         Raises
         ------
@@ -100,6 +100,6 @@ class Answer:
 
 
 def _is_below_zero(polynomial: Polynomial) -> bool:
-    """Whether all coefficients are negative, that of 1 among them, and all exponents even."""
+    """Whether all exponents are even and all coefficients negative, with a constant term."""
     even = all(x % 2 == 0 for exponents in polynomial for x in exponents)
     return even and any(not any(e) for e in polynomial) and all(c < 0 for c in polynomial.values())

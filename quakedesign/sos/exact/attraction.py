@@ -1,7 +1,7 @@
 """Regions of attraction of polynomial fields by Lyapunov functions: claim, proof, files.
 
-The claim holds if V and μ·(−V̇) are given as sums of squares with positive definite Gram matrices for V <
-level; see the first chapter. Further chapters: files of regions (proofs/FORMAT.md) and of fields (TOML).
+The claim holds if V, and μ·(−V̇) where V < level, are sums of squares with positive definite Gram
+matrices; see the first chapter. Further chapters: files of regions (proofs/FORMAT.md) and of fields (TOML).
 """
 
 import json
@@ -37,17 +37,17 @@ from quakedesign.sos.exact.strict import (
 from quakedesign.sos.exact.work_budget import limited
 
 # ----------------------------------------------------------------------
-# Regions of attraction by a Lyapunov function: what is claimed of a polynomial field, and whether its proof holds.
+# Regions of attraction by a Lyapunov function: the claim about a polynomial field, and the check of its proof.
 #
-# V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite. Where a pure power of every state
-# is in a basis of the squares of V, V is positive and grows without bound; where one is in a basis of σ_0 or σ_1, V̇ <
-# 0 where V < level, but at the origin. Then {V < level} is bounded, is never left, and every solution in it tends to
-# zero.
+# V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite. If the bases of the squares of V
+# contain a pure power of every state, V is positive except at the origin and radially unbounded. If the bases of σ_0
+# and σ_1 contain one of every state, V̇ < 0 where V < level, except at the origin. Then {V < level} is bounded and
+# invariant, and every solution in it tends to zero.
 
 
 @dataclass(frozen=True, kw_only=True)
 class LyapunovProof:
-    """Squares of V and of −V̇."""
+    """Sums of squares of V and of μ·(−V̇)."""
 
     positive: SumOfSquares
     decrease: SumOfSquares
@@ -55,7 +55,7 @@ class LyapunovProof:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Attraction:
-    """That V̇ < 0 where V < level, but at the origin, for x' = field(x): proved by squares, or refuted by a point.
+    """Claim that V̇ < 0 for x' = field(x) where V < level, except at the origin; proved, refuted or undecided.
 
     Attributes
     ----------
@@ -65,13 +65,13 @@ class Attraction:
     lyapunov : Polynomial
         V.
     level : Fraction or None
-        None: everywhere.
+        None for the whole space.
     multiplier : Polynomial
         μ.
     proof : LyapunovProof, Point or None
-        A point refutes: V < level there, and V <= 0 or V̇ >= 0, though it is not the origin.
+        A point refutes the claim: it is not the origin, V < level there, and V <= 0 or V̇ >= 0.
     reason : str
-        Why nothing was decided; empty otherwise.
+        Reason why the claim is undecided; empty otherwise.
     """
 
     variables: tuple[str, ...]
@@ -99,12 +99,12 @@ class Attraction:
 
     @cached_property
     def positive(self) -> Statement:
-        """That V is a sum of squares."""
+        """Statement that V is a sum of squares."""
         return _statement(self.variables, self.lyapunov, constant(len(self.variables)), ())
 
     @cached_property
     def decrease(self) -> Statement:
-        """That −V̇ is one where V is at most the level."""
+        """Statement that μ·(−V̇) is non-negative where V is at most the level."""
         falling = combination([(Fraction(-1), self.derivative)])
         size = len(self.variables)
         below = (
@@ -119,7 +119,7 @@ class Attraction:
 
     @property
     def refutation(self) -> Point | None:
-        """The proof where it is a point that refutes the claim."""
+        """Point that refutes the claim; None without one."""
         match self.proof:
             case Point() as point:
                 return point
@@ -127,22 +127,22 @@ class Attraction:
 
     @property
     def height(self) -> Fraction | None:
-        """V at the point of a refutation; None without one."""
+        """V at the refuting point; None without one."""
         return evaluate(self.lyapunov, self.refutation.coordinates) if self.refutation else None
 
     @property
     def equilibrium(self) -> bool:
-        """Whether the point of a refutation is one where the field vanishes, so that no other V helps."""
+        """Whether the field vanishes at the refuting point, so that the claim fails for every V."""
         point = self.refutation
         return point is not None and not any(evaluate(f, point.coordinates) for f in self.field)
 
     def check(self) -> bool:
-        """Whether the proof decides, in exact arithmetic and without a solver; an undecided claim is True.
+        """Whether the proof is valid, in exact arithmetic and without a solver; True for an undecided claim.
 
         Raises
         ------
         WorkError
-            When that takes more work than a check may.
+            When the check exceeds its work budget.
         """
         with limited():
             match self.proof:
@@ -157,7 +157,7 @@ class Attraction:
         return all(vanishes_at_origin_only(sums.squares, size) and holds(statement, sums) for statement, sums in parts)
 
     def refuted_by(self, point: Point) -> bool:
-        """Whether V is below the level at a point other than the origin, and is not positive or does not fall there."""
+        """Whether a point other than the origin has V < level, and V ≤ 0 or V̇ ≥ 0."""
         x = point.coordinates
         if len(x) != len(self.variables) or not any(x):
             return False
@@ -168,18 +168,18 @@ class Attraction:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Region:
-    """What is proved of {V < level}, and what refutes more.
+    """Largest proved region of attraction {V < level}, and a refuted level.
 
     Attributes
     ----------
     proved : Attraction or None
-        The largest level that is proved.
+        Claim of the largest level that is proved.
     refuted : Attraction or None
-        By a point where V is not positive or does not fall; so is every level above the value of V there.
+        Claim refuted by a point where V ≤ 0 or V̇ ≥ 0, which refutes every level above the value of V there.
     remark : str
-        Why nothing was proved; empty otherwise.
+        Reason why no level was proved; empty otherwise.
     inclusion : Answer or None
-        Proof that V is below the level where a shape is at most β, where a shape was asked about.
+        Proof that V is below the level where the given shape is at most β; None without a shape.
     """
 
     proved: Attraction | None
@@ -189,21 +189,21 @@ class Region:
 
     @staticmethod
     def of(claim: Attraction) -> "Region":
-        """Region of a single claim, about everywhere."""
+        """Region of a single claim, about the whole space."""
         proved, refuted = (claim if claim.verdict == verdict else None for verdict in ("proved", "refuted"))
         remark = "" if proved or refuted else claim.reason or "neither a proof nor a counterexample was found"
         return Region(proved=proved, refuted=refuted, remark=remark)
 
     @property
     def verdict(self) -> str:
-        """``proved``, ``refuted`` (no level at all can be proved with this V, or this field) or ``undecided``."""
+        """``proved``, ``refuted`` (no level can be proved with this V or this field) or ``undecided``."""
         if self.proved is not None:
             return "proved"
         return "refuted" if self.refuted is not None and self.refuted.level is None else "undecided"
 
     @property
     def level(self) -> Fraction | None:
-        """Proved level; None if nothing is proved, or everything."""
+        """Proved level; None if no level or the whole space is proved."""
         return None if self.proved is None else self.proved.level
 
     @property
@@ -216,24 +216,24 @@ class Region:
 
     @property
     def refuted_above(self) -> Fraction | None:
-        """V at the point that refutes; None without one."""
+        """V at the refuting point; None without one."""
         return None if self.refuted is None else self.refuted.height
 
 
 def vanishes_at_origin_only(squares: Iterable[Square], size: int) -> bool:
-    """Whether a pure power of every variable is an element of a basis: then the squares vanish at the origin alone."""
+    """Whether the bases contain a pure power of every variable, so that the squares vanish at the origin only."""
     pure = {_pure(b) for square in squares for b in square.basis if isinstance(b, tuple)}
     return pure >= set(range(size))
 
 
 def _pure(exponents: Exponents) -> int | None:
-    """Index of the one variable of a monomial."""
+    """Index of the variable of a pure power; None for other monomials."""
     used = [i for i, x in enumerate(exponents) if x]
     return used[0] if len(used) == 1 else None
 
 
 def along(field: Sequence[Polynomial], function: Polynomial) -> dict[Exponents, Fraction]:
-    """Derivative of a function along a field."""
+    """Derivative of a function along the solutions of a field."""
     slopes = [_partial(function, i) for i in range(len(field))]
     parts = (product(len(field), (slope, f)) for slope, f in zip(slopes, field, strict=True))
     return combination((Fraction(1), part) for part in parts)
@@ -259,11 +259,11 @@ def _statement(
 
 
 # ----------------------------------------------------------------------
-# The file about a region of attraction (proofs/FORMAT.md): read strictly, written whole.
+# The file of a region of attraction (proofs/FORMAT.md): read strictly, written atomically.
 
 
 class AttractionEntries(Entries):
-    """A polynomial field with a Lyapunov function and its level, empty for the whole space."""
+    """A polynomial field, its Lyapunov function, and the level, which is empty for the whole space."""
 
     variables: Names
     field: tuple[PolynomialEntries, ...]
@@ -271,7 +271,7 @@ class AttractionEntries(Entries):
     level: Annotated[tuple[Fraction, ...], Meta(max_length=1)]
 
     def claim(self, multiplier: Polynomial) -> Attraction:
-        """The claim, of polynomials of its variables."""
+        """Claim; its polynomials must be in its variables."""
         size = len(self.variables)
         for polynomial in (self.V, multiplier, *self.field):
             require_polynomial(polynomial, "a polynomial", size, TERMS)
@@ -281,7 +281,7 @@ class AttractionEntries(Entries):
 
 
 class ProvedFile(AttractionEntries):
-    """All of a file with a proof but its format and kind."""
+    """Entries of a file with a proof, without format and kind."""
 
     multiplier: PolynomialEntries
     positive: SosEntries
@@ -289,18 +289,18 @@ class ProvedFile(AttractionEntries):
 
 
 class RefutedFile(AttractionEntries):
-    """All of a file with a refutation but its format and kind."""
+    """Entries of a file with a refutation, without format and kind."""
 
     negative: PointEntries
 
 
 def read(raw: Any) -> Attraction:
-    """Claim and proof of a parsed file; reading verifies nothing.
+    """Claim and proof of a parsed file, which are not checked.
 
     Raises
     ------
     CertificateError
-        When it breaks a rule of FORMAT.md.
+        When the file breaks a rule of FORMAT.md.
     """
     entries = headed(raw, "attraction")
     try:
@@ -324,7 +324,7 @@ def load(text: str) -> Attraction:
 
 
 def text(claim: Attraction) -> str:
-    """Text of the file, the same for the same proof.
+    """Text of the file, reproducible for a given proof.
 
     Raises
     ------
@@ -351,14 +351,14 @@ def text(claim: Attraction) -> str:
 
 
 def save_attraction(claim: Attraction, path: str | Path) -> None:
-    """Write the file whole or not at all, and only if it can be read again.
+    """Write the file atomically, and only if it can be read back.
 
     Raises
     ------
     CertificateError
-        When there is no proof, or it is beyond the limits of the format.
+        When there is no proof, or it exceeds the limits of the format.
     OutputError
-        When the folder cannot be written.
+        When the folder is not writable.
     """
     write_readable(path, text(claim), load)
 
@@ -370,12 +370,12 @@ _LARGEST = 1 << 16  # bytes
 
 
 def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
-    """Rates of the states by name, from the table ``field``, and V where the file has one; all as text.
+    """Rates of the states by name, from the table ``field``, and V if given; all as text.
 
     Raises
     ------
     PolynomialError
-        When the file cannot be read, or has other contents.
+        When the file is not readable, or has other keys or values.
     """
     content = read_text(path, "a field's file", largest=_LARGEST, refusal=PolynomialError)
     try:

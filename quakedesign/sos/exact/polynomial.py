@@ -30,7 +30,7 @@ def ring(variables: int) -> fmpq_mpoly_ctx:
 
 def element(polynomial: Polynomial, variables: int) -> fmpq_mpoly:
     """Element of the ring."""
-    spend(len(polynomial), longest(polynomial.values()))  # all over one denominator
+    spend(len(polynomial), longest(polynomial.values()))  # converts to a common denominator
     entries = {e: fmpq(c.numerator, c.denominator) for e, c in polynomial.items() if c}
     return ring(variables).from_dict(entries)
 
@@ -41,7 +41,7 @@ def mapping(polynomial: fmpq_mpoly) -> dict[Exponents, Fraction]:
 
 
 def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fraction]:
-    """Product of polynomials; one for none."""
+    """Product of polynomials; the constant one without factors."""
     factors, one = list(factors), constant(variables)
     others = [f for f in factors if f != one]
     if len(others) < 2:
@@ -50,7 +50,7 @@ def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fr
 
 
 def multiplied(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
-    """Product of two elements of the ring, its work counted before."""
+    """Product of two elements of the ring; its work is counted in advance."""
     if counted():
         spend(len(left) * len(right), _height(left) + _height(right))
     result = left * right
@@ -59,7 +59,7 @@ def multiplied(left: fmpq_mpoly, right: fmpq_mpoly) -> fmpq_mpoly:
 
 
 def _height(polynomial: fmpq_mpoly) -> int:
-    """Bits of the longest coefficient."""
+    """Bit length of the longest coefficient."""
     return max((int(c.height_bits()) for c in polynomial.coeffs()), default=0)
 
 
@@ -91,7 +91,7 @@ def square_factor(
 
 
 def degree(polynomial: Polynomial) -> int:
-    """Total degree; 0 for zero."""
+    """Total degree; 0 for the zero polynomial."""
     return max((sum(e) for e in polynomial), default=0)
 
 
@@ -135,12 +135,12 @@ def monomials(variables: int, most: int, least: int = 0) -> Iterator[Exponents]:
 
 
 def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fraction]:
-    """Sparse form of a SymPy polynomial with rational coefficients, floats read as `fraction_of_float` does.
+    """Sparse form of a SymPy polynomial with rational coefficients; floats are read by `fraction_of_float`.
 
     Raises
     ------
     PolynomialError
-        When it is not one.
+        When the expression is no such polynomial.
     """
     import sympy as sp
 
@@ -181,7 +181,7 @@ def full_matrix(upper: Sequence[Entry], size: int) -> list[list[Entry]]:
 
 
 def over_common_denominator(values: Sequence[Fraction]) -> tuple[list[int], int]:
-    """Integers n and d with values n/d."""
+    """Integers n and d such that the values are n/d."""
     scale = lcm(*{value.denominator for value in values})
     return [value.numerator * (scale // value.denominator) for value in values], scale
 
@@ -192,7 +192,7 @@ def positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
     Parameters
     ----------
     rows : sequence of n sequences of n Fraction
-        Assumed symmetric; only then is the answer meaningful.
+        Assumed symmetric; the result is meaningless otherwise.
     """
     size = len(rows)
     spend(size * size, longest(value for row in rows for value in row))
@@ -203,8 +203,8 @@ def positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
 def positive_definite_integers(rows: Sequence[Sequence[int]]) -> bool:
     """Whether a symmetric integer matrix is positive definite.
 
-    Its eigenvalues are real, so they are positive if and only if the coefficients of its characteristic polynomial
-    alternate in sign, none of them zero.
+    The eigenvalues are real, so they are all positive if and only if the coefficients of the characteristic polynomial
+    are nonzero and alternate in sign.
     """
     bits = max((abs(v).bit_length() for row in rows for v in row), default=0)
     spend(1 + len(rows) ** 4 * (bits + 10) // 100_000)  # modulo one prime after another, some nanoseconds each
@@ -227,7 +227,7 @@ def nonnegative_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
 
 
 def _components(rows: Sequence[Sequence[Fraction]]) -> list[list[int]]:
-    """Index sets between which all entries are zero."""
+    """Index sets of the connected blocks; entries between blocks are zero."""
     left, components = set(range(len(rows))), []
     while left:
         frontier, block = [min(left)], []

@@ -1,4 +1,4 @@
-"""Files about one polynomial (proofs/FORMAT.md): strict reading, writing."""
+"""Files of a statement about one polynomial (proofs/FORMAT.md): strict reading, and writing."""
 
 import json
 from fractions import Fraction
@@ -35,14 +35,14 @@ Polynomials = Annotated[tuple[PolynomialEntries, ...], Meta(max_length=_CONSTRAI
 
 
 class GramEntries(Entries):
-    """A square: its product of inequalities, its basis of monomials or polynomials, and its Gram matrix."""
+    """A square: product of inequalities, basis of monomials or polynomials, and Gram matrix."""
 
     product: Product
     basis: Annotated[tuple[tuple[int, ...] | dict[str, str], ...], Meta(min_length=1, max_length=_BASIS)]
     gram: tuple[Fraction, ...]
 
     def square(self, statement: Statement) -> Square:
-        """The square, of sizes that fit a statement."""
+        """Square; its sizes must match the statement."""
         need(self.product in statement.products, "a square has a product that is not listed")
         n, size = len(statement.variables), len(self.basis)
         basis = tuple(entry if isinstance(entry, tuple) else read_polynomial(entry) for entry in self.basis)
@@ -72,7 +72,7 @@ class SosEntries(Entries):
     multiplier: Squares
 
     def proof(self, statement: Statement) -> SumOfSquares:
-        """The proof, of sizes that fit a statement."""
+        """Proof; its sizes must match the statement."""
         need(len(self.cofactors) == len(statement.equalities), "there must be a cofactor for each equality")
         for cofactor in self.cofactors:
             require_polynomial(cofactor, "a cofactor", len(statement.variables), TERMS)
@@ -89,7 +89,7 @@ class PointEntries(Entries):
     point: tuple[Fraction, ...]
 
     def proof(self, variables: int) -> Point:
-        """The point, with a coordinate for each variable."""
+        """Point; it must have a coordinate for each variable."""
         need(len(self.point) == variables, f"point must have {variables} coordinates")
         return Point(coordinates=self.point)
 
@@ -112,7 +112,7 @@ class StatementEntries(Entries):
     multiplier: PolynomialEntries
 
     def statement(self) -> Statement:
-        """The statement, of polynomials of its variables."""
+        """Statement; its polynomials must be in its variables."""
         every = (self.polynomial, self.multiplier, *self.inequalities, *self.equalities)
         for polynomial in every:
             require_polynomial(polynomial, "a polynomial", len(self.variables), TERMS)
@@ -127,30 +127,30 @@ class StatementEntries(Entries):
 
 
 class SosFile(StatementEntries, rename={"proof": "sos"}):
-    """A polynomial with a sum of squares."""
+    """File of a polynomial with its proof as a sum of squares."""
 
     proof: SosEntries
 
 
 class NoSosFile(StatementEntries, rename={"proof": "not-sos"}):
-    """A polynomial that is no sum of squares of these products."""
+    """File of a polynomial that is no sum of squares with the given products."""
 
     proof: FunctionalEntries
 
 
 class NegativeFile(StatementEntries, rename={"proof": "negative"}):
-    """A polynomial that is negative at a point."""
+    """File of a polynomial that is negative at a point."""
 
     proof: PointEntries
 
 
 def read(raw: Any) -> tuple[Statement, Proof]:
-    """Statement and proof of a parsed file; reading verifies nothing.
+    """Statement and proof of a parsed file, which are not checked.
 
     Raises
     ------
     CertificateError
-        When it breaks a rule of FORMAT.md.
+        When the file breaks a rule of FORMAT.md.
     """
     entries = headed(raw)
     if "negative" in entries:
@@ -171,7 +171,7 @@ def load(text: str) -> tuple[Statement, Proof]:
 
 
 def text(statement: Statement, proof: Proof) -> str:
-    """Text of the file, the same for the same proof."""
+    """Text of the file, reproducible for a given proof."""
     plain: Json = {name: PolynomialEntries(getattr(statement, name)) for name in ("polynomial", "multiplier")}
     plain |= {name: tuple(map(PolynomialEntries, getattr(statement, name))) for name in ("inequalities", "equalities")}
     file = {"format": 1} | written(made(StatementEntries, statement, **plain)) | proof_entries(proof)
@@ -179,7 +179,7 @@ def text(statement: Statement, proof: Proof) -> str:
 
 
 def proof_entries(proof: Proof) -> Json:
-    """Entries of a proof under its kind."""
+    """Entries of a proof under the key of its kind."""
     match proof:
         case Point():
             return {"negative": written(PointEntries(proof.coordinates))}
@@ -197,14 +197,14 @@ def proof_entries(proof: Proof) -> Json:
 
 
 def save(statement: Statement, proof: Proof | None, path: str | Path) -> None:
-    """Write the file whole or not at all, and only if it can be read again.
+    """Write the file atomically, and only if it can be read back.
 
     Raises
     ------
     CertificateError
-        When there is no proof, or it is beyond the limits of the format.
+        When there is no proof, or it exceeds the limits of the format.
     OutputError
-        When the folder cannot be written.
+        When the folder is not writable.
     """
     if proof is None:
         raise CertificateError("only a proof can be saved. Received an undecided answer.")

@@ -1,4 +1,4 @@
-"""Statement of a problem: whether multiplier · polynomial lies in the cone of a basic semialgebraic set."""
+"""Statement that multiplier · polynomial lies in the cone of a basic semialgebraic set."""
 
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
@@ -33,7 +33,7 @@ class Statement:
     equalities : tuple of Polynomial
         h_k = 0 on the set.
     products : tuple of tuple of int
-        The index sets S; the empty one is always there.
+        The index sets S, always including the empty one.
     degree : int
         Largest degree of a summand.
     multiplier : mapping of exponents to Fraction
@@ -72,13 +72,13 @@ class Statement:
 
     @cached_property
     def structure(self) -> Structure:
-        """All but the numbers of the target, which the blocks do not follow from."""
+        """Statement without the coefficients of the target, on which the blocks do not depend."""
         inequalities, equalities = (tuple(tuple(p.items()) for p in g) for g in (self.inequalities, self.equalities))
         return len(self.variables), frozenset(self.target), self.degree, self.products, inequalities, equalities
 
     @classmethod
     def of(cls, structure: Structure) -> "Statement":
-        """Statement of a structure, every monomial of its target once."""
+        """Statement of a structure; every coefficient of its target is one."""
         size, support, largest, products, inequalities, equalities = structure
         return cls(
             variables=tuple(f"x{i}" for i in range(size)),
@@ -101,19 +101,19 @@ class Statement:
 
     @cached_property
     def graded(self) -> bool:
-        """Whether target and constraints are forms, the target of the statement's degree."""
+        """Whether target and constraints are forms, and the target has the statement's degree."""
         constraints = (*self.inequalities, *self.equalities)
         own = all(sum(e) == self.degree for e in self.target)
         return own and all(len({sum(e) for e in p}) == 1 for p in constraints)
 
     @cached_property
     def dense(self) -> bool:
-        """Whether the set is ℝⁿ or an orthant, so that a multiplier may vanish on a thin part of it."""
+        """Whether the set is ℝⁿ or an orthant, so that a multiplier may vanish on a subset of measure zero."""
         return not self.equalities and all(self.is_variable(g) for g in self.inequalities)
 
     @cached_property
     def parities(self) -> dict[int, int]:
-        """Echelon basis over GF(2) of the parities of all exponents that occur, leading bit to vector."""
+        """Echelon basis over GF(2) of the parities of all occurring exponents, as leading bit to vector."""
         echelon: dict[int, int] = {}
         for p in (self.target, *self.inequalities, *self.equalities):
             for e in p:
@@ -131,7 +131,7 @@ class Statement:
 
 
 def parity(exponents: Exponents) -> int:
-    """Odd exponents as bits."""
+    """Parities of the exponents as bits, one for odd."""
     return sum((x & 1) << i for i, x in enumerate(exponents))
 
 
@@ -154,7 +154,7 @@ def statement(
     degree_bound: int | None = None,
     more: int = 0,
 ) -> Statement:
-    """Statement with the usual choices.
+    """Statement with default products and degree bound.
 
     Parameters
     ----------
@@ -162,14 +162,14 @@ def statement(
     polynomial : mapping of exponents to Fraction
     inequalities, equalities : tuple of Polynomial
     multiplier : mapping of exponents to Fraction, optional
-        One unless given.
+        1 by default.
     products : bool, optional
-        All squarefree products of inequalities (Schmüdgen) if True, each alone (Putinar) if False. Unless given,
-        products of inequalities that are variables (orthant), each alone of the others.
+        All squarefree products of inequalities (Schmüdgen) if True, only single inequalities (Putinar) if False. By
+        default, products of inequalities that are variables (orthant), and the other inequalities singly.
     degree_bound : int, optional
-        Unless given, the smallest even degree that holds multiplier · polynomial and every constraint.
+        By default, the smallest even degree not below those of multiplier · polynomial and every constraint.
     more : int
-        Added to the degree bound.
+        Increment of the degree bound.
     """
     size = len(variables)
     inequalities = tuple({tuple(sorted(g.items())): g for g in inequalities}.values())

@@ -1,7 +1,7 @@
 """Reading of polynomials and constraints from text, SymPy or mappings.
 
-Text is read by a grammar of its own and never passed to an interpreter; every limit on time and memory is
-checked before the work that it limits.
+Text is read by a dedicated grammar and never passed to an interpreter. Every limit on time and memory is
+checked before the operation that it limits.
 """
 
 import re
@@ -19,7 +19,7 @@ from quakedesign.sos.exact.polynomial import Exponents, Polynomial, from_sympy
 from quakedesign.sos.exact.proofs import Element, as_element
 
 # ----------------------------------------------------------------------
-# Expansion of polynomials with a budget: every limit is enforced before the work that it limits.
+# Expansion of polynomials with a work budget: every limit is checked before the operation that it limits.
 
 DEGREE = 60
 """Total degree of any intermediate polynomial, and largest exponent."""
@@ -31,7 +31,7 @@ COEFFICIENT_DIGITS = 1000
 """Decimal digits of any intermediate numerator or denominator."""
 
 _WORK = 2_000_000  # sums and products of two short coefficients in one text: about a second
-_FIELD = 7  # bits an exponent; sums of two exponents up to DEGREE fit
+_FIELD = 7  # bits per exponent; the sum of two exponents up to DEGREE fits
 _BITS_OF_NUMBERS = (10**DIGITS).bit_length()
 _BITS = (10**COEFFICIENT_DIGITS).bit_length()
 _SHORT = 256  # bits; longer coefficients cost more of the budget
@@ -42,7 +42,7 @@ Terms = dict[int, Any]
 
 
 class Token(NamedTuple):
-    """A word of the text: its kind, its characters and the place of the first."""
+    """A token of the text: kind, characters and position of the first character."""
 
     kind: str
     text: str
@@ -50,7 +50,7 @@ class Token(NamedTuple):
 
 
 def refuse(text: str, token: Token, expected: str, remedy: str) -> NoReturn:
-    """Raise the one kind of error, its place marked by ⟦ ⟧ in a short excerpt on one line."""
+    """Raise PolynomialError with a short one-line excerpt, in which ⟦ ⟧ marks the token."""
     start, end = token.start, token.start + min(len(token.text), 24)
     before, after = text[max(0, start - 24) : start], text[end : end + 24]
     shown = f"{'…' if start > 24 else ''}{before}⟦{text[start:end]}⟧{after}{'…' if end + 24 < len(text) else ''}"
@@ -60,14 +60,14 @@ def refuse(text: str, token: Token, expected: str, remedy: str) -> NoReturn:
 
 
 class Expansion:
-    """Arithmetic on the polynomials of one text, which share one budget of work.
+    """Arithmetic on the polynomials of one text, which share one work budget.
 
-    Operands are used up: a sum may be formed in place.
+    Operands must not be reused, as a sum may be formed in place.
 
     Parameters
     ----------
     text : str
-        For the excerpt in messages.
+        Source of the excerpts in messages.
     """
 
     def __init__(self, text: str, variables: Sequence[str]) -> None:
@@ -79,7 +79,7 @@ class Expansion:
         self._work = _WORK
 
     def number(self, token: Token) -> Terms:
-        """Constant polynomial of a decimal."""
+        """Constant polynomial of a decimal number."""
         mantissa, _, exponent = token.text.lower().partition("e")
         whole, _, decimals = mantissa.partition(".")
         if len(mantissa) > DIGITS or len(exponent) > 5 or abs(int(exponent or "0")) > DIGITS:
@@ -130,7 +130,7 @@ class Expansion:
         return self.multiply(left, {0: 1 / right[0]}, token)
 
     def power(self, base: Terms, token: Token) -> Terms:
-        """p to the whole number that the token must be."""
+        """Power p^n; the token must be a whole number n."""
         if not token.text.isdigit() or len(token.text) > 9 or int(token.text) > DEGREE:
             expected = f"a whole number from 0 to {DEGREE} as exponent"
             refuse(self._text, token, expected, "Write for example x^2; only digits make an exponent.")
@@ -142,7 +142,7 @@ class Expansion:
         return total
 
     def _size_of_power(self, base: Terms, exponent: int) -> int:
-        """Upper bound of the monomials of a power: of its products of terms, and of the box of its exponents."""
+        """Upper bound on the number of monomials of a power, from its terms, exponents and degree."""
         sizes = [max((key >> _FIELD * i) % (1 << _FIELD) for key in base or (0,)) for i in range(self._count)]
         box = prod(size * exponent + 1 for size in sizes)
         degree = self._degree(base) * exponent
@@ -183,12 +183,12 @@ class Expansion:
 
 
 # ----------------------------------------------------------------------
-# Polynomials and constraints read from text by a grammar of our own, in bounded time and memory.
+# Polynomials and constraints read from text by a dedicated grammar, in bounded time and memory.
 #
-# A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. Products need their *, powers
-# a whole number from 0 to 60, and only numbers divide. A constraint is two polynomials around >=, <= or ==. A name that
-# elsewhere is a number (pi, nan, …) is a variable only where the variables are given. Nothing is ever handed to an
-# interpreter, and every limit is enforced before the work that it limits.
+# A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. A product needs its *, an
+# exponent is a whole number from 0 to 60, and a divisor is a number. A constraint is two polynomials joined by >=, <=
+# or ==. A name that commonly denotes a number (pi, nan, …) is a variable only if the variables are given. Text is
+# never passed to an interpreter, and every limit is checked before the operation that it limits.
 
 LENGTH = 20_000
 """Characters of one text."""
@@ -223,14 +223,14 @@ def parse(
     text : str
         For example ``x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2``.
     variables : sequence of str, optional
-        Names and their order; any other name in the text is refused. Unless given, the names in order of appearance,
-        none of which may be that of a number (``pi``, ``E``, ``I``, ``nan``, ``inf``, ``oo``, …).
+        Names in order; any other name in the text is rejected. By default, the names in order of appearance, none of
+        which may denote a number (``pi``, ``E``, ``I``, ``nan``, ``inf``, ``oo``, …).
 
     Returns
     -------
     variables : tuple of str
     polynomial : dict of exponents to Fraction
-        Without zeros; empty for the zero polynomial.
+        Without zero coefficients; empty for the zero polynomial.
 
     Raises
     ------
@@ -249,12 +249,12 @@ def parse(
 def parse_constraint(
     text: str, variables: Sequence[str] | None = None
 ) -> tuple[Kind, tuple[str, ...], dict[ExpandedExponents, Fraction]]:
-    """Kind, variables and polynomial g of a constraint, which is g ≥ 0 for an inequality and g = 0 for an equality.
+    """Kind, variables and polynomial g of a constraint: g ≥ 0 for an inequality, g = 0 for an equality.
 
     Parameters
     ----------
     text : str
-        Two polynomials around one of ``>=``, ``<=``, ``==``; for example ``x^2 + y^2 == 1``.
+        Two polynomials joined by ``>=``, ``<=`` or ``==``; for example ``x^2 + y^2 == 1``.
     variables : sequence of str, optional
         As in `parse`.
 
@@ -263,12 +263,12 @@ def parse_constraint(
     kind : "inequality" or "equality"
     variables : tuple of str
     polynomial : dict of exponents to Fraction
-        Left minus right, but right minus left for ``<=``.
+        Left side minus right side; right side minus left side for ``<=``.
 
     Raises
     ------
     PolynomialError
-        As in `parse`, and when there is not exactly one relation or it is strict.
+        As in `parse`, and when there is no relation, more than one, or a strict one.
     """
     tokens = _tokens(text)
     order = _order(text, tokens, variables)
@@ -289,7 +289,7 @@ def names_in_text(*texts: str) -> tuple[str, ...]:
     Raises
     ------
     PolynomialError
-        When a text has a character that no polynomial has, or together they have too many variables.
+        When a text has an invalid character, or all texts together have too many variables.
     """
     names = dict.fromkeys(name for text in texts for name in _order(text, _tokens(text), None))
     if len(names) > VARIABLES:
@@ -353,7 +353,7 @@ def _checked(variables: Sequence[str]) -> tuple[str, ...]:
 
 
 def _relation(text: str, tokens: Sequence[Token]) -> int:
-    """Place of the only relation among the tokens."""
+    """Index of the only relation among the tokens."""
     places = [i for i, token in enumerate(tokens) if token.kind == "relation"]
     if not places:
         refuse(text, tokens[-1], "one of >=, <=, ==", "Write for example x >= 0.")
@@ -366,7 +366,7 @@ def _relation(text: str, tokens: Sequence[Token]) -> int:
 
 
 def _evaluate(text: str, tokens: Sequence[Token], expansion: Expansion) -> Terms:
-    """Value of a whole expression, by two stacks (Dijkstra's shunting yard), so that nesting costs no recursion."""
+    """Value of an expression, by two stacks (Dijkstra's shunting yard), so that nesting needs no recursion."""
     values: list[Terms] = []
     pending: list[Token] = []
     place, operand = 0, True
@@ -385,7 +385,7 @@ def _evaluate(text: str, tokens: Sequence[Token], expansion: Expansion) -> Terms
 
 
 def _begin(text: str, token: Token, values: list[Terms], pending: list[Token], expansion: Expansion) -> bool:
-    """Take a token where an operand must begin; whether it is complete."""
+    """Process a token where an operand must begin; whether the operand is complete."""
     if token.kind in ("number", "name"):
         values.append(expansion.number(token) if token.kind == "number" else expansion.variable(token))
         return True
@@ -402,7 +402,7 @@ def _begin(text: str, token: Token, values: list[Terms], pending: list[Token], e
 
 
 def _continue(text: str, token: Token, values: list[Terms], pending: list[Token], expansion: Expansion) -> bool:
-    """Take a token after a complete operand; whether another operand must follow."""
+    """Process a token after a complete operand; whether another operand must follow."""
     sign = token.text
     if token.kind not in ("end", "operator") or sign == "(":
         refuse(text, token, "an operator", "Write products with *, for example 2*x.")
@@ -438,7 +438,7 @@ def _apply(token: Token, values: list[Terms], expansion: Expansion) -> None:
 
 
 # ----------------------------------------------------------------------
-# Text, SymPy or sparse mappings in; sparse polynomials over common variables out.
+# Conversion of text, SymPy expressions or sparse mappings to sparse polynomials in common variables.
 
 _AUTO = "auto"
 
@@ -451,7 +451,7 @@ def read(
     Raises
     ------
     PolynomialError
-        When something cannot be read, or a mapping comes without variables.
+        When an input is not readable, or a mapping is given without variables.
     """
     if isinstance(on, str):
         on = (on,)
@@ -469,13 +469,13 @@ def read(
 
 
 def read_element(given: Any, names: tuple[str, ...]) -> Element:
-    """Element of a basis: a polynomial as for `read`, or the exponents of a monomial."""
+    """Basis element from a polynomial as for `read`, or from the exponents of a monomial."""
     exponents = tuple(map(_whole, given)) if isinstance(given, Sequence) and not isinstance(given, str) else None
     return as_element(_polynomial({exponents: 1} if exponents is not None else given, names))
 
 
 def _whole(exponent: Any) -> Any:
-    """Integer of an exponent that another programme wrote as a float; text of what is no exponent."""
+    """Integer of an exponent, also if it is a whole float; text of any other value."""
     return floor(exponent) if isinstance(exponent, Real) and exponent % 1 == 0 else str(exponent)
 
 

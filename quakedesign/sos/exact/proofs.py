@@ -1,7 +1,7 @@
 """Exact proofs about a polynomial: sum of squares, functional, and negative point.
 
-The first chapter holds squares bᵀQb with exact numbers, their expansion and their definiteness. No solver
-is used.
+The first chapter defines squares bᵀQb with exact coefficients, their expansion and their definiteness. No
+solver is used.
 """
 
 from collections import Counter
@@ -37,7 +37,7 @@ from quakedesign.sos.exact.reduction import reduced_bases
 from quakedesign.sos.exact.work_budget import expanded, length, longest, spend
 
 # ----------------------------------------------------------------------
-# Squares bᵀQb with exact numbers: what they expand to, and whether they are squares.
+# Squares bᵀQb with exact coefficients: their expansion, and definiteness of Q.
 
 Element = Exponents | Polynomial
 """Basis element: a monomial by its exponents, or a polynomial."""
@@ -50,7 +50,7 @@ class Square:
     Attributes
     ----------
     product : tuple of int
-        S.
+        Index set S.
     basis : tuple of Element
         Entries of b (length n).
     gram : tuple of Fraction
@@ -75,7 +75,7 @@ def integer_gram(square: Square) -> IntegerGram:
     Raises
     ------
     ValueError
-        When the number of entries of Q is not that of the basis.
+        When the number of entries of Q does not match the basis.
     """
     upper, denominator = over_common_denominator(square.gram)
     return IntegerGram(full_matrix(upper, len(square.basis)), denominator)
@@ -87,12 +87,12 @@ def is_definite(gram: IntegerGram) -> bool:
 
 
 def _bits(rows: Sequence[Sequence[int]]) -> int:
-    """Bits of the longest entry."""
+    """Bit length of the longest entry."""
     return max((abs(v).bit_length() for row in rows for v in row), default=0)
 
 
 def has_own_monomials(basis: Sequence[Element]) -> bool:
-    """Whether every element has a monomial with positive coefficient that no other has, so that each number counts."""
+    """Whether every element has a monomial with positive coefficient that no other has, hence linear independence."""
     if all(isinstance(b, tuple) for b in basis):
         return True
     polynomials = [as_polynomial(b) for b in basis]
@@ -101,7 +101,7 @@ def has_own_monomials(basis: Sequence[Element]) -> bool:
 
 
 def in_echelon_form(square: Square) -> Square:
-    """The same square with a basis in which every element has a monomial of its own."""
+    """Equal square with a basis in which every element has a monomial that no other has."""
     if has_own_monomials(square.basis):
         return square
     polynomials = [as_polynomial(b) for b in square.basis]
@@ -122,12 +122,12 @@ def in_echelon_form(square: Square) -> Square:
 
 
 def form(basis: Sequence[Element], gram: IntegerGram, size: int) -> fmpq_mpoly:
-    """Form bᵀQb in the ring, added up in integers.
+    """Form bᵀQb in the ring, summed in integers.
 
     Raises
     ------
     ValueError
-        When the basis repeats a monomial, or is not one of as many variables.
+        When the basis repeats a monomial, or has another number of variables.
     """
     support, (rows, denominator) = _in_monomials(basis, gram)
     spend(len(support) * (len(support) + 1) // 2, _bits(rows))
@@ -144,7 +144,7 @@ def form(basis: Sequence[Element], gram: IntegerGram, size: int) -> fmpq_mpoly:
 
 
 def _in_monomials(basis: Sequence[Element], gram: IntegerGram) -> tuple[list[Exponents], IntegerGram]:
-    """Monomials m and the matrix M with bᵀQb = mᵀMm."""
+    """Monomials m and matrix M with bᵀQb = mᵀMm."""
     exponents = [b for b in basis if isinstance(b, tuple)]
     if len(exponents) == len(basis):
         if len(set(exponents)) != len(exponents):
@@ -160,7 +160,7 @@ def _in_monomials(basis: Sequence[Element], gram: IntegerGram) -> tuple[list[Exp
 
 
 def as_element(polynomial: Polynomial) -> Element:
-    """Polynomial as a basis element: by its exponents where it is a monomial with coefficient 1."""
+    """Polynomial as a basis element; a monomial with coefficient 1 is given by its exponents."""
     nonzero = {e: c for e, c in polynomial.items() if c}
     return next(iter(nonzero)) if list(nonzero.values()) == [1] else nonzero
 
@@ -171,7 +171,7 @@ def as_polynomial(basis_element: Element) -> Polynomial:
 
 
 # ----------------------------------------------------------------------
-# The three kinds of proof about a statement, each decided in rational arithmetic without a solver.
+# The three kinds of proof about a statement, each checked in rational arithmetic without a solver.
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -182,9 +182,9 @@ class SumOfSquares:
     ----------
     squares : tuple of Square
     cofactors : tuple of Polynomial
-        q_k, one for every equality.
+        Cofactors q_k, one for every equality.
     multiplier : tuple of Square
-        The multiplier as a sum of squares; empty where its coefficients show that it is positive.
+        The multiplier as a sum of squares; empty if its coefficients show that it is positive.
     """
 
     squares: tuple[Square, ...]
@@ -194,12 +194,12 @@ class SumOfSquares:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Functional:
-    """Linear functional L, non-negative on the cone and negative on the target; zero on monomials without a value.
+    """Linear functional L that is non-negative on the cone and negative on the target.
 
     Attributes
     ----------
     values : mapping of exponents to Fraction
-        L of a monomial.
+        L of each monomial; zero for all others.
     """
 
     values: Mapping[Exponents, Fraction]
@@ -216,7 +216,7 @@ Proof = SumOfSquares | Functional | Point
 
 
 def holds(statement: Statement, proof: Proof) -> bool:
-    """Whether a proof decides its statement; exact.
+    """Whether a proof is valid for its statement, in exact arithmetic.
 
     Parameters
     ----------
@@ -226,8 +226,8 @@ def holds(statement: Statement, proof: Proof) -> bool:
     Returns
     -------
     bool
-        True only if it does: the polynomial is non-negative on the set; or the statement is false; or the polynomial
-        is negative at a point of the set. False proves nothing.
+        True implies, for the three kinds in order: the polynomial is non-negative on the set; the statement is false;
+        the polynomial is negative at a point of the set. False implies nothing.
     """
     try:
         match proof:
@@ -241,7 +241,7 @@ def holds(statement: Statement, proof: Proof) -> bool:
 
 
 def identity_holds(statement: Statement, proof: SumOfSquares) -> bool:
-    """Whether the identity is exact and every square one; whether the multiplier is positive is not asked."""
+    """Whether the identity is exact and every Gram matrix positive definite; the multiplier is not checked."""
     try:
         return _identity_holds(statement, proof)
     except (ValueError, TypeError, AttributeError):
@@ -257,7 +257,7 @@ def _identity_holds(statement: Statement, proof: SumOfSquares) -> bool:
 
 
 def multiplier_is_positive(statement: Statement, squares: tuple[Square, ...]) -> bool:
-    """Positive on a dense part of the set; on all of it where the set may have no interior."""
+    """Whether the multiplier is positive on a dense subset; on the whole set if its interior may be empty."""
     size = len(statement.variables)
     one = (0,) * size
     if not squares:
@@ -344,7 +344,7 @@ def _functional_holds(statement: Statement, proof: Functional) -> bool:
 def localizing_matrix(
     weight: Polynomial, basis: Sequence[Exponents], values: Mapping[Exponents, Fraction]
 ) -> list[list[Fraction]]:
-    """L(g·b bᵀ) (n × n) for one product g and a basis of monomials."""
+    """Matrix L(g·b bᵀ) (n × n) for one product g and a basis of monomials b."""
     bits = max(map(length, (*weight.values(), *values.values())), default=0)
     spend(len(basis) ** 2 * len(weight), 2 * bits)
     rows = [[Fraction(0)] * len(basis) for _ in basis]
@@ -367,7 +367,7 @@ def _point_holds(statement: Statement, proof: Point) -> bool:
 
 
 def residual(statement: Statement, squares: Sequence[Square], cofactors: Sequence[Polynomial]) -> Polynomial:
-    """Target minus the right-hand side of a proposed proof."""
+    """Target minus the right-hand side of a proposed identity."""
     return mapping(_target(statement) - _right_side(statement, _with_integers(squares), cofactors))
 
 

@@ -1,10 +1,10 @@
 """Exact reduction of monomial bases before a problem is solved.
 
-One rule does the work of Newton polytope and diagonal inconsistency. Let e be a monomial to which no equality and
-only diagonal Gram entries contribute, each with a positive factor. If its coefficient in the target is zero, all
-these diagonal entries vanish, and so do their rows. Repeated on ℝⁿ until nothing changes, every vertex v of the
-convex hull of the basis has 2v in the support of the target, so the basis lies in half of its Newton polytope
-(Reznick 1978).
+One rule replaces Newton polytope and diagonal inconsistency. Let e be a monomial to which no equality and only
+diagonal Gram entries contribute, each with a positive factor. If the coefficient of e in the target is zero, all
+these diagonal entries vanish, and so do their rows. The rule is repeated until nothing changes. On ℝⁿ, every
+vertex v of the convex hull of the basis then has 2v in the support of the target, so the basis lies in half of
+the Newton polytope of the target (Reznick 1978).
 """
 
 from collections import Counter, defaultdict
@@ -24,7 +24,7 @@ Bases = tuple[tuple[Exponents, ...], ...]
 
 
 def full_bases(statement: Statement) -> Bases:
-    """For every product of inequalities all monomials whose squares keep the degree."""
+    """For every product of inequalities, all monomials whose squares times the product keep the degree bound."""
     size = len(statement.variables)
     halves = [(statement.degree - degree(w)) // 2 for w in statement.weights]
     counts = [comb(size + h, size) if h >= 0 else 0 for h in halves]
@@ -42,7 +42,7 @@ def reduced_bases(statement: Statement) -> Bases:
     Raises
     ------
     PolynomialError
-        When there are too many monomials to begin with.
+        When the full bases have too many monomials.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def reduced_bases(statement: Statement) -> Bases:
 
 
 def _contributions(statement: Statement, alive: Any) -> Any:
-    """Number of off-diagonal entries, and the diagonal ones, that feed each monomial."""
+    """Number of off-diagonal entries, and set of diagonal entries, that contribute to each monomial."""
     others: Counter[Exponents] = Counter()
     diagonal: dict[Exponents, set[tuple[int, Exponents, Fraction]]] = defaultdict(set)
     for k, (weight, basis) in enumerate(zip(statement.weights, alive, strict=True)):
@@ -81,7 +81,7 @@ def _contributions(statement: Statement, alive: Any) -> Any:
 
 
 def _forget(weight: Polynomial, k: int, gone: Exponents, basis: Any, others: Any, diagonal: Any) -> list[Exponents]:
-    """Take the entries of one basis element away; the monomials that they fed."""
+    """Remove the entries of one basis element; the monomials to which they contributed."""
     touched = []
     for e, c in weight.items():
         shifted = times(gone, e)
@@ -107,9 +107,9 @@ def reach(statement: Statement) -> set[Exponents]:
 
 
 def parity_classes(statement: Statement, basis: tuple[Exponents, ...]) -> list[tuple[int, ...]]:
-    """Indices of basis elements that no sign change of variables, under which everything is invariant, tells apart.
+    """Indices of basis elements, grouped by their sign under the sign symmetries of the statement.
 
-    The Gram matrix may be taken block diagonal in these classes (Löfberg 2009).
+    The Gram matrix may be chosen block diagonal in these classes (Löfberg 2009).
     """
     echelon = statement.parities
     classes: dict[int, list[int]] = defaultdict(list)

@@ -26,7 +26,7 @@ _RATIONAL = re.compile(r"(-?[1-9][0-9]{0,399}|0)(?:/([1-9][0-9]{0,399}))?")
 _EXPONENTS = re.compile(r"(0|[1-9][0-9]{0,2})(,(0|[1-9][0-9]{0,2}))*")
 _GRID_BITS = 1 << 14
 _DEPTH = 12
-_STRING = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)  # to the end of the text if never closed
+_STRING = re.compile(r'"[^"\\]*(?:\\.[^"\\]*)*(?:"|\\?\Z)', re.DOTALL)  # an unclosed string ends with the text
 _PATTERN = re.compile(r"`str` matching regex .*")
 _NO_BRACKETS = re.compile(r"[^\[\]{}]+")
 
@@ -37,7 +37,7 @@ def parse(text: str) -> Any:
     Raises
     ------
     CertificateError
-        When it is no JSON, too deep, or has floats, long integers or duplicate keys.
+        When the text is no JSON, is nested too deeply, or has floats, long integers or duplicate keys.
     """
     if _depth(text) > _DEPTH:
         raise CertificateError(f"the file is nested deeper than {_DEPTH} levels.")
@@ -56,7 +56,7 @@ def _depth(text: str) -> int:
 
 
 def unique(pairs: list[tuple[str, Any]]) -> Json:
-    """Object whose keys differ. Raises CertificateError for others."""
+    """Object of key-value pairs. Raises CertificateError for duplicate keys."""
     need(len({k for k, _ in pairs}) == len(pairs), "a key occurs twice in one object")
     return dict(pairs)
 
@@ -76,13 +76,13 @@ def _refuse(reason: str) -> NoReturn:
 
 
 def need(condition: bool, reason: str) -> None:
-    """Refuse unless a condition holds."""
+    """Raise CertificateError unless a condition holds."""
     if not condition:
         _refuse(reason)
 
 
 def headed(raw: Any, kind: str = "") -> Json:
-    """Entries of a file without the format's number and, if there is one, its kind, which must be the given one."""
+    """Entries of a file after a check of its format and, if given, its kind, both of which are removed."""
     if not isinstance(raw, dict):
         _refuse("the file must be an object")
     need(type(raw.get("format")) is int and raw["format"] == 1, "format must be 1")
@@ -91,13 +91,13 @@ def headed(raw: Any, kind: str = "") -> Json:
 
 
 def read_rational(raw: Any) -> Fraction:
-    """Canonical rational."""
+    """Fraction of a text in canonical form."""
     if not isinstance(raw, str):
         _refuse("a rational must be a text")
     return _rational(raw)
 
 
-@lru_cache(maxsize=1 << 15)  # the same numbers occur again and again in one file
+@lru_cache(maxsize=1 << 15)  # numbers recur often in one file
 def _rational(text: str) -> Fraction:
     match = _RATIONAL.fullmatch(text)
     if match is None:
@@ -110,7 +110,7 @@ def _rational(text: str) -> Fraction:
 
 
 def common_grid(gram: Iterable[Fraction]) -> None:
-    """Refuse a Gram matrix whose common denominator would make exact arithmetic slow."""
+    """Reject a Gram matrix whose common denominator would make exact arithmetic slow."""
     common = 1
     for denominator in {entry.denominator for entry in gram}:
         common = math.lcm(common, denominator)
@@ -119,7 +119,7 @@ def common_grid(gram: Iterable[Fraction]) -> None:
 
 
 def read_polynomial(raw: Any) -> dict[tuple[int, ...], Fraction]:
-    """Polynomial from an object of equally long exponents, each at most 999, to rationals that are not zero."""
+    """Polynomial from an object of exponents (equal length, each at most 999) to nonzero rationals."""
     if not isinstance(raw, dict):
         _refuse("a polynomial must be an object")
     polynomial: dict[tuple[int, ...], Fraction] = {}
@@ -134,7 +134,7 @@ def read_polynomial(raw: Any) -> dict[tuple[int, ...], Fraction]:
 
 
 def require_polynomial(polynomial: Mapping[tuple[int, ...], Fraction], what: str, variables: int, limit: int) -> None:
-    """Refuse a polynomial of other variables, or with more terms."""
+    """Reject a polynomial with another number of variables, or with more terms than the limit."""
     need(len(polynomial) <= limit, f"{what} is longer than {limit} terms")
     need(all(len(exponents) == variables for exponents in polynomial), f"{what} has a wrong key")
 
@@ -145,35 +145,35 @@ def polynomial_text(polynomial: Any) -> dict[str, str]:
 
 
 def write_readable(path: str | Path, written: str, load: Callable[[str], Any]) -> None:
-    """Write a text whole or not at all, and only if it can be read again."""
+    """Write a text atomically, and only if it can be read back."""
     load(written)
     write_whole(Path(path), written)
 
 
 # ----------------------------------------------------------------------
-# Objects of a file with typed fields: reading and writing follow from the types.
+# Objects of a file with typed fields, which define how to read and write them.
 
 
 class Entries(msgspec.Struct, forbid_unknown_fields=True):
-    """An object of a file; its fields are the keys, and one that equals its default value is left out."""
+    """An object of a file, with its fields as keys; a field with its default value is omitted."""
 
 
 def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
-    """Value of a type from parsed entries, such that `written` gives these entries again.
+    """Value of a type from parsed entries; `written` is its inverse.
 
     Parameters
     ----------
     kind : type
         An `Entries`, a dataclass, or a tuple of these, of rationals, integers and texts.
     raw : object
-        As `parse` gives it.
+        Result of `parse`.
     what : str
         Name of the entries for messages.
 
     Raises
     ------
     CertificateError
-        For another type, a missing or unknown key, a number that is not canonical, a default value that is given, or a
+        For a wrong type, a missing or unknown key, a number that is not canonical, an explicit default value, or a
         value that its class rejects.
     """
     try:
@@ -189,7 +189,7 @@ def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
 
 
 def written(value: Any) -> Any:
-    """Entries of a file that `read_as` reads as a value."""
+    """Entries of a file for a value; the inverse of `read_as`."""
     match value:
         case Fraction():
             return exact_text(value)
@@ -222,7 +222,7 @@ def _parts(kind: Any) -> tuple[tuple[str, str, Any], ...]:
 
 
 class PolynomialEntries(dict[tuple[int, ...], Fraction]):
-    """A polynomial of a file: exponents, as ``"2,0,1"``, to rationals that are not zero."""
+    """A polynomial of a file: exponents such as ``"2,0,1"`` to nonzero rationals."""
 
 
 def _decoded(kind: type, raw: Any) -> Any:
@@ -233,7 +233,7 @@ def _decoded(kind: type, raw: Any) -> Any:
 
 
 def _difference(raw: Any, again: Any) -> str:
-    """Place of the first entry that differs between what was read and what would be written; empty without one."""
+    """Place of the first difference between the entries read and those written back; empty without one."""
     if type(raw) is not type(again):
         return " "
     match raw:
@@ -251,7 +251,7 @@ def _difference(raw: Any, again: Any) -> str:
 
 
 def made(kind: type[_Kind], *sources: Any, **entries: Any) -> _Kind:
-    """Object whose fields are given, or attributes of the same name of one of the sources, or have their defaults."""
+    """Object of a type; each field is given, taken from a source with that attribute, or left at its default."""
     for name, *_ in _parts(cast(Any, kind)):
         values = [getattr(source, name) for source in sources if hasattr(source, name)]
         if name not in entries and values:

@@ -13,13 +13,13 @@ from quakedesign.sos.exact.proofs import Functional, Point, SumOfSquares
 from quakedesign.sos.exact.work_budget import length
 
 # ----------------------------------------------------------------------
-# An answer in sentences.
+# Sentences about an answer.
 
 _LONGEST = 200
 
 
 def polynomial_words(polynomial: Polynomial, variables: Sequence[str]) -> str:
-    """Polynomial as text that `quakedesign.sos.exact.polynomial_text.parse` reads back."""
+    """Polynomial as text, which `quakedesign.sos.exact.polynomial_text.parse` can read."""
     parts = []
     for e, c in sorted(polynomial.items(), key=lambda item: (sum(item[0]), item[0]), reverse=True):
         powers = [n if x == 1 else f"{n}^{x}" for n, x in zip(variables, e, strict=True) if x]
@@ -30,12 +30,12 @@ def polynomial_words(polynomial: Polynomial, variables: Sequence[str]) -> str:
 
 
 def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
-    """What was decided, on which set, and why it holds.
+    """Verdict, polynomial, set and reason of an answer, one sentence each.
 
     Parameters
     ----------
     verbose : bool
-        With the sizes of the Gram matrices before and after the reduction.
+        Add the sizes of the Gram matrices before and after the reduction.
     """
     statement = answer.statement
     lines = [f"{answer.verdict}: {_short(polynomial_words(statement.polynomial, statement.variables))}"]
@@ -58,7 +58,7 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
 
 
 def statement_words(answer: Answer) -> list[str]:
-    """What `sentences` leaves out of a statement: its whole polynomial, its products and degree, and a functional."""
+    """Details that `sentences` omits: the complete polynomial, products, degree, and a refuting functional."""
     statement = answer.statement
     whole = polynomial_words(statement.polynomial, statement.variables)
     products = ("*".join(f"[{i}]" for i in chosen) or "1" for chosen in statement.products)
@@ -94,7 +94,7 @@ def _reason(answer: Answer) -> list[str]:
 
 
 def _shown(value: Fraction) -> str:
-    """A number as it is, or six digits of it on its upper side where it is long."""
+    """Number as text; a long one is rounded up to six digits."""
     if length(value) < 1000:
         return _short(exact_text(value))
     upwards = Context(prec=6, rounding=ROUND_CEILING)
@@ -106,11 +106,11 @@ def _short(text: str) -> str:
 
 
 # ----------------------------------------------------------------------
-# A region of attraction in sentences, and as facts.
+# Sentences and JSON entries about a region of attraction.
 
 
 def claim_words(claim: Attraction) -> list[str]:
-    """The field, V, and what is proved or refuted of them."""
+    """Sentences about a claim: field, V, and what is proved or refuted."""
     names = claim.variables
     lines = [f"{name}' = {polynomial_words(f, names)}" for name, f in zip(names, claim.field, strict=True)]
     lines.append(f"V = {polynomial_words(claim.lyapunov, names)}")
@@ -123,7 +123,7 @@ def claim_words(claim: Attraction) -> list[str]:
 
 
 def region_words(region: Region) -> list[str]:
-    """What is proved, what is refuted, and the reason where nothing is proved."""
+    """Sentences about a region: verdict, proved and refuted levels, and remark."""
     lines = [region.verdict]
     shown = region.proved or region.refuted
     if shown is not None:
@@ -136,7 +136,7 @@ def region_words(region: Region) -> list[str]:
 
 
 def region_entries(region: Region) -> Json:
-    """The same for JSON; exact numbers are texts."""
+    """Entries about a region for JSON; exact numbers are texts."""
     shown = region.proved or region.refuted
     point = region.refuted.refutation if region.refuted is not None else None
     return {
@@ -155,7 +155,7 @@ def region_entries(region: Region) -> Json:
 
 
 def _shape(region: Region) -> str:
-    """The polynomial s of the inequality β − s ≥ 0."""
+    """Text of the polynomial s of the inequality β − s ≥ 0."""
     assert region.inclusion is not None
     statement = region.inclusion.statement
     return polynomial_words({e: -c for e, c in statement.inequalities[0].items() if any(e)}, statement.variables)

@@ -1,6 +1,6 @@
 """Budget of work for a check, counted in arithmetic operations before they are done (proofs/FORMAT.md).
 
-Without `limited` around it nothing is counted: a search may take as long as it is let.
+Work is counted only within a `limited` block, so the duration of a search is not limited.
 """
 
 from collections.abc import Iterable, Iterator
@@ -21,7 +21,7 @@ _left: ContextVar[int | None] = ContextVar("steps left", default=None)
 
 @contextmanager
 def limited(steps: int | None = None) -> Iterator[None]:
-    """Count the work inside, and refuse what is more than so many steps, `STEPS` by default."""
+    """Count the work within a block and limit it to a number of steps, `STEPS` by default."""
     before = _left.set(STEPS if steps is None else steps)
     try:
         yield
@@ -30,12 +30,12 @@ def limited(steps: int | None = None) -> Iterator[None]:
 
 
 def spend(steps: int, bits: int = 0) -> None:
-    """Count steps on integers of the given length, as division is quadratic in it.
+    """Count steps on integers of a bit length, whose weight is quadratic in it, like that of division.
 
     Raises
     ------
     WorkError
-        When the budget is used up.
+        When the budget is exceeded.
     """
     left = _left.get()
     if left is None:
@@ -52,12 +52,12 @@ def counted() -> bool:
 
 
 def length(number: Fraction) -> int:
-    """Bits of the longer one of numerator and denominator."""
+    """Bit length of the longer of numerator and denominator."""
     return max(number.numerator.bit_length(), number.denominator.bit_length())
 
 
 def longest(numbers: Iterable[Fraction]) -> int:
-    """Bits of the longest of numbers over their common denominator, counting what it takes to find that; else 0."""
+    """Bound on the bit length of numbers over their common denominator, with its work counted; 0 outside `limited`."""
     if not counted():
         return 0
     top, common = 0, 1
@@ -69,6 +69,6 @@ def longest(numbers: Iterable[Fraction]) -> int:
 
 
 def expanded(terms: int) -> None:
-    """Refuse a polynomial of too many terms."""
+    """Raise WorkError for a polynomial with too many terms."""
     if counted() and terms > TERMS:
         raise WorkError(f"an expanded polynomial has more than {TERMS} terms. Split it.")

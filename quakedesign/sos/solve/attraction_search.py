@@ -1,6 +1,6 @@
 """Search for Lyapunov functions and the largest regions of attraction of polynomial fields.
 
-Chapters: lowest points where V̇ ≥ 0; expansion of a region by alternation (W. Tan and A. Packard, IEEE
+Chapters: points with V̇ ≥ 0 and lowest V; expansion of a region by alternation (W. Tan and A. Packard, IEEE
 Trans. Automat. Contr. 53, 2008); stability and the largest proved level.
 """
 
@@ -42,18 +42,18 @@ from quakedesign.sos.solve.points import Arrays
 from quakedesign.sos.solve.program import NoSolution, Program
 
 # ----------------------------------------------------------------------
-# Where a Lyapunov function stops to fall: the lowest such points, in floating point, then rational and exact.
+# Points with V̇ ≥ 0 and the lowest V: sought in floating point, then made rational and checked exactly.
 
 _SEED = 20240609
-_DIRECTIONS, _REFINED, _STARTS = 300, 3, 30  # directions for every state
-_NEAR = 1e-3  # distance of a point in a direction in which V never falls
+_DIRECTIONS, _REFINED, _STARTS = 300, 3, 30  # number of directions per state
+_NEAR = 1e-3  # distance of the point in a direction in which V does not decrease near the origin
 _PRECISE = {"xatol": 1e-12, "fatol": 1e-14, "maxiter": 200}
-_TOLERANCES = (1e-3, 1e-7, 1e-12)  # of the fractions that are tried for a point
-_BEYOND = (0.0, 1e-10, 1e-7, 1e-4)  # how far a point is moved out, relative
+_TOLERANCES = (1e-3, 1e-7, 1e-12)  # relative tolerances of the fractions tried for a point
+_BEYOND = (0.0, 1e-10, 1e-7, 1e-4)  # relative distance by which a point is moved outward
 
 
 class _Rays:
-    """V, and V̇ or another polynomial that becomes positive, along rays from the origin, in powers of the distance."""
+    """V, and V̇ or another polynomial, along rays from the origin, in powers of the distance."""
 
     def __init__(self, size: int, lyapunov: Polynomial, rate: Polynomial) -> None:
         self.size = size
@@ -61,12 +61,12 @@ class _Rays:
         self.rate = self.graded(rate)
 
     def graded(self, polynomial: Polynomial) -> list[Arrays]:
-        """Forms of every degree."""
+        """Homogeneous parts of a polynomial, by degree."""
         top = max((sum(e) for e in polynomial), default=0)
         return [Arrays({e: c for e, c in polynomial.items() if sum(e) == k}, self.size) for k in range(top + 1)]
 
     def crossings(self, directions: np.ndarray, parts: list[Arrays]) -> np.ndarray:
-        """Points, one a row, from which on a polynomial is no longer negative; infinite where it remains so."""
+        """First point on each ray where a polynomial is not negative, one a row; infinite where there is none."""
         table = np.array([part.at(directions) for part in parts]).T
         distances = np.array([_first_root(row) for row in table])
         return np.where(
@@ -74,22 +74,22 @@ class _Rays:
         )
 
     def heights(self, directions: np.ndarray) -> np.ndarray:
-        """V where it stops to fall in every direction; infinite where it never does."""
+        """V at the first point with V̇ ≥ 0 in every direction; infinite where there is none."""
         points = self.crossings(directions, self.rate)
         finite = np.isfinite(points).all(axis=1)
         return np.where(finite, self.lyapunov.at(np.where(finite[:, None], points, 0.0)), np.inf)
 
     def height(self, direction: np.ndarray) -> float:
-        """V where it stops to fall in one direction."""
+        """V at the first point with V̇ ≥ 0 in one direction."""
         return float(self.heights((direction / np.linalg.norm(direction))[None, :])[0])
 
     def sampled(self) -> np.ndarray:
-        """Seeded directions, one a row, and those of the axes."""
+        """Seeded random directions and those of the axes, one a row."""
         random = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * self.size, self.size))
         return np.concatenate([random / np.linalg.norm(random, axis=1)[:, None], np.eye(self.size), -np.eye(self.size)])
 
     def lowest(self, directions: np.ndarray) -> list[np.ndarray]:
-        """Directions, refined, in which V stops to fall where it is lowest."""
+        """Refined directions in which V is lowest at the first point with V̇ ≥ 0."""
         heights = self.heights(directions)
         order = np.argsort(heights, kind="stable")[:_REFINED]
         starts = [directions[i] for i in order if np.isfinite(heights[i])]
@@ -97,7 +97,7 @@ class _Rays:
 
 
 def _first_root(row: np.ndarray) -> float:
-    """Smallest r > 0 from which on Σ row_k·r^k is not negative; infinite if there is none."""
+    """Smallest r > 0 at which Σ row_k·r^k stops being negative; infinite if there is none."""
     used = np.flatnonzero(row)
     if not len(used) or row[used[0]] > 0:
         return _NEAR
@@ -107,7 +107,7 @@ def _first_root(row: np.ndarray) -> float:
 
 
 def lowest_crossing(claim: Attraction) -> Point | None:
-    """Rational point, not the origin, where V ≤ 0 or V̇ ≥ 0, with the lowest V found; None if none is found."""
+    """Rational point other than the origin with V ≤ 0 or V̇ ≥ 0 and the lowest V found; None without one."""
     size = len(claim.variables)
     rays = _Rays(size, claim.lyapunov, claim.derivative)
     directions = rays.sampled()
@@ -120,7 +120,7 @@ def lowest_crossing(claim: Attraction) -> Point | None:
 
 
 def _rational(claim: Attraction, x: np.ndarray) -> Iterator[Point]:
-    """Points near one, or a little beyond it, that refute."""
+    """Rational points near a point, or slightly farther out, that refute the claim."""
     for beyond in _BEYOND:
         for tolerance in _TOLERANCES:
             point = Point(coordinates=_fractions(x * (1 + beyond), tolerance))
@@ -129,13 +129,13 @@ def _rational(claim: Attraction, x: np.ndarray) -> Iterator[Point]:
 
 
 def _fractions(x: np.ndarray, tolerance: float) -> tuple[Fraction, ...]:
-    """Simple fractions near coordinates; those far below the largest are zero."""
+    """Simple fractions near the coordinates; zero for those far below the largest."""
     least = 1e-9 * float(np.abs(x).max())
     return tuple(simplest(float(v), tolerance) if abs(v) > least else Fraction(0) for v in x)
 
 
 def other_equilibrium(claim: Attraction) -> Point | None:
-    """Rational point, not the origin, where the field vanishes; None if none is found."""
+    """Rational point other than the origin where the field vanishes; None if none is found."""
     size = len(claim.variables)
     field = [Arrays(f, size) for f in claim.field]
     random = np.random.default_rng(_SEED)
@@ -151,27 +151,27 @@ def other_equilibrium(claim: Attraction) -> Point | None:
 
 
 # ----------------------------------------------------------------------
-# Searched Lyapunov functions: the largest part of a shape in a region of attraction, by alternation.
+# Search for a Lyapunov function whose region of attraction contains the largest part of a shape, by alternation.
 #
-# For V < 1 on the region, fixed multipliers s and t with
+# For the region V < 1, multipliers s and t with
 #
 #     −V̇ − s·(1 − V),  1 − V − t·(β − shape)  and  V  sums of squares
 #
-# are found by `strict_proof` for the V at hand, and then V and β, the larger the better, by a programme that is linear
-# in them (W. Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). Every V is proved anew by who asks.
+# are computed by `strict_proof` for a given V. With s and t fixed, a programme linear in V and β then maximises β
+# (W. Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). The caller proves the level of every new V.
 
 _ROUNDS = 30
-_GROWTH = Fraction(1002, 1000)  # of β in a round: less is no progress
-_INSIDE = Fraction(999999, 1000000)  # of the level, that V does not exceed on the part of the shape
-_SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))  # of β where shape and level touch
-_SLACK = (Fraction(99, 100), Fraction(9, 10))  # of level and β, where multipliers are taken: at both, V can only stay
+_GROWTH = Fraction(1002, 1000)  # least growth of β in a round that continues the search
+_INSIDE = Fraction(999999, 1000000)  # share of the level that V must not exceed where shape ≤ β
+_SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))  # of β where shape touches level
+_SLACK = (Fraction(99, 100), Fraction(9, 10))  # share of level and β for the multipliers; at 1, V could not change
 _MORE = (0, 2)
-_ROOM = 1e-3  # of β, given up for a V inside of what is possible
-_GRID = 2**20  # of the coefficients of V
+_ROOM = 1e-3  # share of the largest β given up for a V with a margin
+_GRID = 2**20  # denominator of the coefficients of V
 
 
 def with_shape(region: Region, shape: Polynomial) -> Region:
-    """Region with the largest β found for which {shape ≤ β} is proved to lie in it."""
+    """Region with the largest β found for which {shape ≤ β} is proved to be a subset."""
     claim = region.proved
     if claim is None or claim.level is None:
         return region
@@ -190,12 +190,12 @@ def with_shape(region: Region, shape: Polynomial) -> Region:
 
 
 def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
-    """Region of a V of degree at most `top` with a larger part of the shape, from one that is proved.
+    """Region with a larger part of the shape, by another V of degree at most `top`, from a proved region.
 
     Parameters
     ----------
     certify : callable
-        Region that is proved for a V.
+        Proved region of a claim with another V.
     """
     best = with_shape(given, shape)
     for degree_now in range(2, top + 1, 2):
@@ -212,7 +212,7 @@ def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attr
 
 
 def _improved(region: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
-    """Claims, not yet proved, with another V, from multipliers that leave less and more slack."""
+    """Unproved claims with another V, from multipliers with small and with large slack."""
     claim, beta = region.proved, region.shape_level
     if claim is None or claim.level is None or beta is None:
         return
@@ -229,7 +229,7 @@ def _improved(region: Region, shape: Polynomial, top: int) -> Iterator[Attractio
 
 
 def _inclusion(claim: Attraction, level: Fraction, shape: Polynomial, beta: Fraction, top: int) -> Statement:
-    """That V ≤ level where shape ≤ β."""
+    """Statement that V ≤ level where shape ≤ β."""
     one = constant(len(claim.variables))
     return statement(
         claim.variables,
@@ -245,7 +245,7 @@ def _even(number: int) -> int:
 
 
 def _multiplier(statement: Statement, least: int) -> Polynomial | None:
-    """Squares that multiply the inequality in a proof of at least some degree; None without a proof."""
+    """Sum of squares that multiplies the inequality in a proof of at least a given degree; None without a proof."""
     for more in _MORE:
         proof = strict_proof(replace(statement, degree=max(statement.degree, _even(least)) + more))
         if proof is not None:
@@ -258,7 +258,7 @@ def _multiplier(statement: Statement, least: int) -> Polynomial | None:
 def _larger(
     claim: Attraction, shape: Polynomial, top: int, falling: Polynomial, inner: Polynomial
 ) -> Polynomial | None:
-    """V of degree `top` with the largest β for two multipliers; None if none is found."""
+    """V of degree `top` with the largest β for two fixed multipliers; None if none is found."""
     size = len(claim.variables)
     terms = list(monomials(size, top, 2))
     program = Program(claim.variables, decision_names(claim.variables, len(terms) + 1))
@@ -280,7 +280,7 @@ def _larger(
 
 
 def affine(fixed: Polynomial, parts: list[Polynomial]) -> dict[Exponents, Fraction]:
-    """Polynomial fixed + Σ_j decision_j·part_j in variables and decisions, as `Program.require` takes it."""
+    """Polynomial fixed + Σ_j decision_j·part_j in variables and decisions, an argument of `Program.require`."""
     whole = {(*e, *(0,) * len(parts)): c for e, c in fixed.items()}
     for j, part in enumerate(parts):
         whole |= {(*e, *(int(i == j) for i in range(len(parts)))): c for e, c in part.items()}
@@ -288,43 +288,43 @@ def affine(fixed: Polynomial, parts: list[Polynomial]) -> dict[Exponents, Fracti
 
 
 def decision_names(variables: tuple[str, ...], count: int) -> list[str]:
-    """Names that no variable has."""
+    """Names of decisions that differ from all variables."""
     prefix = "c" * (1 + max(map(len, variables)))
     return [f"{prefix}{i}" for i in range(count)]
 
 
 # ----------------------------------------------------------------------
-# Stability and regions of attraction of polynomial fields: Lyapunov functions, and the largest level proved.
+# Stability and regions of attraction of polynomial fields: Lyapunov functions, and their largest proved level.
 
 _LEVEL_SHARES = tuple(
     Fraction(s) for s in ("999999/1000000", "9999/10000", "999/1000", "99/100", "9/10", "1/2", "1/10", "1/1000")
 )
-_UNBOUNDED = tuple(Fraction(10) ** power for power in range(6, -7, -1))  # levels where nothing refutes
-_FINEST = 1e-6  # step of a bisection whose levels are of few digits
+_UNBOUNDED = tuple(Fraction(10) ** power for power in range(6, -7, -1))  # levels tried when no point refutes the claim
+_FINEST = 1e-6  # finest step for which the levels of the bisection have few digits
 
 
 def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int] = (2, 4)) -> Attraction:
-    """Decide whether every solution of x' = field(x) tends to the origin, by a polynomial Lyapunov function.
+    """Decide global asymptotic stability of the origin of x' = field(x), by a polynomial Lyapunov function.
 
     Parameters
     ----------
     field : mapping of str or Symbol to str, SymPy expression or mapping
-        For every state its rate: a polynomial in the states with rational coefficients that vanishes at the origin.
+        Rate of every state: a polynomial in the states with rational coefficients that vanishes at the origin.
     V : str, SymPy expression or mapping, optional
-        Searched unless given.
+        Lyapunov function, searched by default.
     degrees : sequence of int
-        Of V, to be tried in turn where it is searched.
+        Degrees of V that the search tries in turn.
 
     Returns
     -------
     Attraction
-        ``proved``: the origin is globally asymptotically stable. ``refuted``: by a point where V is not positive or
-        does not fall; without a given V, by another equilibrium. ``undecided`` otherwise.
+        ``proved`` if the origin is globally asymptotically stable. ``refuted`` by a point where V ≤ 0 or V̇ ≥ 0 or,
+        without a given V, by another equilibrium. ``undecided`` otherwise.
 
     Raises
     ------
     PolynomialError
-        When something cannot be read, or does not vanish at the origin.
+        When field or V is not readable, or does not vanish at the origin.
     """
     claim = _claim(field, V)
     if V is not None:
@@ -347,29 +347,29 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
 def region_of_attraction(
     field: Mapping[Any, Any], V: Any = None, *, relative: float = 1e-4, degree: int | None = None, shape: Any = None
 ) -> Region:
-    """Find the largest level ρ for which V̇ < 0 wherever V < ρ, but at the origin: then {V < ρ} is attracted by it.
+    """Find the largest level ρ with V̇ < 0 where V < ρ, except at the origin, which attracts {V < ρ}.
 
     Parameters
     ----------
     field, V
-        As for `stability`, but V solves AᵀP + PA = −I for the linearised field x' = Ax unless given.
+        As for `stability`. By default V = xᵀPx with AᵀP + PA = −I for the linearised field x' = Ax.
     relative : float
-        Width of the last step of the bisection, between proved and not proved; from 1e-6 to below 1.
+        Relative width of the final bracket of the bisection; from 1e-6 to below 1.
     degree : int, optional
-        Even: search other V of at most this degree, from the one at hand, for a larger part of the shape in the region.
+        Even degree up to which other V are searched, from the given one, for a larger part of the shape inside.
     shape : str, SymPy expression or mapping, optional
-        A polynomial that is positive but at the origin. The largest β found is proved for which shape ≤ β lies in
-        the region. Σ x_i² with a degree, none unless given.
+        A polynomial that is positive except at the origin. The largest β found is proved for which {shape ≤ β} lies in
+        the region. By default Σ x_i² if a degree is given, otherwise none.
 
     Returns
     -------
     Region
-        The largest level proved, and a point that refutes every larger one where such a point is found.
+        The largest proved level and, if found, a point that refutes every level above its value of V.
 
     Raises
     ------
     PolynomialError
-        As for `stability`, or for another width.
+        As for `stability`, or when the width or the degree is invalid.
     """
     if not _FINEST <= relative < 1:
         raise PolynomialError(
@@ -391,7 +391,7 @@ def region_of_attraction(
 
 
 def _region(claim: Attraction, relative: float) -> Region:
-    """Largest level that is proved for the V of a claim, and what refutes more."""
+    """Largest proved level for the V of a claim, and the lowest refuted level."""
     refuted = _refuted(claim)
     if refuted is None:
         proved = _proved(claim) or next(filter(None, (_proved(replace(claim, level=r)) for r in _UNBOUNDED)), None)
@@ -403,14 +403,14 @@ def _region(claim: Attraction, relative: float) -> Region:
 
 
 def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomial | None:
-    """The shape as it is read, Σ x_i² where V is searched without one, or else None."""
+    """Exact shape; by default Σ x_i² if V is searched, otherwise None."""
     if degree is not None and not (isinstance(degree, int) and degree >= 2 and degree % 2 == 0):
         raise PolynomialError(f"degree must be an even number from 2. Received {degree!r}. Give for example 4.")
     return None if shape is None and degree is None else _claim(field, shape).lyapunov
 
 
 def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
-    """The field as it is read, V or else Σ x_i²."""
+    """Claim of the exact field and V, by default Σ x_i², for the whole space."""
     names = tuple(map(str, field))
     size = len(names)
     if not names:
@@ -422,7 +422,7 @@ def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
 
 
 def _refuted(claim: Attraction) -> Attraction | None:
-    """Level just above the lowest point found where V does not fall; no level where V is not positive."""
+    """Claim refuted by the lowest point found: level just above V there, or no level where V ≤ 0."""
     refuted = replace(claim, proof=lowest_crossing(claim))
     if refuted.height is None:
         return None
@@ -448,7 +448,7 @@ def _proved(claim: Attraction, *, thorough: bool = False) -> Attraction | None:
 
 
 def _squares(statement: Statement, thorough: bool) -> SumOfSquares | None:
-    """Proof of one statement: with a margin, or where that has none, on a face."""
+    """Proof of one statement with a margin, or else, if `thorough`, by every method."""
     squares = strict_proof(statement)
     if squares is None and thorough:
         proof = decide(statement).proof
@@ -457,7 +457,7 @@ def _squares(statement: Statement, thorough: bool) -> SumOfSquares | None:
 
 
 def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attraction | None:
-    """Largest level that is proved, a simple number just below the refuted ones where it can be."""
+    """Claim of the largest proved level, if possible a simple number just below the refuted level."""
     best, above = None, ceiling
     for share in _LEVEL_SHARES:
         best = _proved(replace(claim, level=just_below(share * ceiling)))
@@ -478,7 +478,7 @@ def _bisected(claim: Attraction, ceiling: Fraction, relative: float) -> Attracti
 
 
 def _of_linearised(claim: Attraction) -> dict[Exponents, Fraction] | None:
-    """V = xᵀPx with AᵀP + PA = −I, exactly; None where there is no such V > 0."""
+    """Exact V = xᵀPx with AᵀP + PA = −I; None if there is no positive one."""
     size = len(claim.variables)
     units = [tuple(int(i == j) for j in range(size)) for i in range(size)]
     A = [[f.get(u, Fraction(0)) for u in units] for f in claim.field]
@@ -500,7 +500,7 @@ def _of_linearised(claim: Attraction) -> dict[Exponents, Fraction] | None:
 
 
 def _searched(claim: Attraction, top: int) -> Attraction | NoSolution:
-    """Claim with a V of some degree for which V − Σ x_i² and −V̇ have squares, or why none is found."""
+    """Claim with a V of given degree for which V − Σ x_i² and −V̇ are sums of squares, or the reason without one."""
     size = len(claim.variables)
     terms = list(monomials(size, top, 2))
     program = Program(claim.variables, decision_names(claim.variables, len(terms)))

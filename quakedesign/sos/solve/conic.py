@@ -1,4 +1,4 @@
-"""Conic programmes stated in cvxpy and solved by Clarabel: once, or compiled with parameters."""
+"""Conic programmes stated in cvxpy and solved by Clarabel, once or compiled with parameters."""
 
 import warnings
 from collections.abc import Iterator, Sequence
@@ -23,14 +23,14 @@ _handed: ContextVar["dict[int, cp.Problem] | None"] = ContextVar("handed", defau
 def stated_problems() -> "Iterator[list[cp.Problem]]":
     """Collect the cvxpy problems solved within a block, each once, in the order of their first solution.
 
-    Parameters, variables and multipliers have the values of the last solve. To be handed over, all is solved in this
-    process, whatever `workers` says. The fastest backend to compile them is `canon_backend="COO"`. A statement about
-    one polynomial (`sos.prove`) is no cvxpy problem: compiling it would take several times as long as solving it.
+    Parameters, variables and multipliers have the values of the last solve. Within the block all problems are solved in
+    this process, regardless of `workers`. The fastest backend to compile them is `canon_backend="COO"`. A statement
+    about one polynomial (`sos.prove`) is no cvxpy problem, as compiling it would take several times its solution time.
 
     Yields
     ------
     list of cvxpy.Problem
-        Complete when the block ends.
+        Filled when the block ends.
     """
     by_number: dict[int, cp.Problem] = {}
     problems: list[cp.Problem] = []
@@ -43,19 +43,19 @@ def stated_problems() -> "Iterator[list[cp.Problem]]":
 
 
 def handing_back() -> bool:
-    """Whether somebody waits for the problems that are solved."""
+    """Whether a `stated_problems` block is active."""
     return _handed.get() is not None
 
 
 def hand_back(problem: "cp.Problem") -> None:
-    """Note a problem that is about to be solved."""
+    """Record a problem for the active `stated_problems` block."""
     handed = _handed.get()
     if handed is not None:
         handed.setdefault(id(problem), problem)
 
 
 def solve(problem: "cp.Problem", **chosen: Any) -> bool:
-    """Run Clarabel; whether there is an answer worth looking at. Its status is no verdict."""
+    """Run Clarabel; whether its solution is usable. Its status is no verdict."""
     import cvxpy as cp
 
     hand_back(problem)
@@ -74,7 +74,7 @@ class Compiled:
     Parameters
     ----------
     problem : cvxpy.Problem
-        Disciplined in its Parameters (DPP), none of which is a term of the objective by itself.
+        DPP-compliant (disciplined parametrised programming); no Parameter alone is a term of the objective.
     """
 
     def __init__(self, problem: "cp.Problem") -> None:
@@ -83,7 +83,7 @@ class Compiled:
         self._solvers: dict[str, Any] = {}
 
     def data(self) -> tuple[dict[str, Any], Any, Any]:
-        """Cone form for the present Parameters, as `cvxpy.Problem.get_problem_data` returns it."""
+        """Cone form for the present Parameters, in the format of `cvxpy.Problem.get_problem_data`."""
         form, chain, inverse = self._form
         program = form["param_prob"]
         if not program.total_param_size:
@@ -103,7 +103,7 @@ class Compiled:
 
     @cached_property
     def _form(self) -> tuple[dict[str, Any], Any, Any]:
-        """What is compiled once, with the maps from the Parameters to the numbers of the cone form."""
+        """Compiled cone form, with the maps from the Parameters to its numbers."""
         import cvxpy as cp
 
         form, chain, inverse = self.problem.get_problem_data(
@@ -112,13 +112,13 @@ class Compiled:
         return form, chain, inverse
 
     def solve(self, accuracy: float = 1e-8, *, anew: bool = True) -> bool:
-        """Whether Clarabel has an answer worth looking at; variables and constraints then have their values.
+        """Run Clarabel; whether its solution is usable. Variables and constraints then have their values.
 
         Parameters
         ----------
         anew : bool
-            False goes on with the solver of the last call, faster by what it has ordered and scaled; its last digits
-            then depend on what was solved before.
+            False reuses the solver of the last call with its ordering and scaling, which is faster; rounding then
+            depends on the problems solved before.
         """
         hand_back(self.problem)
         data, chain, inverse = self.data()
@@ -132,9 +132,9 @@ class Compiled:
 
 
 def in_cones(shapes: Sequence[MomentProgram], moments: "cp.Expression") -> "list[cp.Constraint]":
-    """cvxpy constraints on functionals, one a shape, below each other: zero on its relations, ⪰ 0 on its blocks.
+    """cvxpy constraints on stacked functionals, one per shape: zero on its relations, ⪰ 0 on its blocks.
 
-    Blocks of one size are one constraint, which compiles some ten times faster than one for every block.
+    Blocks of equal size share one constraint, which compiles about ten times faster than one per block.
     """
     import cvxpy as cp
 

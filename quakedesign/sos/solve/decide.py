@@ -1,4 +1,4 @@
-"""Search for a proof of one statement: solve, round, refute by a point, reduce to a face."""
+"""Search for a proof of one statement: solve, round, refute by a point, restrict to a face."""
 
 from dataclasses import dataclass, field
 from fractions import Fraction
@@ -21,14 +21,14 @@ from quakedesign.sos.solve.rounding import Scaled, decimal_units, relations, rou
 
 _STRICT = 1e-7
 _ROUNDS = 4
-_ENTRIES = 50_000_000  # of half the matrix that the solver factors, dense for every block: some 6 GB
+_ENTRIES = 50_000_000  # limit for half the matrix that the solver factors, dense for every block: about 6 GB
 _ACCURACIES = (1e-9, 1e-12)
 KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
 
 @dataclass
 class StatementSearch:
-    """One statement under way."""
+    """Search for a proof of one statement, in scaled variables."""
 
     original: Statement
     moved: Scaled = field(init=False)
@@ -45,7 +45,7 @@ class StatementSearch:
         self.blocks = modulo(initial_blocks(self.statement), self.relations)
 
     def run(self) -> Proof | None:
-        """Checked proof, or None."""
+        """Checked proof of the statement; None if none is found."""
         solution, program = self._solve(self.blocks)
         if solution is not None and (solution.margin > 0 or self._determined()):
             proof = self._finish(rounded(self.statement, self.blocks, solution))
@@ -68,7 +68,7 @@ class StatementSearch:
         return proof
 
     def _determined(self) -> bool:
-        """Whether the target fixes the Gram matrices, so that exact arithmetic alone decides."""
+        """Whether the target determines the Gram matrices, so that exact arithmetic alone decides."""
         keys = [
             tuple(a + b for a, b in zip(left, right, strict=True))
             for block in self.blocks
@@ -91,7 +91,7 @@ class StatementSearch:
         return program.solve(target, accuracy), program
 
     def _hints(self, solution: MomentSolution | None) -> list[list[float]]:
-        """First moments of the functional, where it has a mass."""
+        """Normalised first moments of the functional, if its mass is positive."""
         if solution is None:
             return []
         size = len(self.statement.variables)
@@ -102,7 +102,7 @@ class StatementSearch:
         return [[solution.functional[u] / mass for u in units]]
 
     def _finish(self, proof: Proof | None) -> Proof | None:
-        """Proof of the statement as it was asked, checked."""
+        """Checked proof of the original statement, from one in scaled variables."""
         if proof is None:
             return None
         restored = self.moved.restore(proof)
@@ -111,7 +111,7 @@ class StatementSearch:
         return restored if holds(self.original, restored) else None
 
     def _outside(self, program: MomentProgram | None) -> Proof | None:
-        """Refutation by a monomial of the target that nothing can produce."""
+        """Refutation by a monomial of the target that no product or equality contains."""
         covered = set() if program is None else set(program.index)
         target = self.statement.target
         for e in target:
@@ -124,7 +124,7 @@ class StatementSearch:
         interior = program.interior(target, solution.margin / 2)
         for values in (interior, solution.functional) if interior is not None else (solution.functional,):
             for bits in (6, 10, 14, 18, 22, 26, 32, 40):
-                # Functional rounded to multiples of 2^-bits of its largest value, exactly zero on the equalities.
+                # Round the functional to multiples of 2^-bits of its largest value; make it zero on the equalities.
                 size = max(abs(v) for v in values.values())
                 exact = {e: nearest(v / size, 2**bits) for e, v in values.items()}
                 if self.relations:
@@ -168,9 +168,9 @@ class StatementSearch:
 
 
 def strict_proof(statement: Statement) -> SumOfSquares | None:
-    """Checked identity for a statement that holds with a margin, in monomials; None if none is found.
+    """Checked identity in monomials for a statement that holds with a margin; None if none is found.
 
-    Whether the multiplier is positive is the caller's question.
+    The caller must check that the multiplier is positive.
     """
     search = StatementSearch(statement)
     solution = search._solve(search.blocks)[0]
@@ -185,12 +185,12 @@ def strict_proof(statement: Statement) -> SumOfSquares | None:
 
 
 def initial_blocks(statement: Statement) -> list[Block]:
-    """Blocks after the exact reduction, split by sign symmetry; among forms only squares of the target's degree.
+    """Blocks after the exact reduction, split by sign symmetry; for forms, only squares of the target's degree.
 
     Raises
     ------
     PolynomialError
-        When they are more than a solver has the memory for.
+        When the blocks exceed the memory limit of the solver.
     """
     return list(_blocks_of(statement.structure))
 
@@ -222,7 +222,7 @@ def block_sizes(statement: Statement) -> dict[str, list[int]]:
 
 
 def _project(values: dict[Exponents, Fraction], rows: Any) -> dict[Exponents, Fraction]:
-    """Nearest-looking values that satisfy every relation: the pivots follow from the others."""
+    """Values that satisfy every relation: those at the pivots are replaced, the others stay."""
     keys = sorted({e for r in rows for e in r} | set(values), key=lambda e: (sum(e), e), reverse=True)
     index = {e: i for i, e in enumerate(keys)}
     matrix = [[fmpq(0)] * len(keys) for _ in rows]

@@ -1,6 +1,6 @@
 """Search for a proof of positivity: methods, multipliers, and the undecided answer.
 
-Methods: Gram matrices by conic programming with rounding, and factorisation into a square and a rest.
+Methods: Gram matrices by conic programming with rounding, and factorisation into a square and a cofactor.
 Multipliers are powers of the sum of squares, or sums of squares found in floating point. Exact arithmetic
 decides every proof.
 """
@@ -46,18 +46,18 @@ from quakedesign.sos.solve.joint import Demand, joint_program
 from quakedesign.sos.solve.rounding import scaled
 
 # ----------------------------------------------------------------------
-# Multipliers of a polynomial on ℝⁿ: powers of the sum of squares, and sums of squares that are searched for it.
+# Multipliers of a polynomial P on ℝⁿ: powers of the sum of squares, and sums of squares that are searched for P.
 #
-# A sum of squares σ of a degree with σ·P a sum of squares is a linear question. σ is found in floating point, in scaled
-# variables, then rounded, and proved to be a sum of squares; whether σ·P is one is decided exactly by who asks.
+# A sum of squares σ of given degree for which σ·P is one too is the solution of a linear conic programme. σ is computed
+# in floating point and scaled variables, rounded, and proved to be a sum of squares. The caller decides σ·P exactly.
 
-_TERMS = 40  # of σ, so that the programme is solved within seconds
-_GRID = 2**8  # of its coefficients
-_LEAST = 1e-5  # margin of σ, whose coefficients are at most one
+_TERMS = 40  # most terms of σ, so that the programme is solved within seconds
+_GRID = 2**8  # denominator of its coefficients
+_LEAST = 1e-5  # least margin of σ, whose coefficients are at most one
 
 
 def searched(variables: tuple[str, ...], polynomial: Polynomial, top: int) -> Polynomial | None:
-    """Sum of squares σ of one degree, a form where P is one, for which σ·P may be one; None if none is found."""
+    """Sum of squares σ of given degree for which σ·P may be one; a form if P is one. None if none is found."""
     moved = scaled(statement(variables, polynomial))
     target = moved.statement.polynomial
     used = [i for i in range(len(variables)) if any(e[i] for e in target)]
@@ -91,12 +91,12 @@ def _demand(variables: tuple[str, ...], parts: Sequence[Polynomial], margin: Pol
 
 
 class Method(ABC):
-    """A search that may end in a proof; exact arithmetic decides whether it is one.
+    """A search method for proofs, whose proposals are checked in exact arithmetic.
 
     Attributes
     ----------
     order : int
-        Lower ones, which are cheaper, are tried first.
+        Rank by cost; the cheapest method, with the lowest order, is tried first.
     """
 
     name: ClassVar[str]
@@ -104,21 +104,21 @@ class Method(ABC):
 
     @abstractmethod
     def propose(self, statement: Statement) -> Proof | None:
-        """Proof of exactly this statement, which is not that zero is a sum of squares; None if none is found."""
+        """Proof of exactly this statement, whose target is nonzero; None if none is found."""
 
 
 @cache
 def methods() -> tuple[Method, ...]:
-    """Every method, in the order in which they are tried."""
+    """All methods, in the order in which they are tried."""
     return SquareFactor(), Conic()
 
 
 # ----------------------------------------------------------------------
-# Questions about positivity, answered with a proof or with ``undecided``.
+# Decisions about positivity, with a proof or ``undecided``.
 
 _GROWTH = (0, 2)
 _SEARCHED = (2, 4)  # degrees of searched multipliers
-_LARGEST_RETRY = 60  # monomials in a basis, so that a second attempt ends in seconds
+_LARGEST_RETRY = 60  # most monomials in a basis for a further attempt, so that it ends within seconds
 
 
 def prove(
@@ -131,7 +131,7 @@ def prove(
     products: bool | None = None,
     degree_bound: int | None = None,
 ) -> Answer:
-    """Decide whether a polynomial is a sum of squares, or has such a proof of positivity on a set.
+    """Decide whether a polynomial is a sum of squares, or has a sum-of-squares proof of positivity on a set.
 
     Parameters
     ----------
@@ -140,28 +140,28 @@ def prove(
     on : sequence of str or SymPy relation
         Constraints of the set such as ``"x >= 0"``, ``"x^2 + y^2 <= 1"``, ``"x*y == 1"``; ℝⁿ unless given.
     multiplier : str, SymPy expression or mapping, optional
-        multiplier · polynomial is decided instead; ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
-        for forms on the orthant) up to the third; on ℝⁿ for what is left of the polynomial beside squares, in its
-        variables, and before the first and the second power a sum of squares of that degree that is searched for it.
+        multiplier · polynomial is decided instead. ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
+        for forms on the orthant) up to the third. On ℝⁿ the variables are those of the squarefree cofactor of the
+        polynomial, and a sum of squares searched for it is tried before the first and second power, of equal degree.
     variables : sequence of str or Symbol, optional
-        Their order; in order of appearance unless given.
+        Variables in order; by default in order of appearance.
     margin : rational, optional
         polynomial − margin·Σ x_i^d (forms of degree d) or − margin·(1 + Σ x_i^d) is decided instead.
     products : bool, optional
-        All squarefree products of inequalities if True, none if False; unless given, products of variables only.
+        All squarefree products of inequalities if True, none if False; by default products of variables only.
     degree_bound : int, optional
-        Largest degree of a summand. Unless given the smallest even one that fits is tried, and on a constrained set
-        the next even one.
+        Largest degree of a summand. By default the smallest even degree possible and, on a constrained set, also the
+        next even degree.
 
     Returns
     -------
     Answer
-        Its ``verdict`` is ``sos``, ``not-sos``, ``negative`` or ``undecided``, and only checked proofs are returned.
+        Its ``verdict`` is ``sos``, ``not-sos``, ``negative`` or ``undecided``; every proof returned is checked.
 
     Raises
     ------
     PolynomialError
-        When the input cannot be read, or the multiplier is not shown to be positive.
+        When the input is not readable, or the multiplier is not proved to be positive.
     """
     start = perf_counter()
     names, given, inequalities, equalities, factor = read(polynomial, on, multiplier, variables)
@@ -191,7 +191,7 @@ def prove(
 
 
 def _largest_basis(statement: Statement) -> int:
-    """Monomials up to half the degree; on ℝⁿ only of what is left beside squares, in its variables."""
+    """Number of monomials up to half the degree; on ℝⁿ for the squarefree cofactor and its variables."""
     if statement.inequalities or statement.equalities or not statement.target:
         return _basis_size(statement.degree, len(statement.variables))
     rest = square_factor(statement.target, len(statement.variables))[1]
@@ -203,12 +203,12 @@ def _basis_size(top: int, variables: int) -> int:
 
 
 def decide(statement: Statement) -> Answer:
-    """Search for a proof of exactly one statement.
+    """Search for a proof of exactly the given statement.
 
     Raises
     ------
     PolynomialError
-        When the multiplier is not shown to be positive.
+        When the multiplier is not proved to be positive.
     """
     squares, start = _squares_of_multiplier(statement), perf_counter()
     none = Answer(statement=statement, proof=None, blocks=block_sizes(statement), versions=versions())
@@ -220,7 +220,7 @@ def decide(statement: Statement) -> Answer:
 
 
 def _decides(answer: Answer) -> bool:
-    """Whether a proof is one, as far as it can be checked with limited work."""
+    """Whether the proof of an answer is valid and can be checked within the work budget."""
     try:
         return answer.check()
     except WorkError:
@@ -228,7 +228,7 @@ def _decides(answer: Answer) -> bool:
 
 
 def versions() -> dict[str, str]:
-    """Versions of what an answer rests on."""
+    """Versions of the packages on which an answer depends."""
     return {name: version(name) for name in ("quakedesign", "clarabel", "python-flint")}
 
 
@@ -248,7 +248,7 @@ def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
 
 
 def _multipliers(names: Any, polynomial: Any, factor: Any, inequalities: Any, equalities: Any) -> Iterator[Any]:
-    """Multipliers to try: the given one, or one, then searched ones and powers of growing degree."""
+    """Multipliers to try: the given one, or else 1, searched multipliers and powers of increasing degree."""
     if factor != "auto":
         yield factor
         return
@@ -271,7 +271,7 @@ def _multipliers(names: Any, polynomial: Any, factor: Any, inequalities: Any, eq
 
 
 def _squares_of_multiplier(claim: Statement) -> Any:
-    """The multiplier as a sum of squares, unless its coefficients show that it is positive."""
+    """Sum of squares of the multiplier; empty if its coefficients show that it is positive."""
     if multiplier_is_positive(claim, ()):
         return ()
     own = statement(
@@ -294,7 +294,7 @@ __all__ = ["decide", "from_sympy", "prove"]
 
 
 class Conic(Method):
-    """Solve, round, look for a point, refute, pass to a face; see `quakedesign.sos.solve.decide`."""
+    """Solve, round, search for a point, refute, restrict to a face; see `quakedesign.sos.solve.decide`."""
 
     name: ClassVar[str] = "conic"
     order: ClassVar[int] = 2
@@ -309,15 +309,15 @@ class Conic(Method):
 
 
 class SquareFactor(Method):
-    """Proof for s²·r from one for r."""
+    """Proof for s²·r from a proof for r."""
 
     name: ClassVar[str] = "square-factor"
     order: ClassVar[int] = 1
 
     def propose(self, claim: Statement) -> SumOfSquares | None:
-        """See `Method.propose`; None as well where r has no sum of squares.
+        """See `Method.propose`; None also if r is no sum of squares.
 
-        A square in the multiplier may be what makes r one, so that the polynomial's own is tried alone as well.
+        A square factor of the multiplier may be needed for r, so the polynomial is also factored without multiplier.
         """
         count = len(claim.variables)
         whole = replace(claim, polynomial=claim.target, multiplier=constant(count))
@@ -328,7 +328,7 @@ class SquareFactor(Method):
 
 
 def _multiplied(root: Polynomial, left: Statement, bound: int) -> SumOfSquares | None:
-    """Proof of what is left beside root², up to a degree, times root²."""
+    """Proof for root² times the given statement, from a proof of the statement with a degree bound."""
     inner = decide(replace(left, degree=bound)).proof if bound >= 0 else None
     if not isinstance(inner, SumOfSquares):
         return None

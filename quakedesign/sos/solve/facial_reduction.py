@@ -1,6 +1,6 @@
 """Facial reduction: rational zeros of the target, or a rational kernel of the Gram matrix, shrink the basis.
 
-A wrong guess costs time, never truth: the proof is checked against the full statement in the end.
+A wrong guess costs time only, as the final proof is checked against the full statement.
 """
 
 import math
@@ -23,28 +23,28 @@ _SIMPLE = 20_000
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """One block of the search."""
+    """One Gram matrix of the search: product of inequalities and basis."""
 
-    product: tuple[int, ...]  # Inequalities multiplied
+    product: tuple[int, ...]  # Indices of the multiplied inequalities
     weight: Polynomial  # Their product
-    monomials: tuple[Exponents, ...]  # m (length n)
-    face: tuple[Row, ...] | None = None  # The basis is face·m (r × n); m itself unless given
+    monomials: tuple[Exponents, ...]  # Vector m (length n)
+    face: tuple[Row, ...] | None = None  # r × n; the basis b is face·m, or m if None
 
     @property
     def basis(self) -> tuple[Element, ...]:
-        """Entries of b."""
+        """Entries of the basis b."""
         if self.face is None:
             return self.monomials
         return tuple(as_element(dict(zip(self.monomials, row, strict=True))) for row in self.face)
 
     def shape(self) -> Shape:
-        """The block in floats."""
+        """Block in floating point."""
         face = None if self.face is None else [[float(v) for v in row] for row in self.face]
         weight = {e: float(c) for e, c in self.weight.items()}
         return Shape(weight=weight, basis=self.monomials, face=face)
 
     def restricted(self, kernel: Sequence[Row]) -> "Block | None":
-        """Block whose Gram matrix has the given vectors (in the present basis) in its kernel; None if empty."""
+        """Block whose Gram matrix has the given vectors, in the present basis, in its kernel; None if empty."""
         if not kernel:
             return self
         reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in kernel]).rref()
@@ -79,7 +79,7 @@ class Block:
         )
 
     def at(self, point: Sequence[Fraction]) -> Row:
-        """Basis at a point."""
+        """Values of the basis at a point."""
         values = [monomial(point, e) for e in self.monomials]
         if self.face is None:
             return tuple(values)
@@ -98,9 +98,9 @@ def at_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[Fraction]]) -> li
 
 
 def at_real_zeros(blocks: Sequence[Block], zeros: Sequence[Sequence[float]], scale: Sequence[Fraction]) -> list[Block]:
-    """Blocks whose squares vanish at real zeros, as far as the basis is there proportional to a rational vector.
+    """Blocks whose squares vanish at real zeros where the basis is proportional to a rational vector.
 
-    A zero such as (√2, 1) need not be rational itself: within a class of equal parity its square roots cancel.
+    The zero itself may be irrational, such as (√2, 1): within a parity class its square roots cancel.
     """
     reduced = []
     for block in blocks:
@@ -130,7 +130,7 @@ def _float_value(polynomial: Polynomial, point: Sequence[float]) -> float:
 
 
 def modulo(blocks: Sequence[Block], relations: Sequence[Polynomial]) -> list[Block]:
-    """Blocks without the monomials that multiples of the equalities express by lower ones."""
+    """Blocks without the monomials that multiples of the equalities express by lower monomials."""
     return [b for b in (_modulo(block, relations) for block in blocks) if b is not None]
 
 
@@ -153,7 +153,7 @@ def _modulo(block: Block, relations: Sequence[Polynomial]) -> Block | None:
 def at_kernels(
     blocks: Sequence[Block], grams: Sequence[np.ndarray], threshold: float, tolerance: float, scale: Sequence[Fraction]
 ) -> list[Block] | None:
-    """Blocks without the numerical kernels of their Gram matrices, rounded; None if there is no kernel."""
+    """Blocks without the rounded numerical kernels of their Gram matrices; None if there is no kernel."""
     reduced, smaller_face = [], False
     for block, gram in zip(blocks, grams, strict=True):
         kernel = _kernel(block, gram, threshold, tolerance, scale)
@@ -165,7 +165,7 @@ def at_kernels(
 
 
 def _kernel(block: Block, gram: np.ndarray, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:
-    """Rational basis of the eigenspace of small eigenvalues, in the simplest fractions of the unscaled variables."""
+    """Rational basis of the eigenspace of small eigenvalues, in simplest fractions of the unscaled variables."""
     values, vectors = np.linalg.eigh(gram)
     space = vectors[:, values < threshold].T
     if not len(space):
@@ -181,7 +181,7 @@ def _kernel(block: Block, gram: np.ndarray, threshold: float, tolerance: float, 
 
 
 def _units(block: Block, scale: Sequence[Fraction]) -> list[Fraction]:
-    """Size of every basis element in the scaled variables; of its own leading monomial on a face."""
+    """Unit of every basis element in the scaled variables; on a face, the unit of its leading monomial."""
     sizes = [monomial(scale, e) for e in block.monomials]
     if block.face is None:
         return sizes
@@ -189,7 +189,7 @@ def _units(block: Block, scale: Sequence[Fraction]) -> list[Fraction]:
 
 
 def _entry(value: float, unit: Fraction, tolerance: float) -> Fraction:
-    """Simplest fraction near value·unit, over unit."""
+    """Simplest fraction near value·unit, divided by the unit."""
     if abs(value) < max(tolerance, 1e-7):
         return Fraction(0)
     return simplest(value * float(unit), tolerance) / unit
@@ -204,7 +204,7 @@ def simplest(value: float, tolerance: float) -> Fraction:
 
 
 def just_below(value: Fraction) -> Fraction:
-    """Fraction of few digits within a part in ten million below a number, less than a bisection steps."""
+    """Fraction of few digits below a positive number, by at most 1e-7 relative, less than a bisection step."""
     return simplest_between(value * (1 - Fraction(1, 10**7)), value)
 
 

@@ -1,10 +1,10 @@
 """Facial reduction with decisions: linear equations that membership in a cone forces on the decisions.
 
 A polynomial p(d), affine in the decisions d, is in the span of the products that the cone allows. A monomial that no
-product reaches therefore has the coefficient zero, an equation on d. Its exact solution may empty further
-coefficients; then diagonal Gram entries vanish (`reduction`), and fewer monomials are reached: this is repeated until
-nothing changes. Where a Gram matrix has a numerical kernel for every d, its rounded kernel restricts the basis in the
-same way; such equations are a guess. What follows from them is proved for the decisions found, as all else.
+product contains therefore has the coefficient zero, which is an equation on d. Its exact solution may cancel further
+coefficients; then diagonal Gram entries vanish (`reduction`), and the products contain fewer monomials. This is
+repeated until nothing changes. If a Gram matrix has a numerical kernel for every d, the rounded kernel restricts the
+basis likewise. These equations are a guess, but the resulting decisions are proved like all others.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,16 +29,16 @@ Affine = tuple[Fraction, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
-    """One polynomial p(d) that must be in a cone, as far as it is reduced."""
+    """One polynomial p(d) that must be in a cone, after the reductions so far."""
 
-    # Constant part of p and the part of every decision; empty for those that are eliminated
+    # Constant part of p and the part of every decision; empty for eliminated decisions
     parts: Sequence[Polynomial]
-    template: Statement  # The cone; its polynomial only says which monomials may occur
-    blocks: Sequence[Block] | None = None  # Faces, in place of the blocks that follow from the template
+    template: Statement  # The cone; its polynomial only lists the monomials that may occur
+    blocks: Sequence[Block] | None = None  # Faces that replace the blocks of the template
 
     @cached_property
     def shape(self) -> MomentProgram | None:
-        """The cone in floats; None where only zero is in it."""
+        """The cone in floating point; None if it contains only zero."""
         rows = [{e: float(c) for e, c in r.items()} for _, _, r in relations(self.template)]
         if not self.present and not rows:
             return None
@@ -47,7 +47,7 @@ class Requirement:
 
     @property
     def reached(self) -> Mapping[Exponents, int]:
-        """Monomials that a product or a multiple of an equality may have."""
+        """Monomials that products and multiples of equalities may contain."""
         return {} if self.shape is None else self.shape.index
 
     @property
@@ -57,25 +57,25 @@ class Requirement:
         return modulo(initial_blocks(self.template), multiples) if self.blocks is None else self.blocks
 
     def coefficient(self, e: Exponents) -> Affine:
-        """Coefficient of a monomial."""
+        """Coefficient of a monomial, affine in the decisions."""
         return tuple(part.get(e, Fraction(0)) for part in self.parts)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Forced:
-    """Equations on the decisions, solved, and the requirements without the decisions that they eliminate."""
+    """Solved equations on the decisions, and the requirements without the eliminated decisions."""
 
     requirements: tuple[Requirement, ...]
-    solved: Mapping[int, Affine] = field(default_factory=dict)  # Decisions that follow from the others
-    reasons: tuple[str, ...] = ()  # A sentence for every equation, in the order in which they were found
+    solved: Mapping[int, Affine] = field(default_factory=dict)  # Eliminated decisions as functions of the others
+    reasons: tuple[str, ...] = ()  # One sentence per equation, in the order of elimination
     contradiction: bool = False  # Whether the last equation has no solution
 
     def completed(self, values: Sequence[Fraction]) -> list[Fraction]:
-        """Decisions that satisfy every equation, from those that are free."""
+        """Decisions that satisfy every equation, from the free ones among the values."""
         return [_value(self.solved[j], values) if j in self.solved else v for j, v in enumerate(values)]
 
     def reduced(self, names: Sequence[str]) -> "Forced":
-        """Requirements after all equations that monomials out of reach force."""
+        """Requirements after all equations from monomials that no product contains."""
         present, before = self, -1
         while len(present.reasons) > before and not present.contradiction:
             before = len(present.reasons)
@@ -87,7 +87,7 @@ class Forced:
         return present
 
     def on_faces(self, faces: Sequence[Sequence[Block] | None], names: Sequence[str]) -> "Forced":
-        """Requirements on faces, where there are any, after all equations that the span of their products forces."""
+        """Requirements restricted to the given faces, after all equations from the span of their products."""
         within = (
             r if b is None else replace(r, blocks=tuple(b)) for r, b in zip(self.requirements, faces, strict=True)
         )
@@ -101,7 +101,7 @@ class Forced:
         return present.reduced(names)
 
     def refuted(self) -> str:
-        """Requirement with a monomial that squares alone produce, and whose coefficient is negative; else nothing."""
+        """Sentence on a monomial that only squares produce, but with a negative coefficient; empty without one."""
         for k, need in enumerate(self.requirements):
             system = System(need.template, need.present)
             mixed = {e for _, _, r in system.relations for e in r}
@@ -114,7 +114,7 @@ class Forced:
         return ""
 
     def _with(self, equation: Affine, rule: str, names: Sequence[str]) -> "Forced":
-        """One more equation, equation·(1, d) = 0."""
+        """Result of one more equation, equation·(1, d) = 0."""
         if self.contradiction or not any(equation):
             return self
         pivot = next((j for j, c in enumerate(equation[1:]) if c), None)
@@ -152,7 +152,7 @@ def _value(affine: Affine, values: Sequence[Fraction]) -> Fraction:
 
 
 def _annihilators(need: Requirement) -> Iterable[dict[Exponents, Fraction]]:
-    """Basis of the functionals on the monomials that vanish on every product of a face."""
+    """Basis of the functionals that vanish on every product of a face."""
     columns = [dict(c) for c in {frozenset(c.items()) for c in System(need.template, need.present).columns}]
     keys = sorted({e for c in (*columns, *need.parts) for e in c})
     if not columns:
@@ -172,7 +172,7 @@ def _monomial(variables: Sequence[str], e: Exponents) -> str:
 
 
 def _sentence(equation: Affine, names: Sequence[str]) -> str:
-    """Affine function of the decisions."""
+    """Text of an affine function of the decisions."""
     terms = [(equation[0], ""), *zip(equation[1:], names, strict=True)]
     text = "".join(f" {'-' if c < 0 else '+'} {'*'.join(filter(None, (_factor(c, n), n)))}" for c, n in terms if c)
     return text.removeprefix(" + ").removeprefix(" ") or "0"

@@ -1,13 +1,13 @@
 """Decision variables with which several polynomials lie in their cones, with the largest common margin.
 
-Primal: maximise t with C_o + Σ_j x_j P_oj − t·N_o in the cone of every obligation o, and x within limits. It is stated
-from the other side,
+Primal: maximise t with C_o + Σ_j x_j P_oj − t·N_o in the cone of every obligation o, and x within bounds. The dual is
+solved instead,
 
     minimise Σ_o L_o(C_o) + Σ_j radius_j·|Σ_o L_o(P_oj)|
     subject to  Σ_o L_o(N_o) = 1,  L_o(g_S·b bᵀ) ⪰ 0,  L_o(m·h) = 0,
 
-where the unknowns are as many as monomials; t and x are the multipliers of equations. Every further limit has a
-multiplier of its own among the unknowns.
+with one unknown per monomial; t and x are the multipliers of equations. Every further bound adds its multiplier to the
+unknowns.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ _cached: dict[tuple[object, ...], "JointProgram"] = {}
 class Demand:
     """One polynomial Σ_j x_j P_j − t·N that must be in a cone."""
 
-    template: Statement  # Its set, degree and multiplier; the polynomial only says which monomials may occur
+    template: Statement  # Set, degree and multiplier; its polynomial only lists the monomials that may occur
     parts: Sequence[Polynomial]  # P_j
     margin: Polynomial  # N
 
@@ -44,22 +44,22 @@ class Demand:
 class DecisionBounds:
     """Bounds on the decisions x: |x_j| ≤ radius_j, row·x ≤ bound for every row, and Σ_j share_j|x_j| ≤ 1."""
 
-    radii: Sequence[float]  # Without effect on those that have a share
+    radii: Sequence[float]  # Ignored for decisions with a share
     rows: Sequence[Sequence[float]] = ()
     bounds: Sequence[float] = ()
-    shares: Sequence[float] = ()  # Of the first decisions, positive; none unless given
+    shares: Sequence[float] = ()  # Positive, for the first decisions; none by default
 
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Floating-point answer of a search; proves nothing."""
+    """Floating-point solution of a search, without proof."""
 
     decision: list[float]  # x_j
-    margin: float  # Largest t; negative or zero when no decision gives one
+    margin: float  # Largest t; positive if the decision has a margin
 
 
 def joint_program(demands: Sequence[Demand]) -> "JointProgram":
-    """The programme of the structure that demands have, kept from the last time that it was asked for."""
+    """Cached programme for the structure of the demands."""
     key = len(demands[0].parts), *(d.template.structure for d in demands)
     program = _cached.pop(key, None) or JointProgram(demands)
     if len(_cached) >= _MOST_CACHED:
@@ -68,12 +68,12 @@ def joint_program(demands: Sequence[Demand]) -> "JointProgram":
 
 
 class JointProgram:
-    """Programme of one structure, compiled once for every kind of limits and solved for many numbers.
+    """Programme of one structure, compiled once for every kind of bounds and solved for varying coefficients.
 
     Parameters
     ----------
     demands : sequence of Demand
-        All with the same number of parts.
+        Demands with equal numbers of parts.
     """
 
     def __init__(self, demands: Sequence[Demand]) -> None:
@@ -89,14 +89,14 @@ class JointProgram:
         Parameters
         ----------
         fixed : sequence of Polynomial, optional
-            C_o, in the monomials of the demand's template; nothing unless given.
+            C_o, in the monomials of the demand's template; zero by default.
         limits : DecisionBounds, optional
-            All |x_j| ≤ 1 unless given.
+            |x_j| ≤ 1 for all j by default.
 
         Raises
         ------
         ValueError
-            When a monomial occurs that the structure does not have.
+            When a monomial is not in the structure.
         """
         within = limits or DecisionBounds(radii=[1.0] * self._count)
         kind = len(within.bounds), len(within.shares)
@@ -114,12 +114,12 @@ class JointProgram:
         return self._stated[kind].solve(values)
 
     def _row(self, polynomials: Sequence[Mapping[Exponents, Fraction]]) -> np.ndarray:
-        """Coefficients of one polynomial for every demand, beside each other."""
+        """Concatenated coefficients of one polynomial per demand."""
         return np.concatenate([shape.vector(p) for shape, p in zip(self._shapes, polynomials, strict=True)])
 
 
 class _Stated:
-    """The programme in cvxpy for limits of one kind; all its numbers are Parameters."""
+    """cvxpy programme for one kind of bounds; all its numbers are Parameters."""
 
     def __init__(self, shapes: Sequence[MomentProgram], count: int, rows: int, shares: int) -> None:
         import cvxpy as cp
@@ -156,7 +156,7 @@ class _Stated:
 
 
 def shape_of(template: Statement) -> MomentProgram:
-    """Monomials, blocks and relations of a cone, modulo the equalities; to be read alone, as others share it."""
+    """Monomials, blocks and relations of a cone, modulo the equalities; cached and shared, so read-only."""
     return _shape_of(template.structure)
 
 

@@ -2,9 +2,9 @@
 
     minimise L(target) + 4y  subject to  L(g_S·b bᵀ) ⪰ 0 for every block,  Σ traces + y = 1,  y ≥ 0,  L(m·h) = 0.
 
-Its value t is the largest margin: target = Σ g_S·bᵀ(Z + t·I)b + Σ q·h with the dual Z ⪰ 0. One solve gives the Gram
-matrices when t > 0 and a functional that refutes when t < 0. There are as many unknowns as monomials, far fewer than
-Gram entries, and between polynomials of one shape only the cost changes.
+Its value t is the largest margin: target = Σ g_S·bᵀ(Z + t·I)b + Σ q·h with the dual Z ⪰ 0. One solution yields the
+Gram matrices if t > 0 and a refuting functional if t < 0. There is one unknown per monomial, far fewer than Gram
+entries, and between polynomials of one shape only the cost changes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,34 +23,34 @@ from scipy import sparse
 from quakedesign.sos.exact.polynomial import Exponents
 
 Array = np.ndarray
-Sided = tuple[sparse.csc_matrix, np.ndarray]  # a matrix and the right side of its equations
-_LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # keep the programme bounded where every polynomial is in the cone
+Sided = tuple[sparse.csc_matrix, np.ndarray]  # matrix and right-hand side
+_LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # bound the programme if every polynomial is in the cone
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """Numbers of one block: weight g_S and basis, all as floats."""
+    """One block in floating point: weight g_S and basis."""
 
     weight: Mapping[Exponents, float]
     basis: tuple[Exponents, ...]  # Monomials m (length n)
-    face: np.ndarray | list[list[float]] | None = None  # (r × n): The basis is face·m; m itself unless given
+    face: np.ndarray | list[list[float]] | None = None  # r × n; the basis is face·m, or m if None
 
     @property
     def size(self) -> int:
-        """Rows of the Gram matrix."""
+        """Number of rows of the Gram matrix."""
         return len(self.basis) if self.face is None else len(self.face)
 
 
 @dataclass(frozen=True, kw_only=True)
 class MomentSolution:
-    """Floating-point answer; proves nothing."""
+    """Floating-point solution, without proof."""
 
     margin: float
     # grams, moments: list of array: Q = Z + t·I and L(g_S·b bᵀ) of every block
     grams: list[np.ndarray]
     moments: list[np.ndarray]
     functional: Mapping[Exponents, float]
-    cofactors: Sequence[float] | np.ndarray  # Coefficients of the multiples of the equalities, by their rows
+    cofactors: Sequence[float] | np.ndarray  # Coefficients of the multiples of the equalities, in order
 
 
 class MomentProgram:
@@ -59,7 +59,7 @@ class MomentProgram:
     Parameters
     ----------
     relations : sequence of mapping of exponents to float
-        The multiples m·h on which L vanishes.
+        Multiples m·h of the equalities, on which L vanishes.
     """
 
     def __init__(self, blocks: Sequence[Shape], relations: Sequence[Mapping[Exponents, float]] = ()) -> None:
@@ -81,25 +81,25 @@ class MomentProgram:
         self.solver_seconds = 0.0
 
     def alone(self) -> Self:
-        """The same programme with a solver of its own, which shares nothing that changes with others."""
+        """Copy of the programme with its own solver, which shares no mutable state."""
         own = copy(self)
         own._solver = None
         return own
 
     def covers(self, target: Mapping[Exponents, object]) -> bool:
-        """Whether every monomial of a target can be produced at all."""
+        """Whether the products and relations contain every monomial of a target."""
         return all(e in self.index for e in target)
 
     def solve(self, target: Mapping[Exponents, float], accuracy: float = 1e-9) -> MomentSolution | None:
         """Largest margin for a target whose coefficients are about one; None if the solver fails.
 
-        On a set without interior the largest margin may not be attained. Then a smaller one is asked for.
+        On a set without interior the largest margin may not be attained. Then a smaller bound on it is tried.
         """
         answers = (self._answer(target, (accuracy, True), most) for most in _LARGEST_MARGINS)
         return next((self._solution(answer) for answer in answers if answer is not None), None)
 
     def margin(self, target: Mapping[Exponents, float], accuracy: float) -> float | None:
-        """The margin of `solve` alone, first without refinement of the linear systems, in two thirds of the time."""
+        """Margin of `solve` only; without refinement of the linear systems if possible, in two thirds of the time."""
         quick = self._answer(target, (accuracy, False), _LARGEST_MARGINS[0])
         if quick is not None:
             return -float(quick.z[0])
@@ -109,7 +109,7 @@ class MomentProgram:
     def _answer(
         self, target: Mapping[Exponents, float], chosen: tuple[float, bool], most: float
     ) -> DefaultSolution | None:
-        """What the solver says; None if that is not worth looking at."""
+        """Solution of the solver; None if it is not usable."""
         cost = np.append(self.vector(target), most)
         if self._solver is None or self._chosen != chosen:
             slack = [(0, len(self.keys), 1.0), (1 + self.relation_count, len(self.keys), -1.0)]
@@ -121,7 +121,7 @@ class MomentProgram:
             self._solver.update(q=cost)
         began = perf_counter()
         answer = self._solver.solve()
-        self.solver_seconds = perf_counter() - began  # its own solve_time holds the set-up of the first solve
+        self.solver_seconds = perf_counter() - began  # the solver's solve_time includes the set-up of the first solve
         return answer if useful(answer) else None
 
     def _solution(self, answer: DefaultSolution) -> MomentSolution:
@@ -146,9 +146,9 @@ class MomentProgram:
         return [clarabel.PSDTriangleConeT(s.size) for s in self.blocks]
 
     def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int) -> Sided:
-        """Sparse matrix and right side: trace, relations, further rows, then minus the localizing matrices.
+        """Sparse matrix and right-hand side: trace, relations, further rows, then minus the localizing matrices.
 
-        The unknowns are the values of L and one more; `more` has further entries.
+        The unknowns are the values of L and one more; `more` lists further entries (row, column, value).
         """
         rows, columns, values, diagonal = self.localizing
         first = equations + limits
@@ -165,7 +165,7 @@ class MomentProgram:
         ), b
 
     def interior(self, target: Mapping[Exponents, float], value: float) -> Mapping[Exponents, float] | None:
-        """Functional with L(target) = value < 0 and the largest smallest eigenvalue; None if none is found."""
+        """Functional with L(target) = value < 0 that maximises the smallest eigenvalue; None if none is found."""
         cost = self.vector(target)
         count = 1 + self.relation_count
         unit = np.concatenate([_unit_vector(s.size) for s in self.blocks])
@@ -182,7 +182,7 @@ class MomentProgram:
         return dict(zip(self.index, answer.x[:-1], strict=True))
 
     def triangles(self) -> sparse.csr_array:
-        """Sparse map from L to the upper triangles of all localizing matrices, column by column, below each other."""
+        """Sparse map from L to the stacked upper triangles of all localizing matrices, column by column."""
         rows, columns, values, diagonal = self.localizing
         size = sum(s.size * (s.size + 1) // 2 for s in self.blocks)
         plain = np.where(_marked(size, diagonal)[rows], values, values / np.sqrt(2.0))
@@ -194,12 +194,12 @@ class MomentProgram:
         return sparse.csr_array((values, (rows, columns)), shape=(self.relation_count, len(self.keys)))
 
     def vector(self, target: Mapping[Exponents, Fraction | float]) -> np.ndarray:
-        """Coefficients in the order of the monomials, as floats.
+        """Coefficients as floats, in the order of the monomials.
 
         Raises
         ------
         ValueError
-            When a monomial cannot be produced.
+            When a monomial is not in the programme.
         """
         vector = np.zeros(len(self.keys))
         for e, c in target.items():
@@ -210,7 +210,7 @@ class MomentProgram:
 
 
 def useful(answer: DefaultSolution) -> bool:
-    """Whether an answer of the solver is worth looking at; its status is no verdict."""
+    """Whether a solution of the solver is usable; its status is no verdict."""
     finite = np.all(np.isfinite(answer.x)) and np.all(np.isfinite(answer.z))
     return str(answer.status) in _USEFUL and bool(finite)
 
@@ -230,7 +230,7 @@ def _marked(size: int, places: np.ndarray) -> np.ndarray:
 
 
 def _by_columns(entries: Array, rows: Array, columns: Array, shape: tuple[int, int]) -> sparse.csc_matrix:
-    """Sparse matrix with entries in one place added up, in a third of the time that SciPy takes for a small one."""
+    """Sparse matrix that sums duplicate entries; for small matrices three times as fast as SciPy."""
     places = columns * shape[0] + rows
     order = np.argsort(places, kind="stable")
     places = places[order]
@@ -243,7 +243,7 @@ def _by_columns(entries: Array, rows: Array, columns: Array, shape: tuple[int, i
 def _localizing(
     blocks: Sequence[Shape], entries: list[tuple[Array, Array]], where: Array, width: int
 ) -> tuple[Array, ...]:
-    """Rows, columns and values of all localizing matrices below each other, and the rows of their diagonals."""
+    """Rows, columns and values of all stacked localizing matrices, and the rows of their diagonals."""
     rows, columns, values, diagonal = [], [], [], []
     start = first = 0
     for block, (exponents, factors) in zip(blocks, entries, strict=True):
@@ -266,13 +266,13 @@ def _localizing(
 
 
 def options(accuracy: float) -> dict[str, float]:
-    """What Clarabel is asked for, by the names of its settings."""
+    """Tolerances and options of Clarabel, by the names of its settings."""
     exact = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), accuracy)
     return {"presolve_enable": False, "chordal_decomposition_enable": False, "max_iter": 100, **exact}
 
 
 def settings(accuracy: float, refined: bool = True) -> clarabel.DefaultSettings:
-    """Settings of Clarabel with these values."""
+    """Settings of Clarabel with the values of `options`."""
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.iterative_refinement_enable = refined

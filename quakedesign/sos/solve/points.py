@@ -1,7 +1,7 @@
 """Points of semialgebraic sets in floating point: minima, interior and boundary, zeros.
 
-Points are hints for a negative value or a rational zero; exact code decides. The first chapter evaluates
-polynomials and their derivatives as arrays.
+Points are candidates for a negative value or a rational zero, which exact code checks. The first chapter
+evaluates polynomials and their derivatives as arrays.
 """
 
 from collections.abc import Iterator, Sequence
@@ -17,7 +17,7 @@ from quakedesign.sos.exact.proofs import Point, holds
 from quakedesign.sos.solve.facial_reduction import simplest
 
 # ----------------------------------------------------------------------
-# A polynomial as arrays of floating point, for its values and derivatives; nothing here decides.
+# A polynomial as floating-point arrays, for its values and derivatives; without proof.
 
 
 class Arrays:
@@ -34,7 +34,7 @@ class Arrays:
         return float(self.coefficients @ np.prod(np.asarray(x) ** self.exponents, axis=1))
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Values at points, one a row."""
+        """Values at points, one point a row."""
         return np.asarray(np.prod(points[:, None, :] ** self.exponents[None, :, :], axis=2) @ self.coefficients)
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
@@ -56,14 +56,14 @@ class Arrays:
 
 
 # ----------------------------------------------------------------------
-# Points inside a set of inequalities and on its boundary, and the way from its boundary towards the inside.
+# Points in the interior and on the boundary of a set of inequalities, and directions from the boundary inwards.
 
 _SEED = 20240608
 _SAMPLES, _RETAINED = 4000, 12
 _SPREADS = (0.1, 0.3, 1.0, 3.0)  # scaled variables are about one
 _HALVINGS = 40
-_NEAR = 1e-3  # distance from which on a constraint does not count as active
-_VIOLATION = 1e-6  # relative, up to which a point is taken to be one of the set
+_NEAR = 1e-3  # distance within which a constraint counts as active
+_VIOLATION = 1e-6  # relative violation up to which a point counts as inside the set
 
 
 def _polynomial(statement: Statement) -> Arrays:
@@ -71,7 +71,7 @@ def _polynomial(statement: Statement) -> Arrays:
 
 
 def violation(statement: Statement, points: np.ndarray) -> np.ndarray:
-    """Largest relative violation of the inequalities at points (one a row); zero inside."""
+    """Largest relative violation of the inequalities at points (one a row); zero inside the set."""
     worst, size = np.zeros(len(points)), len(statement.variables)
     for g in statement.inequalities:
         scale = Arrays({e: abs(c) for e, c in g.items()}, size).at(np.abs(points))
@@ -80,7 +80,7 @@ def violation(statement: Statement, points: np.ndarray) -> np.ndarray:
 
 
 def by_value(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[Sequence[float]]:
-    """Candidates by the polynomial's value over their size, those of the set before all others."""
+    """Candidates sorted by the value of the polynomial relative to its growth, those in the set first."""
     if not candidates:
         return []
     points = np.array(candidates, dtype=float)
@@ -93,8 +93,8 @@ def by_value(statement: Statement, candidates: Sequence[Sequence[float]]) -> lis
 def lowest_samples(statement: Statement) -> list[list[float]]:
     """Points of the set, inside and on the boundary, at which the polynomial is lowest among seeded samples.
 
-    A sample outside is moved along the segment to one inside until it is on the boundary. None are found for a set that
-    is thin, such as one with equalities.
+    A sample outside is moved to the boundary, along the segment to a sample inside. No points are returned for sets
+    without interior, such as those with equalities.
     """
     if statement.equalities:
         return []
@@ -117,9 +117,9 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
 
 
 def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[float], float]]:
-    """Points strictly inside at which the polynomial is negative, from far to near, with their distance from x.
+    """Points strictly inside where the polynomial is negative, with their distances from x in decreasing order.
 
-    They lie in the direction that increases all active constraints the fastest; none where no direction does.
+    They lie in the direction in which the slowest active constraint increases fastest; none if no direction exists.
     """
     point = np.asarray(x, dtype=float)
     direction = _into(statement, point)
@@ -134,7 +134,7 @@ def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[flo
 
 
 def _into(statement: Statement, point: np.ndarray) -> np.ndarray | None:
-    """Direction, of largest coordinate at most 1, along which the slowest active constraint grows the fastest."""
+    """Direction in which the slowest active constraint increases fastest, with coordinates of at most 1."""
     rows = []
     for g in (Arrays(g, len(point)) for g in statement.inequalities):
         slope = g.gradient(point)
@@ -151,15 +151,15 @@ def _into(statement: Statement, point: np.ndarray) -> np.ndarray | None:
 
 
 # ----------------------------------------------------------------------
-# Local minima of a polynomial on its set, as hints for a negative point and for rational zeros.
+# Local minima of a polynomial on its set, as candidates for a negative point and for rational zeros.
 
 _POINT_SEED, _STARTS = 20240607, 24
-_FAR = 1e6  # from there on a minimum is taken to be at infinity
+_FAR = 1e6  # distance beyond which a minimum counts as infinite
 _SIMPLE = (Fraction(0), Fraction(1), Fraction(-1), Fraction(1, 2), Fraction(2))
 
 
 def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[list[float]]:
-    """Candidates where the polynomial nearly vanishes, after Newton steps on its gradient; different ones only."""
+    """Distinct candidates where the polynomial nearly vanishes, refined by Newton steps on its gradient."""
     p = Arrays(statement.polynomial, len(statement.variables))
     zeros: list[list[float]] = []
     for x in candidates:
@@ -174,7 +174,7 @@ def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) 
 
 
 def local_minima(statement: Statement, hints: Sequence[Sequence[float]] = ()) -> Iterator[list[float]]:
-    """Local minima of the polynomial on the set, from seeded starts; floating point, on ℝⁿ also towards infinity.
+    """Local minima of the polynomial on the set in floating point, from seeded starts; on ℝⁿ also at infinity.
 
     On ℝⁿ and orthants the homogenised polynomial is minimised on the sphere (x_i = v_i² where x_i ≥ 0); with other
     constraints SLSQP works in the variables themselves.
@@ -273,7 +273,7 @@ def _constrained(statement: Statement, hints: Sequence[Sequence[float]]) -> Iter
 def negative_point(
     statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]
 ) -> Point | None:
-    """Point of the set where the polynomial is negative, with small fractions; None if no candidate leads to one."""
+    """Point of the set with small fractions where the polynomial is negative; None if no candidate yields one."""
     for x in by_value(statement, candidates)[:12]:
         for coordinates in chain(_near(statement, x, scale), _inside(statement, x, scale)):
             point = Point(coordinates=coordinates)
@@ -283,7 +283,7 @@ def negative_point(
 
 
 def _inside(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
-    """Rational points beside a point of the boundary, rounded by less than they are inside it."""
+    """Rational points inside a boundary point, with rounding errors below their distance from it."""
     if statement.inequalities and not statement.equalities:
         for moved, distance in inwards(statement, x):
             size = max(1e-2, *map(abs, moved))
@@ -291,7 +291,7 @@ def _inside(statement: Statement, x: Sequence[float], scale: Sequence[Fraction])
 
 
 def _near(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
-    """Rational points near a point, simple ones first; on the set as far as that can be had."""
+    """Rational points near a point, simple ones first; on the set if possible."""
     for tolerance in (0.3, 0.1, 1e-2, 1e-4, 1e-7, 1e-10, 1e-14):
         near = rationalised(x, scale, tolerance)
         yield near
@@ -304,7 +304,7 @@ def _near(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -
 def on_quadric(
     equality: Polynomial, near: Sequence[Fraction], scale: Sequence[Fraction]
 ) -> Iterator[tuple[Fraction, ...]]:
-    """Rational points of a quadric near a given one: second intersections of lines through a rational point of it."""
+    """Rational points of a quadric near a given point: second intersections of lines through known rational points."""
     size = len(near)
     simple = (tuple(v / s for v, s in zip(p, scale, strict=True)) for p in product(_SIMPLE, repeat=size))
     seeds = (p for p in islice(simple, 5000) if evaluate(equality, p) == 0)
@@ -319,7 +319,7 @@ def on_quadric(
 def rational_zeros(
     statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]
 ) -> list[tuple[Fraction, ...]]:
-    """Different rational points of the set among the candidates where the polynomial vanishes exactly."""
+    """Distinct rational points of the set, near the candidates, where the polynomial vanishes exactly."""
     points = dict[tuple[Fraction, ...], None]()
     for x in candidates:
         for lead in _leads(statement, x):
@@ -343,7 +343,7 @@ def _vanishes(statement: Statement, point: tuple[Fraction, ...]) -> bool:
 
 
 def _leads(statement: Statement, x: Sequence[float]) -> list[float]:
-    """Coordinates to divide by: a zero of a form is a ray."""
+    """Coordinates by which a point is divided, as the zeros of a form are rays; 0 for no division."""
     top = degree(statement.polynomial)
     if statement.equalities or any(sum(e) != top for e in statement.polynomial):
         return [0.0]
@@ -352,7 +352,7 @@ def _leads(statement: Statement, x: Sequence[float]) -> list[float]:
 
 
 def rationalised(x: Sequence[float], scale: Sequence[Fraction], tolerance: float) -> tuple[Fraction, ...]:
-    """Simplest fractions, in the unscaled variables, within a tolerance relative to the largest coordinate."""
+    """Simplest fractions in the unscaled variables, within a tolerance relative to the largest coordinate."""
     size = max(1e-2, *map(abs, x))  # scaled variables are about one
     return tuple(
         Fraction(0) if abs(v) <= tolerance * size else simplest(v * float(s), tolerance * min(1.0, size / abs(v))) / s

@@ -35,30 +35,30 @@ if TYPE_CHECKING:
 
 _ROOM = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BITS = (4, 8, 12, 18, 24, 32)
-_KERNELS = ((1e-6, 1e-3), (1e-6, 1e-5), (1e-4, 1e-2), (1e-4, 1e-4))  # largest eigenvalue of one, and its rounding
-_ROUNDS = 3  # of numerical kernels, each on the faces of the last
+_KERNELS = ((1e-6, 1e-3), (1e-6, 1e-5), (1e-4, 1e-2), (1e-4, 1e-4))  # eigenvalue threshold and rounding tolerance
+_ROUNDS = 3  # successive restrictions to faces by numerical kernels
 
 
 @dataclass(frozen=True, kw_only=True)
 class Solution:
-    """Exact decision with a proof of every requirement."""
+    """Exact values of the decisions with a proof of every requirement."""
 
     values: Mapping[str, Fraction]  # Decision variables
-    answers: tuple[Answer, ...]  # One for every required polynomial, in order; each is ``sos``
-    objective: Fraction  # Exact value of the objective; a bound on the optimum from the feasible side
-    bound: float  # The solver's optimum, in floating point: no proof
-    # Equations that were solved beforehand: each with its requirement, and the monomial or kernel that forces it
+    answers: tuple[Answer, ...]  # One ``sos`` answer for every required polynomial, in order
+    objective: Fraction  # Exact value of the objective, attained by a feasible decision
+    bound: float  # Optimum of the solver in floating point, without proof
+    # Equations solved in advance, each with its requirement and the monomial or kernel that forces it
     forced: tuple[str, ...] = ()
 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class NoSolution:
-    """No decision was found; false where a truth value is needed, and no proof that there is none.
+    """Result of a search without a decision, false as a truth value; no proof of infeasibility.
 
     Attributes
     ----------
     reason : str
-        Which decisions are forced by which requirement, and where the search ended.
+        Decisions forced by each requirement, and the outcome of the search.
     """
 
     reason: str
@@ -85,25 +85,25 @@ class Program:
         self._objective: dict[Exponents, Fraction] = {}
 
     def __getitem__(self, decision: str) -> "cp.Expression":
-        """Decision as a cvxpy expression, for further constraints; these steer the search and are not proved."""
+        """Decision as a cvxpy expression for further constraints, which steer the search and are not proved."""
         return self._vector[self.decisions.index(decision)]
 
     def require(
         self, polynomial: Any, *, on: Sequence[Any] = (), degree_bound: int | None = None, products: bool | None = None
     ) -> None:
-        """Demand a proof that a polynomial in variables and decisions is non-negative on a set.
+        """Require a proof that a polynomial in variables and decisions is non-negative on a set.
 
         Parameters
         ----------
         polynomial : str, SymPy expression or mapping
-            Affine in the decisions. Without variables it is a linear constraint.
+            Affine in the decisions; a linear constraint if it has no variables.
         on, degree_bound, products
-            As in `quakedesign.sos.prove`; constraints without decisions.
+            As in `quakedesign.sos.prove`; the constraints must not contain decisions.
 
         Raises
         ------
         PolynomialError
-            When it is not affine in the decisions.
+            When the polynomial is not affine in the decisions.
         """
         names = self.variables + self.decisions
         _, exact, _, _, _ = read(polynomial, (), None, names)
@@ -121,7 +121,7 @@ class Program:
         self._required.append(Requirement(parts=parts, template=template))
 
     def require_definite(self, matrix: Sequence[Sequence[Any]]) -> None:
-        """Demand that a symmetric matrix of affine functions of the decisions is positive definite; proved exactly.
+        """Require an exact proof that a symmetric matrix, affine in the decisions, is positive definite.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class Program:
         Raises
         ------
         PolynomialError
-            When it is not symmetric or not affine.
+            When the matrix is not symmetric or not affine.
         """
         rows = [[self._affine(entry) for entry in row] for row in matrix]
         size = len(rows)
@@ -152,7 +152,7 @@ class Program:
         self._objective = {e: -c for e, c in self._affine(objective).items()}
 
     def problem(self) -> "cp.Problem":
-        """The cvxpy problem as it is first solved, on the faces that the requirements force."""
+        """First cvxpy problem of the search, on the faces that the requirements force."""
         self._forced = Forced(requirements=tuple(self._required)).reduced(self.decisions)
         return self._problem()
 
@@ -162,15 +162,15 @@ class Program:
         return cp.Problem(cp.Maximize(self._value(self._objective)), self._constraints(0.0))
 
     def solve(self) -> Solution | NoSolution:
-        """Exact decision with proofs, as near to the optimum as can be proved.
+        """Exact decision with proofs, as close to the optimum as a proof is found.
 
         Decisions that the requirements force, such as the coefficient of a monomial that no square produces, are
-        eliminated exactly beforehand.
+        eliminated exactly in advance.
 
         Returns
         -------
         Solution or NoSolution
-            The latter is false, has a reason, and says nothing about feasibility unless the reason does.
+            NoSolution gives a reason; it implies infeasibility only if the reason states it.
         """
         self.problem()
         base = self._forced
@@ -187,7 +187,7 @@ class Program:
         return solution or NoSolution(reason="; ".join((*base.reasons, ended)))
 
     def _ended(self) -> tuple[Solution | None, str]:
-        """Solution on the present faces, or how the search for one ended."""
+        """Solution on the present faces or None, and the outcome of the search in words."""
         if self._forced.contradiction:
             return None, "so no decisions satisfy the requirements at this degree"
         solution = next(filter(None, (self._rounded(*point) for point in self._interior(_ROOM))), None)
@@ -199,7 +199,7 @@ class Program:
         return solution, ended
 
     def _restricted(self, threshold: float, tolerance: float) -> bool:
-        """Pass to the faces without the numerical kernels of the last Gram matrices; whether there are any."""
+        """Restrict to faces without the numerical kernels of the last Gram matrices; whether any kernel exists."""
         if self._margin is None or self._forced.contradiction:
             return False
         faces: list[Sequence[Block] | None] = []
@@ -213,12 +213,12 @@ class Program:
         return any(face is not None for face in faces)
 
     def proposal(self, room: float) -> list[float] | None:
-        """Decisions with the largest margin, in floating point: no proof; None if none are found.
+        """Decisions with the largest margin, in floating point without proof; None if none are found.
 
         Parameters
         ----------
         room : float
-            Share of the optimum that is given up for the margin, or of 1 if that is larger.
+            Loss of objective allowed for the margin, relative to max(1, |optimum|).
         """
         if not room >= 0 or math.isinf(room):
             raise PolynomialError(f"room must be a number of at least 0. Received {room!r}. Write 0.01, say.")
@@ -227,7 +227,7 @@ class Program:
         return None if solution is None else np.asarray(self._vector.value).tolist()
 
     def _interior(self, rooms: Sequence[float]) -> Iterator[tuple[float, float]]:
-        """The optimum, and how much of it was given up where decisions with a margin are now at hand."""
+        """Optimum and allowed loss of objective, for each loss that admits decisions with a margin."""
         import cvxpy as cp
 
         self._margin = None
@@ -250,7 +250,7 @@ class Program:
                     yield best, room
 
     def _rounded(self, best: float, room: float) -> Solution | None:
-        """Proved decision near the last one of the solver, which gave up some room of the optimum for its margin."""
+        """Proved decision near the last one of the solver, whose objective is within `room` of the optimum."""
         for bits in _BITS:
             near = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
             values = self._forced.completed(near)
@@ -309,7 +309,7 @@ class Program:
         return exact
 
     def _parts(self, exact: Mapping[Exponents, Fraction]) -> list[dict[Exponents, Fraction]]:
-        """Constant part and the part of every decision."""
+        """Constant part of a polynomial, then the part of every decision."""
         count = len(self.variables)
         parts: list[dict[Exponents, Fraction]] = [{} for _ in range(1 + len(self.decisions))]
         for e, c in exact.items():
@@ -324,15 +324,15 @@ class Program:
 def largest(
     question: Callable[[Fraction], Answer], low: Any, high: Any, *, relative: float = 1e-4
 ) -> tuple[Fraction, Answer] | None:
-    """Largest level of a bisection whose statement is proved, with its proof; None if the lowest one is not.
+    """Largest level proved by a bisection, with its proof; None if the lowest level is not proved.
 
     Parameters
     ----------
     question : callable
-        Answer for a rational level.
+        Returns the answer for a rational level.
     low, high : rational
     relative : float
-        The bisection ends when the bracket is this small against its upper end.
+        Width of the final bracket relative to its upper end.
     """
     below, above = rational(low, "low"), rational(high, "high")
     answer = question(below)
@@ -360,11 +360,11 @@ def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fra
 def _membership(
     vector: "cp.Variable", need: Requirement, margin: "cp.Variable | float"
 ) -> "tuple[list[cp.Variable], list[cp.Constraint]]":
-    """Gram matrices, less the margin, and the equations between their coefficients and those of the polynomial."""
+    """Gram matrices minus margin·I, and the equations that match their coefficients to the polynomial."""
     import cvxpy as cp
 
     shape, reached = need.shape, need.reached
-    beyond = {e for part in need.parts for e in part if e not in reached}  # none unless the requirements contradict
+    beyond = {e for part in need.parts for e in part if e not in reached}  # empty unless requirements conflict
     vanishing = []
     for constant, *factors in map(need.coefficient, beyond):
         vanishing.append(float(constant) + np.array(factors, dtype=float) @ vector == 0)
@@ -399,7 +399,7 @@ def _definite(
 
 
 # ----------------------------------------------------------------------
-# Many polynomials of one shape: modelled once, solved with the solver's data updated in place.
+# Many polynomials of one shape: modelled once, then solved with updated solver data.
 
 
 class Membership:
@@ -408,7 +408,7 @@ class Membership:
     Parameters
     ----------
     template : Statement
-        Fixes set, degree, multiplier and, by its polynomial, the monomials that may occur.
+        Defines set, degree, multiplier and, by its polynomial, the admissible monomials.
     """
 
     def __init__(self, template: Statement) -> None:
@@ -418,12 +418,12 @@ class Membership:
         self._program = MomentProgram([b.shape() for b in initial_blocks(template)], rows)
 
     def margin(self, polynomial: Mapping[Exponents, Fraction | float]) -> float:
-        """Largest t with polynomial − t·Σ b² in the cone, in floating point: no proof; NaN when the solver fails.
+        """Largest t with polynomial − t·Σ b² in the cone, in floating point without proof; NaN if the solver fails.
 
         Raises
         ------
         PolynomialError
-            When it has a monomial that the template's polynomial does not have.
+            When a monomial is not in the template's polynomial.
         """
         unknown = [e for e in polynomial if e not in self.template.polynomial]
         if unknown:
@@ -439,5 +439,5 @@ class Membership:
         return float("nan") if margin is None else margin * size
 
     def prove(self, polynomial: Mapping[Exponents, Fraction]) -> Answer:
-        """Exact answer for one of the polynomials."""
+        """Exact answer for one polynomial."""
         return decide(replace(self.template, polynomial=dict(polynomial)))

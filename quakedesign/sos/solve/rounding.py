@@ -38,7 +38,7 @@ from quakedesign.sos.solve.facial_reduction import Block
 from quakedesign.sos.solve.moment import MomentSolution
 
 # ----------------------------------------------------------------------
-# From floating-point Gram matrices to an exact sum of squares: round, then put the exact residual back.
+# From floating-point Gram matrices to an exact sum of squares: round, then add back the exact residual.
 
 _BITS = (4, 7, 10, 13, 16, 20, 24, 28, 33, 38, 44)
 
@@ -49,20 +49,20 @@ def rounded(
     solution: MomentSolution,
     checked: Callable[[SumOfSquares], SumOfSquares | None] | None = None,
 ) -> SumOfSquares | None:
-    """Exact proof near a floating-point one, with the coarsest rounding that works; None if none does.
+    """Exact proof near a floating-point solution, with the coarsest valid rounding; None without one.
 
     Parameters
     ----------
     blocks : sequence of Block
-        As solved.
+        Blocks of the solution.
     checked : callable, optional
-        The exact decision: the proof that is returned for a rounded one, or None where that one does not hold. Unless
-        given, the identity is checked and the proof is returned as it is.
+        Exact check that maps a rounded proof to the proof to return, or to None if it is invalid. By default the
+        identity is checked and the proof returned unchanged.
 
     Returns
     -------
     SumOfSquares or None
-        Checked.
+        Checked proof.
     """
     decision = checked or (lambda proof: proof if identity_holds(statement, proof) else None)
     system = System(statement, blocks)
@@ -84,7 +84,7 @@ def rounded(
 
 
 def relations(statement: Statement) -> Iterator[tuple[int, Exponents, dict[Exponents, Fraction]]]:
-    """Equality, monomial and their product, for all products within the degree; among forms of just that degree."""
+    """Equality, monomial and their product, for all products within the degree bound; for forms, at the bound."""
     size = len(statement.variables)
     for k, h in enumerate(statement.equalities):
         most = statement.degree - degree(h)
@@ -117,12 +117,12 @@ class System:
         return {e: factor * c for e, c in product(len(self.statement.variables), parts).items()}
 
     def flat(self, solution: MomentSolution) -> list[float]:
-        """All unknowns of a solution in order."""
+        """Gram entries and cofactor coefficients of a solution, in order."""
         grams = [float(solution.grams[k][i][j]) for k, i, j in self.entries]
         return [*grams, *(float(c) for c in solution.cofactors)]
 
     def proof(self, values: Sequence[Fraction]) -> SumOfSquares:
-        """Unknowns as a proof, unchecked."""
+        """Unchecked proof with given values of the unknowns."""
         squares, start = [], 0
         for block in self.blocks:
             count = len(block.basis) * (len(block.basis) + 1) // 2
@@ -136,7 +136,7 @@ class System:
         return SumOfSquares(squares=tuple(squares), cofactors=tuple(cofactors))
 
     def correction(self, missing: Polynomial) -> dict[int, Fraction] | None:
-        """Change of the unknowns that produces the residual exactly; None if there is none."""
+        """Change of the unknowns that exactly produces a residual; None if there is none."""
         return self._spread(missing) if self.single else self._solve(missing)
 
     def _spread(self, missing: Polynomial) -> dict[int, Fraction] | None:
@@ -166,7 +166,7 @@ class System:
         return dict(zip(chosen, values, strict=True))
 
     def _choose(self) -> Any:
-        """Independent rows and columns, by pivoted QR, with the exact square matrix between them."""
+        """Independent rows and columns, by pivoted QR, and the exact square matrix that they define."""
         keys = sorted({e for c in self.columns for e in c})
         self.rows = {e: i for i, e in enumerate(keys)}
         dense = np.zeros((len(keys), len(self.columns)))
@@ -188,22 +188,22 @@ class System:
 
 
 # ----------------------------------------------------------------------
-# Exact scaling, so that a solver sees coefficients of about one whatever the units.
+# Exact scaling to coefficients of about one, so that the units do not affect the solver.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
-    """A statement in ũ = u/scale, scale powers of two, with every polynomial divided by its largest coefficient."""
+    """Statement in ũ = u/scale, with powers of two as scales and every polynomial over its largest coefficient."""
 
     statement: Statement
     scale: tuple[Fraction, ...]
-    target: Fraction  # Factor that the target was divided by
-    # inequalities, equalities: Factors that the constraints were divided by
+    target: Fraction  # Divisor of the target
+    # inequalities, equalities: Divisors of the constraints
     inequalities: tuple[Fraction, ...]
     equalities: tuple[Fraction, ...]
 
     def restore(self, proof: Proof) -> Proof:
-        """Proof of the statement in u from one in ũ."""
+        """Proof of the statement in u from a proof in ũ."""
         match proof:
             case Point():
                 return Point(coordinates=tuple(s * x for s, x in zip(self.scale, proof.coordinates, strict=True)))
@@ -226,7 +226,7 @@ class Scaled:
         return _moved(square, self.scale, 1 / self._factor(square))
 
     def _factor(self, square: Square) -> Fraction:
-        """What a Gram matrix in ũ is multiplied by in u."""
+        """Factor from the Gram matrix in ũ to that in u."""
         return self.target / prod(self.inequalities[i] for i in square.product)
 
 
@@ -239,7 +239,7 @@ def _moved(square: Square, scale: Sequence[Fraction], factor: Fraction) -> Squar
 
 
 def _rescaled(basis_element: Element, scale: Sequence[Fraction]) -> tuple[Element, Fraction]:
-    """Basis element in the other variables, and the factor that its rows of the Gram matrix take."""
+    """Basis element in the other variables, and the factor of its row of the Gram matrix."""
     match basis_element:
         case tuple():
             return basis_element, monomial(scale, basis_element)
@@ -249,7 +249,7 @@ def _rescaled(basis_element: Element, scale: Sequence[Fraction]) -> tuple[Elemen
 
 
 def scaled(statement: Statement) -> Scaled:
-    """Statement with coefficients of about one."""
+    """Scaled statement with coefficients of about one."""
     scale = _balance(statement)
 
     def normal(polynomial: Polynomial) -> tuple[dict[Exponents, Fraction], Fraction]:
@@ -277,7 +277,7 @@ def scaled(statement: Statement) -> Scaled:
 
 
 def decimal_units(scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Scaled variables in units of a power of ten near their scale, where simple numbers are looked for."""
+    """Scales over the nearest powers of ten: the decimal units in which simple numbers are sought."""
     return tuple(s / Fraction(10) ** round(_log2(s) / math.log2(10)) for s in scale)
 
 
@@ -286,7 +286,7 @@ def _log2(value: Fraction) -> float:
 
 
 def _balance(statement: Statement) -> tuple[Fraction, ...]:
-    """Powers of two that bring the coefficients of every polynomial as near to each other as they can."""
+    """Powers of two that make the coefficients of every polynomial as equal as possible, by least squares."""
     size = len(statement.variables)
     rows, sides = [], []
     polynomials = (statement.polynomial, *statement.inequalities, *statement.equalities)

@@ -33,43 +33,43 @@ from quakedesign.sos.solve.rounding import Scaled, decimal_units, rounded, scale
 from quakedesign.text import shown
 
 # ----------------------------------------------------------------------
-# Gram matrices that somebody else's solver has found: rounded and put right exactly, or answered otherwise.
+# Gram matrices of other solvers: rounded and corrected exactly, or else the polynomial is decided without them.
 
 Array = np.ndarray
 Matrixed = tuple[Block, Array]
-_NEAR = Fraction(1, 100)  # of the largest coefficient: a matrix with a larger error is about another polynomial
+_NEAR = Fraction(1, 100)  # largest error over largest coefficient; beyond, the matrix is for another polynomial
 
 
 def verify(
     polynomial: Any, gram: Any, basis: Any, *, on: Sequence[Any] = (), variables: Sequence[Any] | None = None
 ) -> Answer:
-    """Exact proof from a Gram matrix in floating point, or what is true instead.
+    """Exact proof from a Gram matrix in floating point, or the verdict without the matrix.
 
-    The matrix is rounded and moved exactly onto polynomial = bᵀQb; where it is singular, its kernel is made rational
-    first. A matrix from which no proof comes is left, and the polynomial is decided as `quakedesign.sos.prove` does.
+    The matrix is rounded and corrected to satisfy polynomial = bᵀQb exactly; the kernel of a singular matrix is made
+    rational first. If no proof results, the polynomial is decided without the matrix, as by `quakedesign.sos.prove`.
 
     Parameters
     ----------
     polynomial : str, SymPy expression or mapping of exponents to Fraction
     gram : array of float (n × n)
-        Only its symmetric part counts. Under constraints a list of such arrays: of σ_0, then of σ_i for every g_i ≥ 0
-        in polynomial = σ_0 + Σ g_i·σ_i.
+        Only its symmetric part is used. With constraints, a list of such arrays: for σ_0, then for the σ_i of every
+        g_i ≥ 0 in polynomial = σ_0 + Σ g_i·σ_i.
     basis : sequence of n str, SymPy expressions or tuples of exponents
-        Monomials, or any polynomials; under constraints a list of such sequences.
+        Monomials or any polynomials; with constraints, a list of such sequences.
     on : sequence of str or SymPy relation, optional
-        Inequalities of the set; ℝⁿ unless given.
+        Inequalities of the set; ℝⁿ by default.
     variables : sequence of str or Symbol, optional
-        Their order, for exponents; in order of appearance in the polynomial unless given.
+        Order of the variables in exponents; by default in order of appearance in the polynomial.
 
     Returns
     -------
     Answer
-        Its ``remark`` says what became of the matrix.
+        Its ``remark`` states whether the matrix was used.
 
     Raises
     ------
     PolynomialError
-        When something cannot be read, or matrix and basis do not fit.
+        When an input is not readable, or the sizes of matrix and basis differ.
     """
     start = perf_counter()
     names, exact, inequalities, equalities, _ = read(polynomial, on, None, variables)
@@ -100,7 +100,7 @@ def _listed(given: Any) -> list[Any]:
 
 
 def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, ...]) -> Square:
-    """Given matrix, as exact as its floats, with a basis in which every element has a monomial of its own."""
+    """Square of a given matrix, its floats exact, with a basis whose elements have monomials of their own."""
     elements = tuple(read_element(b, names) for b in _listed(basis))
     matrix = _matrix(gram, len(elements))
     upper = tuple(Fraction(float(matrix[i, j])) for i in range(len(elements)) for j in range(i, len(elements)))
@@ -121,7 +121,7 @@ def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, .
 def _matrix(gram: Any, size: int) -> Any:
     """Symmetric part of a matrix."""
     try:
-        matrix = np.asarray(gram, dtype=object).astype(float)  # one by one, so that no imaginary part is dropped
+        matrix = np.asarray(gram, dtype=object).astype(float)  # by entry, so that complex numbers raise
     except (TypeError, ValueError, OverflowError):
         raise PolynomialError("a Gram matrix must be an array of real numbers. Received something else.") from None
     if matrix.shape != (size, size) or not np.all(np.isfinite(matrix)):
@@ -150,7 +150,7 @@ def _verified(problem: Statement, squares: Sequence[Square]) -> Answer:
 
 
 def _block(moved: Statement, square: Square) -> Matrixed:
-    """Block and matrix of a square."""
+    """Block and floating-point Gram matrix of a square."""
     support = sorted({e for b in square.basis for e in as_polynomial(b)})
     monomials = tuple(b for b in square.basis if isinstance(b, tuple))
     rows = tuple(tuple(as_polynomial(b).get(e, Fraction(0)) for e in support) for b in square.basis)
@@ -165,7 +165,7 @@ def _block(moved: Statement, square: Square) -> Matrixed:
 
 
 def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Array]) -> Iterator[tuple[str, Any]]:
-    """Proofs from the matrices as they are, then from what is left of them beside their kernels."""
+    """Proofs from the given matrices, then from the matrices without their kernels."""
     yield "rounded", _rounded(moved, blocks, grams)
     for threshold, tolerance in KERNELS:
         smaller = [_beside(b, g, threshold, tolerance, moved) for b, g in zip(blocks, grams, strict=True)]
@@ -174,7 +174,7 @@ def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Array]) ->
 
 
 def _beside(block: Block, gram: Array, threshold: float, tolerance: float, moved: Scaled) -> Matrixed | None:
-    """Block without the numerical kernel of its matrix, and the matrix there; None if nothing is left."""
+    """Block without the numerical kernel of its matrix, and the restricted matrix; None if the block is empty."""
     smaller = at_kernels([block], [gram], threshold, tolerance, decimal_units(moved.scale))
     if smaller is None:
         return block, gram
@@ -186,7 +186,7 @@ def _beside(block: Block, gram: Array, threshold: float, tolerance: float, moved
 
 
 def _rows(block: Block, monomials: Sequence[Exponents]) -> np.ndarray:
-    """Basis of a block in monomials, one element a row."""
+    """Coefficients of the basis of a block in monomials, one element a row."""
     polynomials = [as_polynomial(b) for b in block.basis]
     return np.array([[float(p.get(e, 0)) for e in monomials] for p in polynomials])
 
@@ -201,7 +201,7 @@ def _rounded(moved: Scaled, blocks: Sequence[Block], grams: Sequence[np.ndarray]
 
 
 # ----------------------------------------------------------------------
-# Files in which other programmes leave a Gram matrix: JSON, and MATLAB's .mat.
+# Files with a Gram matrix of another program: JSON, and MATLAB's .mat.
 
 _LARGEST = 4 << 20  # bytes
 _KEYS = {"variables", "polynomial", "gram", "basis"}
@@ -210,7 +210,7 @@ _IN_MATLAB = {"vars": "variables", "p": "polynomial", "Q": "gram", "Z": "basis"}
 
 @dataclass(frozen=True, kw_only=True)
 class GramFile:
-    """What a file says: that polynomial = basisᵀ·gram·basis."""
+    """Contents of a file that claims polynomial = basisᵀ·gram·basis."""
 
     variables: tuple[str, ...]
     polynomial: Any  # str or mapping of exponents to Fraction
@@ -218,22 +218,22 @@ class GramFile:
     basis: list[Any]
 
     def verify(self) -> Answer:
-        """Exact proof, or what is true instead; see `quakedesign.sos.verify`."""
+        """Exact proof, or the verdict without the matrix; see `quakedesign.sos.verify`."""
         return verify(self.polynomial, self.gram, self.basis, variables=self.variables)
 
 
 def read_gram(path: str | Path) -> GramFile:
     """Polynomial, Gram matrix and basis of a file.
 
-    A file ``.mat`` has the variables p, Q, Z and vars, any other is JSON with the keys polynomial, gram, basis and
-    variables. A polynomial is text, or a list of terms, each its coefficient and then the exponents; a basis has texts,
-    or lists of exponents. Numbers of JSON are read as they are written, floats of MATLAB as the decimals that they
-    print as.
+    A ``.mat`` file has the variables p, Q, Z and vars; any other file is JSON with the keys polynomial, gram, basis and
+    variables. A polynomial is text, or a list of terms, each a coefficient followed by exponents. Basis elements are
+    texts or lists of exponents. JSON numbers are read exactly as written, MATLAB floats as the decimals that they print
+    as.
 
     Raises
     ------
     PolynomialError
-        When the file cannot be read, or has other contents.
+        When the file is not readable, or has other keys or values.
     """
     path = Path(path)
     content = read_bytes(path, "a file with a Gram matrix", largest=_LARGEST, refusal=PolynomialError)
@@ -243,7 +243,7 @@ def read_gram(path: str | Path) -> GramFile:
             if path.suffix == ".mat"
             else json.loads(content, object_pairs_hook=unique, parse_float=_number)
         )
-    except Exception as error:  # a broken file raises anything
+    except Exception as error:  # a broken file may raise any exception
         reason = str(error).partition("\n")[0]
         raise PolynomialError(
             f"{path} must be JSON, or .mat as MATLAB's save -v7 writes. Received: {reason}."
@@ -257,7 +257,7 @@ def read_gram(path: str | Path) -> GramFile:
 
 
 def _number(written: str) -> Fraction | str:
-    """The number exactly; where it has too many digits for that its text, which is good enough for a matrix."""
+    """Exact number, or its text if it has too many digits; a matrix accepts either."""
     try:
         return rational(written)
     except ParameterError:
@@ -276,7 +276,7 @@ def _gram_file(raw: Json) -> GramFile:
 
 
 def _terms(raw: Any, size: int) -> dict[tuple[int, ...], Fraction]:
-    """Sum of terms, each a coefficient and then its exponents (flat, or in a list of their own)."""
+    """Sum of terms, each a coefficient followed by its exponents (flat or as a list)."""
     total: dict[tuple[int, ...], Fraction] = {}
     for term in raw if isinstance(raw, list) else [raw]:
         parts = term if isinstance(term, list) and term else [term]
@@ -296,11 +296,11 @@ def _is_whole(exponent: Any) -> bool:
 
 
 def _matlab(content: bytes) -> dict[str, Any]:
-    """The same keys from MATLAB's names: Z and p as matrices, one monomial or term a row, or as text."""
+    """Contents of a MATLAB file under the JSON keys; Z and p are matrices (one monomial or term a row) or text."""
     from scipy.io import loadmat
 
     with catch_warnings():
-        simplefilter("ignore", DeprecationWarning)  # of the kind of sparse matrices, which are made dense
+        simplefilter("ignore", DeprecationWarning)  # about the type of sparse matrices, made dense later
         raw = loadmat(BytesIO(content), squeeze_me=False, chars_as_strings=True)
     by_key = {key: raw[name] for name, key in _IN_MATLAB.items() if name in raw}
     if set(by_key) != _KEYS:
@@ -324,5 +324,5 @@ def _plain(array: Any) -> list[Any]:
 
 
 def _texts(array: Any) -> list[str]:
-    """Names or monomials from a matrix of characters or a cell array."""
+    """Names or monomials from a character matrix or a cell array."""
     return [str(entry.item() if hasattr(entry, "item") else entry).strip() for entry in array.ravel()]
