@@ -256,7 +256,7 @@ def design_held(
     if proof.proved or not noise:
         return proof
     quiet = replace(setup, slip_noise=Fraction(0), rate_noise=Fraction(0))
-    without = design_held(task, step, objective=objective, room=room, measured=measured, **quiet)  # type: ignore[arg-type]
+    without = design_held(task, step, objective=objective, room=room, measured=measured, setup=quiet)
     return proof if not without.proved else _with_noise(without, noise)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 from fractions import Fraction as F
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
+from quakedesign.guarantees.search import linear_design
 from quakedesign.guarantees.search.linear_design import _with_noise, closest
 from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.laws import published
@@ -284,6 +286,23 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
         return
     assert found.reason.startswith("with slip noise of 5 m and rate noise of 0.1 m/s the pressure may rise to ")
     assert found.reason.endswith(": the fault may open; without it a law is proved")
+
+
+def test_a_design_that_noise_leaves_without_a_proof_is_designed_without_noise(monkeypatch):
+    stored, noises = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text()), []
+
+    def laws(task, step, measured, setup):
+        noises.append(setup.slip_noise)
+        held = replace(stored.held, slip_noise=setup.slip_noise)
+        family = SimpleNamespace(starts=[np.zeros(3)])
+        best = {"least_peak": lambda x: (0.5, x), "seen": lambda x: None, "held": lambda x: held}
+        return SimpleNamespace(template=held, family=family, **best)
+
+    monkeypatch.setattr(linear_design._Laws, "of", laws)
+    found = design_held(stored.task, stored.held.step, objective="peak", setup=ExactSetup(slip_noise=F(5)))
+    assert noises == [5, 0]
+    assert found.reason.startswith("with slip noise of 5 m the pressure may rise to ")
+    assert found.reason.endswith("; without it a law is proved")
 
 
 @pytest.mark.slow
