@@ -30,7 +30,7 @@ def test_a_constant_disturbance_leaves_no_error_where_the_implicit_scheme_keeps_
     still = dataclasses.replace(REAL, reference=dataclasses.replace(REAL.reference, target_slip=1e-12))
     pushed = still.with_disturbance(Disturbance(constant=1e-4))
     runs = {
-        name: simulate(pushed, LAW, scheme=name, duration=400.0, settled_from=300.0, compiled=False)
+        name: simulate(pushed, LAW, scheme=name, duration=400.0, settled_from=300.0, compiled=False, plant="printed")
         for name in ("implicit", "compensated")
     }
     errors = {name: run.metrics.max_slip_error for name, run in runs.items()}
@@ -63,7 +63,8 @@ def test_weight_one_chatters_where_the_theory_says_so():
     errors = {}
     for weight in (0.5, 1.0):
         scheme = dataclasses.replace(simulation_scheme("compensated"), weight=weight, authority=least)
-        errors[weight] = simulate(REAL, LAW, scheme=scheme, duration=1000.0, compiled=False).metrics.max_slip_rate_error
+        run = simulate(REAL, LAW, scheme=scheme, duration=1000.0, compiled=False, plant="printed")
+        errors[weight] = run.metrics.max_slip_rate_error
     assert errors[1.0] > 50 * errors[0.5]
 
 

@@ -115,8 +115,8 @@ def test_grains_never_reach_beyond_the_longest_interval():
 @pytest.mark.slow
 def test_a_run_says_its_intervals_and_what_is_exported_that_a_clock_calls_it():
     assert [seen().provenance[f"{end}_interval"] for end in ("shortest", "longest")] == [0.001, 0.002]
-    assert any("to be called by a clock, once every 0.001 s" in line for line in remarks_of(claim().controller))
-    assert not any("by a clock" in line for line in remarks_of(replace(claim().controller, longest=F(0))))
+    assert any("to be called periodically, once every 0.001 s" in line for line in remarks_of(claim().controller))
+    assert not any("periodically" in line for line in remarks_of(replace(claim().controller, longest=F(0))))
 
 
 def remarks_of(law):

@@ -22,7 +22,8 @@ ACCELERATION = {1e-5: 0.073, 1e-4: 3.0}  # of the sampled 2-CTA with exact state
 
 def tracks(differentiator):
     scheme = simulation_scheme("explicit", measurement=OutputFeedback(differentiator=differentiator))
-    run = simulate(LAB, PUBLISHED["cta"], step=differentiator.step, scheme=scheme, duration=1.0, samples=50)
+    options = {"step": differentiator.step, "scheme": scheme, "plant": "printed"}
+    run = simulate(LAB, PUBLISHED["cta"], duration=1.0, samples=50, **options)
     return run.metrics is not None and run.metrics.max_slip_error < 1e-5
 
 
