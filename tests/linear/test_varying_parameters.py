@@ -133,8 +133,8 @@ def test_the_designed_gains_run_up_to_the_proved_period_and_not_at_the_refuted_o
     longest = longest_of(PROBLEM, tuple(law.gains.values()))
     proved, refuted = float(longest.proved), float(longest.refuted)
     assert proved < 0.1415  # at which the fault opens
-    good = qd.simulate(REAL, law, scheme="explicit", step=proved)
-    bad = qd.simulate(REAL, law, scheme="explicit", step=refuted)
+    good = qd.simulate(REAL, law, scheme="explicit", step=proved, plant="printed")
+    bad = qd.simulate(REAL, law, scheme="explicit", step=refuted, plant="printed")
     assert not {"opening", "diverged"} & set(good.events)
     assert good.metrics.max_slip_error < 1e-4
     assert {"opening", "diverged"} & set(bad.events)
