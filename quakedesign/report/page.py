@@ -415,7 +415,7 @@ REST_LIMITS = (
     "a guarantee that begins 'on the plant without stick' is for friction continued linearly to negative slip rates; "
     "for the stick–slip plant the worst case found is then reported, which is no proof",
 )
-_WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D ="}
+_WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "a diffusion path of L^2/D ="}
 SLIDING_LIMITS = (
     "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
     "of the run nor of the proof",

@@ -565,7 +565,7 @@ def sliding_run_lines(result: dict[str, Any]) -> list[str]:
     least, largest = (p / 1e6 for p in result["pressure"])
     path = "".join(f", through a {name.replace('_', ' ')}" for name in result["stages"])
     path += f", through a lag of {result['lag']:.4g} s" if result["lag"] else ""
-    path += f", through rock of L^2/D = {result['diffusion']:.4g} s" if result["diffusion"] else ""
+    path += f", through a diffusion path of L^2/D = {result['diffusion']:.4g} s" if result["diffusion"] else ""
     shaken = f", under a shear stress of up to {result['stress'] / 1e3:.4g} kPa" if result["stress"] else ""
     return [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "

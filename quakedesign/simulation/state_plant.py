@@ -287,7 +287,7 @@ class SlidingVariation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PressurePath:
-    """What a pressure goes through before it is in the fault: a pump, then a lag of pump and pipe, then rock."""
+    """Path of a pressure to the fault: a pump, then a lag of pump and pipe, then diffusion."""
 
     # lag, diffusion: Time constant and L²/D [s], not negative; 0 for none
     lag: Fraction = Fraction(0)
@@ -298,7 +298,7 @@ class PressurePath:
 
     @classmethod
     def of(cls, meant: Sampling, actuator: Actuator | None) -> "PressurePath":
-        """That of an actuator; without a lag and rock in it that which a law of samples is meant for."""
+        """Path of an actuator; without lag and diffusion in it the path of a sampled law's design."""
         given = (
             Actuator.meant_for(replace(meant, lag=Fraction(0), diffusion=Fraction(0))) if actuator is None else actuator
         )
@@ -307,7 +307,7 @@ class PressurePath:
             return cls(lag=meant.lag, diffusion=meant.diffusion, stages=stages)
         if [type(stage) for stage in flowing] not in ([Lag], [Diffusion], [Lag, Diffusion]):
             raise ParameterError(
-                "the pressure of slow sliding goes through a lag, rock, or both. Received "
+                "the pressure of slow sliding takes a lag, a diffusion path, or both. Received "
                 f"{', '.join(stage.name for stage in flowing)}. Leave out the others."
             )
         by_name = {stage.name: stage for stage in flowing}

@@ -144,7 +144,7 @@ def sum_of_places(count: int) -> int:
 def bounded(value: Fixed) -> Fixed:
     """Refuse numbers that only an unstable or absurd loop can have."""
     largest = max(map(abs, chain([value.error], *value.rows)))
-    need(largest <= LARGEST, "the nominal loop must be stable, its numbers of ordinary size")
+    need(largest <= LARGEST, "the nominal loop must be stable, with numbers below 2^192")
     return value
 
 
@@ -161,7 +161,7 @@ def column(values: Sequence[Fraction]) -> Fixed:
 def exponential(flow: list[Row], time: Fraction) -> Fixed:
     """e^{At} by a Taylor sum at t/2^j and squaring."""
     norm = max(sum(map(abs, line)) for line in flow) * time
-    need(norm <= 1 << 12, "the flow must change by a factor of ordinary size between two events")
+    need(norm <= 1 << 12, "the flow between two events must have a norm of at most 4096")
     halvings = int(norm).bit_length()  # to a norm below 1
     base = fixed([[v * time / 2**halvings for v in line] for line in flow])
     term = total = fixed(unit(len(flow)))

@@ -32,7 +32,7 @@ class Near:
     def of(cls, value: Fraction) -> "Near":
         """A rational; one that is a multiple of the unit is itself."""
         at, more = divmod(value.numerator << BITS, value.denominator)
-        need(abs(at) <= LARGEST, "numbers of a period must be of ordinary size")
+        need(abs(at) <= LARGEST, "numbers of a period must be below 2^192")
         return cls(at, int(more > 0))
 
     def __add__(self, other: "Near") -> "Near":
@@ -130,7 +130,7 @@ class Polytope:
         scaled = [Near.of(v * size) + m for v, size, m in zip(function.row, self.sizes, moved, strict=True)]
         constant = Near.of(function.constant) + function.beside
         above = constant.at + constant.off
-        need(max(abs(f.at) for f in scaled) <= LARGEST, "numbers of a period must be of ordinary size")
+        need(max(abs(f.at) for f in scaled) <= LARGEST, "numbers of a period must be below 2^192")
         floats = [f.at / ONE for f in scaled]
         values = [sum(map(float.__mul__, floats, place)) for place in self.places]
         best = max(values)

@@ -122,7 +122,7 @@ def read_lifts(value: dict[str, Any], loop: Loop) -> dict[str, list[Term]]:
 
 
 def read_loop(document: dict[str, Any]) -> Loop:
-    """Read everything that closed loops share."""
+    """Read the common part of closed loops."""
     law, domain = document["law"], document["domain"]
     need(type(law) is str and LAW.fullmatch(law) is not None, "law", "1 to 40 of [A-Za-z0-9_-]", law)
     need(type(domain) is str and domain in ("cells", "reals"), "domain", "cells or reals", domain)
@@ -209,11 +209,11 @@ def sum_text(terms: Iterable[Term], loop: Loop) -> str:
 
 
 def describe(loop: Loop) -> list[str]:
-    """Describe the loop, which is what the verdict is about."""
+    """Describe the loop that the verdict is on."""
     ranges = {name: f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()}
     roots = {name: f"root: {ranges.pop(name)} is the positive square root of {of}" for name, of in loop.roots.items()}
     return [
-        f"law {loop.law}: no name is verified, the verdict is about the field below",
+        f"law {loop.law}: names are not verified, the verdict is on the field below",
         f"gains and constants: {named(loop.numbers)}",
         f"domain: {loop.domain}; states with weights: {named(loop.weights)}",
         f"uncertain, measurable in time: {', '.join(ranges.values()) or 'none'}",

@@ -61,7 +61,7 @@ class Answer:
 
     @property
     def set_is_empty(self) -> bool:
-        """Whether a set is seen to have no point, so that a proof on it is about nothing.
+        """Whether a set is seen to have no point, so that a proof on it is vacuous.
 
         A negative number is proved to be non-negative on it, an inequality has negative coefficients and even exponents
         alone with a constant among them, or an equality has such coefficients of one sign.
