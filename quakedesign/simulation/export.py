@@ -332,7 +332,7 @@ def export_controller(
     fmu: bool = False,
     force: bool = False,
 ) -> ControllerStep:
-    """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder that appears whole.
+    """Write a controller's sampled step as ``controller.c`` and ``controller.h`` into a folder, atomically.
 
     The C has no dynamic memory and no state of its own, needs the standard mathematics library only, and gives the
     digits of `ControllerStep.function` when compiled with ``-ffp-contract=off``.
@@ -477,7 +477,7 @@ def _after(loop: ClosedLoop, scheme: Sampled, counter: ca.SX, state: ca.SX, step
 def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
     """Limits of use of a sampled law: another T_s, a fault that sticks, and what its pressure acts through."""
     own = controller.sampling
-    path = {"a delay of": own.delay, "a lag of": own.lag, "rock of L^2/D =": own.diffusion} if own else {}
+    path = {"a delay of": own.delay, "a lag of": own.lag, "a diffusion path of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
     behind = f"designed for {between} between controller and fault: the pressure is that commanded at the valve"
     by_a_clock = (

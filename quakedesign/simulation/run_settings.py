@@ -18,7 +18,7 @@ from quakedesign.fault import Fault, fault_toml
 from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.loop import Actuator, Scheme, simulation_scheme
-from quakedesign.loop.schemes.base import MOST_SUBSTEPS, NoClock
+from quakedesign.loop.schemes.base import MOST_SUBSTEPS, AperiodicClock
 from quakedesign.loop.sensing import Sensor
 from quakedesign.simulation import stepping
 from quakedesign.simulation.adaptive import require_smooth, smooth_march
@@ -189,16 +189,16 @@ def own_path(
 def by_no_clock(
     controller: Controller | None, scheme: str | Scheme, step: float | None, numbers: dict[str, Any]
 ) -> tuple[float | None, dict[str, Any]]:
-    """Step [s] and numbers of a run; of a law whose samples follow no clock a part of the shortest interval, and those.
+    """Step [s] and numbers of a run; with aperiodic sampling the step is a fraction of the shortest interval.
 
-    A scheme that is no name has its own intervals, or a clock.
+    A scheme that is not given by name has its own intervals.
     """
     sampling = controller.sampling if controller else None
     clock = getattr(scheme, "clock", None)
     if sampling is None or step is None or not (sampling.longest or clock):
         return step, numbers
     if isinstance(scheme, str):
-        clock = NoClock.of(sampling.step, sampling.longest)
+        clock = AperiodicClock.of(sampling.step, sampling.longest)
         numbers = numbers | {"clock": clock}
     return (step / clock.shortest if clock else step), numbers
 

@@ -241,11 +241,11 @@ def run_campaign(
     renew: bool = False,
     tell: Tell = lambda _what, _done: None,
 ) -> Campaign:
-    """Run many samples of a closed loop, and keep every batch that is done in a folder.
+    """Run many samples of a closed loop; every finished batch is stored in a folder.
 
-    Interrupted or killed at any moment, the same call goes on from the files, and its answer has the digits of an
-    uninterrupted one, whatever the workers and their number. More samples than before go on from those that are there.
-    The digits depend neither on the processor nor on the C compiler and its library, but for loads with tan, inverse
+    After an interruption at any moment the same call continues from these files, and its result is bitwise that of an
+    uninterrupted one, whatever the workers and their number. More samples than before continue from the stored ones.
+    The digits depend neither on the processor nor on the C compiler and its library, except for loads with tan, inverse
     functions or hyperbolic ones other than tanh.
 
     Parameters
@@ -255,11 +255,11 @@ def run_campaign(
     samples : int
         Number of samples; number i depends on the seed and on i alone.
     folder : str or Path
-        New, empty, or that of this campaign. It holds one file for each batch that is done.
+        New, empty, or that of this campaign. It has one file for each finished batch.
     metric : str, optional
-        Look for the worst value of this metric, starting from the worst sample and the corners of the box.
+        Search for the worst value of this metric, starting from the worst sample and the corners of the box.
     rounds : int
-        Of that search.
+        Number of rounds of that search.
     workers : int, optional
         Number of processes; one per core unless given.
     scheduler : str, optional
@@ -267,11 +267,11 @@ def run_campaign(
     executor : Executor, optional
         Any other executor of `concurrent.futures` that is used instead.
     batch : int, optional
-        Samples in a batch; as many as take about half a minute, unless given.
+        Samples in a batch; by default as many as take about half a minute.
     renew : bool
-        Delete another campaign that the folder holds; the same one goes on.
+        Delete another campaign in the folder; the same one continues.
     tell : callable
-        Called with what is being done and the fraction done [-].
+        Called with the present step and the fraction done [-].
 
     Returns
     -------
