@@ -1,6 +1,6 @@
 """Rationals and polynomials: read strictly, computed exactly, every step counted.
 
-A polynomial maps tuples of exponents to nonzero fractions. What breaks a rule is `Refused`; `budget` counts what the
+A polynomial maps tuples of exponents to nonzero fractions. A broken rule raises `Refused`; `budget` counts what the
 arithmetic costs, before it is done, so that every file ends in bounded time and memory.
 """
 

@@ -80,11 +80,11 @@ def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fr
 def of_class(
     task: Task, loop: Loop, found: list[list[list[Fraction]]], spread: tuple[Fraction, Fraction] | None = None
 ) -> tuple[Row, Fraction]:
-    """The same of one class of disturbances, from the gains of every input.
+    """The same for one class of disturbances, from the gains of every input.
 
     `spread`: deviation of a slow beta from that of the nominal loop, now and in the past.
     """
-    pushes = len(loop.outputs) - loop.asked - loop.stepped  # up to there outputs are errors and what acts on the fault
+    pushes = len(loop.outputs) - loop.asked - loop.stepped  # outputs before it are errors and pressures on the fault
     half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
     force, drift, coupling, shifted = inputs(task, half[2])
     half[2] = spread[0] if spread else half[2]
@@ -105,7 +105,7 @@ def of_class(
     if not loop.events and len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [none] * 2
-    if loop.layer:  # the fourth output bounds what its modes leave out
+    if loop.layer:  # the fourth output bounds the truncation error
         if loop.fade:
             shares.append([*none])
         shares[-1 if loop.fade else 0][3] = half[2]  # it acts as b(p - p*) does, in the small gain
@@ -127,7 +127,7 @@ def of_class(
 
 
 def peaks_of(found: list[list[list[Fraction]]], own: Row, shares: list[Row]) -> tuple[Row, Fraction]:
-    """Bounds of the outputs, and the small gain, from gains by input, output and piece, and what bounds the inputs."""
+    """Bounds of the outputs, and the small gain, from gains by input, output and piece, and bounds of the inputs."""
     table = [
         [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
         for share in shares

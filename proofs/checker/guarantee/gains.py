@@ -219,9 +219,9 @@ def start_gains(loop: Loop) -> list[list[Fraction]]:
 
 
 def followed(flows: list[Flow], start: Fixed, rows: int) -> tuple[Fixed, Fixed, list[int]]:
-    """States at the beginning of K periods; W^-1 after them, and what no W times a state exceeds, ever.
+    """States at the beginning of K periods; W^-1 after them, and a bound of W times the state for all later periods.
 
-    K = 2^j periods, until a 1024th of these bounds is left but for the slowest mode, which has to fall.
+    K = 2^j periods, until 1/1024 of these bounds remains except for the slowest mode, which has to decay.
     """
     size, count = len(start.rows), len(start.rows[0])
     period = flows[0].whole

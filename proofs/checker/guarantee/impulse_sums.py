@@ -179,7 +179,7 @@ def pieces(flow: Flow, later: Fixed | None) -> Fixed:
 
 
 def diagonal(rest: Fixed) -> Fixed:
-    """One column for every entry that is not 0."""
+    """One column for every nonzero entry."""
     corner = [i for i, (v,) in enumerate(rest.rows) if v]
     return Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)])
 
@@ -245,7 +245,7 @@ def past(flows: list[Flow], rows: int) -> Past:
     raise Refused(f"the nominal loop must be stable, as shown within {2**DOUBLINGS} periods")
 
 
-@lru_cache(maxsize=16)  # all inputs of a loop ask for the same ones
+@lru_cache(maxsize=16)  # the same for all inputs of a loop
 def stacked(rows: Fixed, maps: tuple[Fixed, ...]) -> Fixed:
     """Rows as they are and after each of the maps, above those after two of them, and so on."""
     if not maps:

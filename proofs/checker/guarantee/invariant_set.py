@@ -30,7 +30,7 @@ class Reach:
 
 
 def read_reach(value: Any, loop: Loop) -> Reach:
-    """Read the set and what bounds it, of the sizes of the loop."""
+    """Read the set and its bases, in the dimensions of the loop."""
     given = keys(value, "reach", "inputs", "facets", "at_samples", "between")
     size, facets = len(reduced(loop.events[0][0])[0]), given["facets"]
     need(type(facets) is list and size <= len(facets) <= MAX_FACETS, f"reach needs {size} to {MAX_FACETS} facets")

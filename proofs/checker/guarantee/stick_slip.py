@@ -209,7 +209,7 @@ class Period:
         need(large, "the disturbance must be large enough for the condition of rest")
 
     def find_curvature(self) -> None:
-        """Bounds of the impulse responses and their curvature over the longest interval, and what follows from them."""
+        """Bounds of the impulse responses and their curvature over the longest interval, and their consequences."""
         step, zero, one = self.law.longest_interval, Fraction(0), Fraction(1)
         (s, ds), (w, dw) = (((high + low) / 2, (high - low) / 2) for low, high in (self.slope, self.damping))
         self.growth = 1 / (1 - self.slope[1] * step**2 / 2)

@@ -233,7 +233,7 @@ def cells_of(choices: Iterable[Sequence[int]]) -> dict[str, Exponents]:
 
 @dataclass
 class Cell:
-    """Points where states and lifts have given signs, after what holds there; it grows with every lift.
+    """Points where states and lifts have given signs, and the relations there; it grows with every lift.
 
     `degrees` has an entry for every variable: its index among states and lifts, and the degree of that.
     """
@@ -246,13 +246,13 @@ class Cell:
     inequalities: list[Polynomial]
 
     def has_interior(self) -> bool:
-        """Tell whether signs alone leave points where all variables are positive."""
+        """Whether the signs alone admit points where all variables are positive."""
         one_sign = (len({number > 0 for number in h.values()}) == 1 for h in self.equalities)
         return not any(one_sign) and all(max(g.values()) > 0 for g in self.inequalities)
 
 
 def whole_space(size: int) -> Cell:
-    """Return what takes the place of the cells on reals."""
+    """Return the single cell of the domain reals."""
     return Cell("", size, (1,) * size, dict.fromkeys(range(size), 1), [], [])
 
 
