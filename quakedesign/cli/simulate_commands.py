@@ -211,7 +211,7 @@ def _print_run(trajectory: Any, fault: Any, premises: Any, *texts: str) -> None:
     print_run(trajectory, fault, premises, console())
     if trajectory.energy:
         lost = f"{trajectory.energy.relative_residual:.2g} of the largest share"
-        print_lines([f"  energy that the integration loses: {lost}"])
+        print_lines([f"  energy error of the integration: {lost}"])
     print_lines([f"  {line}" for line in texts if line])
 
 

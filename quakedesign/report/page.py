@@ -509,7 +509,7 @@ def _way(comparison: "Compared") -> str:
     """What the pressure of the runs goes through."""
     paths = (e.design.setup.path.items() for e in comparison.of("designed"))
     stages = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
-    return f"the pressure in the runs acts {'through ' + ', '.join(stages) if stages else 'at once'}"
+    return f"the pressure in the runs acts {'through ' + ', '.join(stages) if stages else 'without delay'}"
 
 
 def _tables(comparison: "Compared") -> dict[str, Any]:

@@ -195,5 +195,5 @@ def test_a_sample_is_run_again_by_its_number_or_its_name(tmp_path):
 def test_what_is_proved_of_a_run_stands_last(capsys, monkeypatch, proved, energy):
     monkeypatch.setattr(terminal, "print_run", lambda *_: print("the run"))
     simulate_commands._print_run(SimpleNamespace(energy=energy), None, (), proved)
-    lost = ["  energy that the integration loses: 1.2e-09 of the largest share"] if energy else []
+    lost = ["  energy error of the integration: 1.2e-09 of the largest share"] if energy else []
     assert capsys.readouterr().out.splitlines() == ["the run", *lost, *([f"  {proved}"] if proved else [])]

@@ -117,7 +117,7 @@ def test_a_divergence_is_an_event_and_no_metric(run):
 def test_people_are_told_the_energy_that_is_lost(run):
     code, out, _ = run(*SHORT[:-1])
     assert code == 0
-    assert "energy that the integration loses" in out
+    assert "energy error of the integration" in out
 
 
 @pytest.mark.slow

@@ -203,7 +203,7 @@ def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path
 
 SLIDING = json.loads((PATH.parent / "certificates" / "sliding_crustal-patch.json").read_text(encoding="utf-8"))
 NEGATIVE = [
-    (HELD, ("loop", "of_reference"), [["0", "0"], ["0", "0"]], "of_reference must not be zero where it is given"),
+    (HELD, ("loop", "of_reference"), [["0", "0"], ["0", "0"]], "of_reference must not be zero if given"),
     (HELD, ("start",), {"slip": "0", "rate": "0"}, "a bound of the start must be above 0"),
     (HELD, ("start",), {"slip": "-1/9", "rate": "1/9"}, "bounds of the initial slip and slip rate"),
     (HELD, ("start",), {"slip": "1/9", "rate": "-1/9"}, "bounds of the initial slip and slip rate"),

@@ -192,7 +192,7 @@ def test_the_report_says_behind_what_its_runs_are():
         design = SimpleNamespace(setup=SimpleNamespace(path={name: time for name, time in path.items() if time}))
         return SimpleNamespace(of=lambda _: [SimpleNamespace(design=design)])
 
-    assert page._way(compared()) == page._way(compared(lag=F(0))) == "the pressure in the runs acts at once"
+    assert page._way(compared()) == page._way(compared(lag=F(0))) == "the pressure in the runs acts without delay"
     found = page._way(compared(delay=F("0.15"), lag=F("0.03"), diffusion=F(2)))
     assert found.endswith("acts through a delay of 0.15 s, a lag of 0.03 s, a diffusion path of L^2/D = 2 s")
 

