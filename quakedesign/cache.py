@@ -120,7 +120,7 @@ class CachedStatement(pickle.Pickler):
         return getattr(value, name)
 
     def reducer_override(self, value: Any) -> Any:
-        """How a value is written that is told by its fields or its items."""
+        """Text of a value given by its fields or its items."""
         if isinstance(value, MappingProxyType):
             return dict, (tuple(value.items()),)
         if not is_dataclass(value) or isinstance(value, type):
@@ -129,7 +129,7 @@ class CachedStatement(pickle.Pickler):
 
 
 def stated(value: Any, writer: type[CachedStatement] = CachedStatement) -> bytes | None:
-    """A question in bytes; None where it cannot be told."""
+    """The arguments of a computation in bytes; None if they have no such form."""
     content = io.BytesIO()
     try:
         writer(content).dump(value)

@@ -216,7 +216,7 @@ class SampledController(Controller):
         return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
 
     def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
-        """The pressure that is applied, what that is more than is asked for, over T_s, and the limit's states after."""
+        """The applied pressure, its excess over the commanded one divided by T_s, and the next states of the limit."""
         commanded = _combined((*self.law.output, *self.law.feedback), self._read(signals))
         commanded += self._of_reference(signals)[-1]
         if self.rest_limit is None:

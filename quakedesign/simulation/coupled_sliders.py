@@ -435,7 +435,7 @@ def simulate_held_blocks(
 ) -> SlidersRun:
     """Blocks under a sampled law along the reference of slow sliding, from steady sliding at its first rate.
 
-    The planned pressure reaches the blocks as it is; what the law asks for beside it goes through the lag. The far end
+    The planned pressure reaches the blocks as it is; the commanded pressure goes through the lag. The far end
     rests. Each block has a sine of the stress, shifted by its share of a turn, which acts at once.
 
     Parameters

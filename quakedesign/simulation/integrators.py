@@ -112,7 +112,7 @@ _ITERATION_ERROR = 1e-3  # share of the tolerance; the usual 0.33 lets the slip 
 
 
 class StoppedError(RuntimeError):
-    """The solver could not go on; the run that asked for it says where."""
+    """The solver failed; the run that called it reports where."""
 
 
 class AdaptiveIntegrator:

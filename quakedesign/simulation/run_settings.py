@@ -178,7 +178,7 @@ def sampled_scheme(
 def own_path(
     controller: Controller | None, actuator: Actuator | None, substeps: int = 1
 ) -> tuple[Actuator | None, int]:
-    """Actuator and substeps of a named scheme: as told, else what a law of samples is for, and what it needs."""
+    """Actuator and substeps of a named scheme: the given ones, else those of a sampled law's design."""
     sampling = controller.sampling if controller else None
     if actuator is not None or sampling is None:
         return actuator, substeps

@@ -36,12 +36,12 @@ class SlidingRun(LoopTrajectory):
     Attributes
     ----------
     theta, asked, stress : ndarray
-        State of friction [s], pressure that the law asks for beside that of the reference, and shear stress disturbance
+        State of friction [s], pressure commanded in addition to that of the reference, and shear stress disturbance
         [Pa], shape (n,).
     """
 
     theta: "np.ndarray" = signal("state of friction", "s")
-    asked: "np.ndarray" = signal("pressure that the law asks for beside that of the reference", "Pa")
+    asked: "np.ndarray" = signal("pressure commanded in addition to that of the reference", "Pa")
     stress: "np.ndarray" = signal("shear stress disturbance", "Pa")
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
@@ -230,7 +230,7 @@ class _Loop:
         return self.pressure_per_slip * self.reference.slip(time)
 
     def pressure(self, time: Any, held: Any, since: Any, modes: Any, exp: Callable[[Any], Any] = np.exp) -> Any:
-        """Pressure [Pa] of the fault at a time [s], `since` [s] after the law asked for `held` [Pa]."""
+        """Pressure [Pa] of the fault at a time [s], `since` [s] after the law commanded `held` [Pa]."""
         direct, layered = held * (1 - sum(self.share)), 0
         for i, (rate, share) in enumerate(zip(self.decay, self.share, strict=True)):
             layered = layered + share * (held + (modes[i] - held) * exp(-rate * since))

@@ -360,11 +360,11 @@ class Instruments:
         return cls(step, Actuator(stages=path.stages).part, _remembering(_read(transducer, step)), *stages)
 
     def read(self, slip: float) -> float:
-        """Slip [m] that is told."""
+        """Measured slip [m]."""
         return float(self._reading(slip))
 
     def pump(self, asked: float, planned: float) -> float:
-        """Pressure [Pa] beside a planned one that is held, of what is asked for beside it."""
+        """Held pressure [Pa] in addition to a planned one, for the commanded one."""
         return float(self._pumped(float(self._late(asked)) + planned)) - planned
 
     def sections(self, now: float, before: float, after: float) -> list[tuple[float, float, float]]:

@@ -234,7 +234,7 @@ class _History:
         return found, np.array([now] if risen else [])
 
     def _joined(self, start: "np.ndarray", parts: list[SmoothSolution]) -> SmoothSolution:
-        """All parts; where a variable jumps, both values are kept, or the later one at an instant that is asked for."""
+        """All parts; at a jump of a variable with both values, at a requested instant with the later one."""
         times, values = [parts[0].time[:1]], [start[:, None]]
         for part in parts:
             same = int(np.array_equal(part.values[:, 0], values[-1][:, -1]))

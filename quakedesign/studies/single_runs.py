@@ -696,7 +696,7 @@ def _premises(fault: Fault, chosen: Choice, run: Trajectory, seen: Sensor, schem
 
 
 def _natural(fault: Fault, settings: dict[str, Any], around: dict[str, Any]) -> Trajectory:
-    """Natural earthquake, to which nothing but the plant can be told."""
+    """Natural earthquake, whose only option is the plant."""
     usual = {"step": None, "scheme": "continuous", "method": "dormand-prince", "substeps": 1}
     others = [name for name, value in settings.items() if name != "plant" and value != usual[name]]
     others += list(around)

@@ -497,11 +497,11 @@ class Objective(ABC):
         return level * (1 + share if self.larger else 1 - share)
 
     def at(self, loop: Loop, level: float) -> Loop:
-        """Loop with the ranges that a level asks for."""
+        """Loop with the ranges of a level."""
         return loop
 
     def speed(self, level: float) -> float | None:
-        """1/T that a level asks for, see `pace_of`."""
+        """1/T that a level requires, see `pace_of`."""
         return None
 
     def norm_bound(self, level: float) -> float | None:
@@ -703,7 +703,7 @@ def _limits(
 
 
 def _shares(setting: PathSetting, loop: Loop, around: Neighbourhood) -> list[float]:
-    """Largest size of every a_j-th part of V on the box, where a rate is asked for: then V ≤ 1 there."""
+    """Largest size of every a_j-th part of V on the box, for a required rate: then V ≤ 1 there."""
     if not setting.objective.paced:
         return []
     sizes = box(loop, setting.units)

@@ -59,7 +59,7 @@ class Proposal:
 
 
 def joint_program(demands: Sequence[Demand]) -> "JointProgram":
-    """The programme of the structure that demands have, kept from the last time that it was asked for."""
+    """Cached programme for the structure of the demands."""
     key = len(demands[0].parts), *(d.template.structure for d in demands)
     program = _cached.pop(key, None) or JointProgram(demands)
     if len(_cached) >= _MOST_CACHED:

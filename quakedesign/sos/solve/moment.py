@@ -266,7 +266,7 @@ def _localizing(
 
 
 def options(accuracy: float) -> dict[str, float]:
-    """What Clarabel is asked for, by the names of its settings."""
+    """Settings of Clarabel."""
     exact = dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), accuracy)
     return {"presolve_enable": False, "chordal_decomposition_enable": False, "max_iter": 100, **exact}
 
