@@ -5,7 +5,7 @@ statement that was verified, or ``invalid`` with one reason. Exit code 0: all pr
 argument cannot be read, or the verdict not be written; 4: out of memory. The folder ``checker`` must
 stand beside this file.
 
-What has to be read: this file, checker/numbers.py, which reads files and computes, and what the kind of file imports.
+To trust a verdict, read this file, checker/numbers.py (reading and arithmetic) and the modules of the kind of file.
 """
 
 import os
@@ -20,11 +20,11 @@ from types import CodeType, ModuleType
 from typing import Any
 
 FOLDER = Path(__file__).resolve().with_name("checker")
-PACKAGE = f"{__name__}_checker".replace(".", "_")  # no other module goes by this name
+PACKAGE = f"{__name__}_checker".replace(".", "_")  # a name that no other module has
 
 
 class Source(SourceFileLoader):
-    """A module as its source says: compiled files are not believed, nor written."""
+    """Loads a module from its source: compiled files are neither read nor written."""
 
     def get_code(self, fullname: str) -> CodeType:
         """Compile the source."""
@@ -32,10 +32,10 @@ class Source(SourceFileLoader):
 
 
 class Finder(MetaPathFinder):
-    """Finds the modules of the folder, and nothing else; none is found in any other place."""
+    """Finds the modules of the folder there only, and no others."""
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
-        """Where a module of the package lies; an OSError names the file that is missing."""
+        """Location of a module of the package; an OSError names a missing file."""
         package, *parts = fullname.split(".")
         if package != PACKAGE:
             return None
@@ -52,7 +52,7 @@ sys.meta_path.insert(0, Finder())
 
 
 def beside(name: str) -> ModuleType:
-    """Load a module of the folder ``checker``, with what it imports."""
+    """Load a module of the folder ``checker``, with its imports."""
     return import_module(f"{PACKAGE}.{name}")
 
 
@@ -80,7 +80,7 @@ class Result:
 
 
 def check(text: str) -> Result:
-    """Verify the text of a file; it is Refused if a rule is broken, which says nothing about the claim itself."""
+    """Verify the text of a file; Refused if a rule is broken, whether or not the claim is true."""
     numbers.budget.renew()
     document = numbers.read_object(numbers.parse(text), "the file")
     version = document.get("format")
@@ -116,7 +116,7 @@ def check_polynomial(document: dict[str, Any]) -> Result:
 
 
 def check_guarantee(document: dict[str, Any]) -> Result:
-    """Verify a file about a loop that runs."""
+    """Verify the guarantee of a file."""
     kind = document["kind"]
     modules = {"guarantee": "tracking", "slow_sliding": "slow_sliding", "stick_slip": "stick_slip"}
     modules["uncertain_plant"] = "plant"
@@ -148,7 +148,7 @@ def report(name: str) -> int:
     except Refused as error:
         print(f"{ascii(name)[1:-1]}: invalid: {error}")
         return 1
-    except MemoryError:  # nothing is said about the file
+    except MemoryError:  # no verdict on the file
         print(f"FILE must fit into memory. Received {name!a}. Raise the limit.", file=sys.stderr)
         return 4
     except Outdated:
@@ -179,10 +179,10 @@ if __name__ == "__main__":
             raise OSError("standard output is closed")
         code = main(sys.argv[1:])
         sys.stdout.flush()
-    except BrokenPipeError:  # nobody reads on: no verdict was told
+    except BrokenPipeError:  # the output is closed: the verdict was not printed
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
-    except OSError as error:  # no verdict was told either
+    except OSError as error:  # the verdict was not printed either
         print(f"The verdict must be written. Received: {error}. Redirect it.", file=sys.stderr)
         os._exit(2)
     sys.exit(code)

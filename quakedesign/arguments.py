@@ -175,7 +175,7 @@ _late = cache(_Late)
 
 @cache
 def _hint(function: Callable[..., Any], name: str) -> Any:
-    """Type of a parameter; what cannot be told outside of a type checker is anything."""
+    """Type of a parameter; Any if only a type checker could resolve it."""
     hint = _signature(function).parameters[name].annotation
     if not isinstance(hint, str):
         return Any if hint is Parameter.empty else hint

@@ -5,9 +5,9 @@ libraries, and the machine. So nothing is ever out of date. A search only propos
 is decided in exact arithmetic each time.
 
 The folder is that of ``QUAKEDESIGN_CACHE`` (``off`` for none), else ``quakedesign`` in the user's folder for caches
-(``XDG_CACHE_HOME``, ``~/.cache``; ``~/Library/Caches``). It counts if it is a folder of this user that nobody else may
-write, and so does each file; a file that is not what was written counts as none. Files appear whole, and the oldest go
-when they are too much together. Whatever fails, as where nothing can be written: the work is done anew.
+(``XDG_CACHE_HOME``, ``~/.cache``; ``~/Library/Caches``). It is used if it belongs to this user and nobody else may
+write it, and so is each file; a changed file is ignored. Files are written atomically, and the oldest are deleted when
+their total size is too large. After any failure, as where nothing can be written, the work is done again.
 """
 
 import io
@@ -120,7 +120,7 @@ class CachedStatement(pickle.Pickler):
         return getattr(value, name)
 
     def reducer_override(self, value: Any) -> Any:
-        """How a value is written that is told by its fields or its items."""
+        """Text of a value given by its fields or its items."""
         if isinstance(value, MappingProxyType):
             return dict, (tuple(value.items()),)
         if not is_dataclass(value) or isinstance(value, type):
@@ -129,7 +129,7 @@ class CachedStatement(pickle.Pickler):
 
 
 def stated(value: Any, writer: type[CachedStatement] = CachedStatement) -> bytes | None:
-    """A question in bytes; None where it cannot be told."""
+    """The arguments of a computation in bytes; None if they have no such form."""
     content = io.BytesIO()
     try:
         writer(content).dump(value)

@@ -1,4 +1,4 @@
-"""Random tests draw the same examples every time, and are in no hurry; every worker computes on one thread."""
+"""Random tests are reproducible and have no deadline; every worker computes on one thread."""
 
 import contextlib
 import gc
@@ -9,20 +9,20 @@ import sys
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-os.environ["QUAKEDESIGN_CACHE"] = "off"  # tests compute, and leave the cache of the user alone
+os.environ["QUAKEDESIGN_CACHE"] = "off"  # tests compute, and do not use the user's cache
 
 import pytest
 from hypothesis import settings
 
-sys.set_int_max_str_digits(640)  # so that an exact number that is written by `str` is found by a shorter one
+sys.set_int_max_str_digits(640)  # the minimum: `str` of a long exact number fails early
 for name, examples in (("reproducible", 25), ("thorough", 100)):  # the second with --hypothesis-profile=thorough
     settings.register_profile(name, max_examples=examples, derandomize=True, print_blob=True, deadline=None)
 settings.load_profile("reproducible")
 
 ROOT = Path(__file__).parent.parent
-sys.path.append(str(ROOT / "tests" / "data"))  # parts of a user's own, `own_parts`
+sys.path.append(str(ROOT / "tests" / "data"))  # user-defined parts, `own_parts`
 sys.path.append(str(ROOT / "benchmarks"))  # studies beside the package
-sys.path.append(str(ROOT / "notebooks"))  # what stands beside the notebooks, `own`
+sys.path.append(str(ROOT / "notebooks"))  # modules of the notebooks, `own`
 LAUNCH = """
 import os, signal, sys
 for name in ("SIGINT", "SIGTERM", "SIGHUP"):
@@ -33,7 +33,7 @@ os.execv(sys.executable, [sys.executable, *sys.argv[2:]])
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection():
-    """Ten thousand tests are made, none of which is garbage; what they leave is searched at the end of each file."""
+    """Ten thousand tests are created, none of which is garbage; garbage is collected at the end of each file."""
     gc.disable()
     yield
     gc.freeze()
@@ -42,12 +42,12 @@ def pytest_collection():
 
 
 NOTEBOOK = "02_equations_and_scaling.ipynb"
-"""The one that runs by default; the others do with -m slow."""
+"""Notebook that runs by default; the others run with -m slow."""
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """The longest files first, so that no worker is left alone with one of them at the end."""
+    """The longest files first, so that no worker ends with one of them alone."""
     moving = [item.nodeid for item in items if " at 0x" in item.nodeid]
     if moving:
         raise pytest.UsageError(f"a name with an address differs from worker to worker: {moving[0]}")
@@ -59,17 +59,17 @@ def pytest_collection_modifyitems(items):
 
 @pytest.fixture(scope="module", autouse=True)
 def _no_warning_wanders():
-    """What a file of tests has left open is warned of there, and not in another file."""
+    """Warnings about unclosed resources of a test file are raised in that file."""
     yield
     gc.collect()
-    gc.freeze()  # what lives on is not searched again
+    gc.freeze()  # remaining objects are not searched again
 
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
-    """What another file has searched, compiled, run or drawn is taken from one folder of all workers.
+    """Results that another file has searched, compiled, run or drawn are cached in one folder of all workers.
 
-    For tests of what is shown. A test of a computation computes.
+    For tests of output. A test of a computation computes.
     """
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "kept"
@@ -80,7 +80,7 @@ def kept(tmp_path_factory):
 
 @pytest.fixture
 def start(tmp_path):
-    """Starts Python with some arguments, in a session and with signals of its own; ends and closes it in any case.
+    """Starts Python with some arguments, in its own session and with its own signals; always ends and closes it.
 
     Its workers hold its stderr, so that `communicate` returns when the last of them is gone.
     """
@@ -103,7 +103,7 @@ def start(tmp_path):
 
     yield begin
     for process in started:
-        with contextlib.suppress(ProcessLookupError):  # all of its session are gone, and so is its number
+        with contextlib.suppress(ProcessLookupError):  # the session has no processes left
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         process.stdout.close()

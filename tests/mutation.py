@@ -1,11 +1,11 @@
-"""Change the rooms that decide, one place at a time, and list the changes that no test notices.
+"""Mutation testing: change modules in one place at a time, and list the mutants that no test detects.
 
 Usage: ``python tests/mutation.py MODULE.py... --tests TEST... [--results FILE]``. The tests are collected once and
-run once to learn which of them reaches which line. Every mutant then gets a forked child, in which the code of
-the functions is exchanged and the tests that reach the line run, quickest first, until one fails. Results are
-JSON lines: a mutant that was killed is not tried again, one that survived is, unless ``mutation_equivalents.toml``
+run once to record which of them reaches which line. Every mutant then gets a forked child, in which the code of
+the functions is exchanged and the tests that reach the line run, fastest first, until one fails. Results are
+JSON lines: a killed mutant is not tried again, a surviving one is, unless ``mutation_equivalents.toml``
 explains it with a reason: by module, line and mutation, or by a rule for all lines and mutations that match its
-patterns. A rule says which tests hold what it leaves free. Without tests the results so far are reported.
+patterns. A rule names the tests of what it excepts. Without tests the results so far are reported.
 
 Not mutated: annotations, strings, messages of errors, imports, and ``strict`` of ``zip``, which guards no input.
 """
@@ -42,7 +42,7 @@ from hypothesis import settings
 ROOT = Path(__file__).parent.parent
 EQUIVALENTS = Path(__file__).with_name("mutation_equivalents.toml")
 CALLS = 25  # of one function in one test that are followed line by line
-LONGEST = 4  # seconds that a test may take when lines are followed, else it is left out
+LONGEST = 4  # seconds that a test may take when lines are followed; longer ones are omitted
 MEMORY = 6 * 2**30  # bytes of address space that a mutant may fill
 
 COMPARISONS = {
@@ -72,12 +72,12 @@ def changed(node: ast.AST, **fields: object) -> ast.AST:
 
 
 def replaced(entries: list, index: int, *new: object) -> list:
-    """Return a list with one entry replaced or left out."""
+    """Return a list with one entry replaced or omitted."""
     return [*entries[:index], *new, *entries[index + 1 :]]
 
 
 def numbers_near(value: object) -> Iterator[object]:
-    """Yield what a constant is changed to."""
+    """Yield the mutations of a constant."""
     if isinstance(value, bool):
         yield not value
     elif isinstance(value, int):
@@ -87,7 +87,7 @@ def numbers_near(value: object) -> Iterator[object]:
 
 
 def variants(node: ast.AST, returns_bool: bool) -> Iterator[ast.AST]:
-    """Yield what can stand in the place of a node."""
+    """Yield the mutations of a node."""
     match node:
         case ast.Compare():
             for i, operator in enumerate(node.ops):
@@ -124,7 +124,7 @@ def forced(parent: ast.AST, name: str, node: ast.AST) -> Iterator[ast.AST]:
 
 
 def is_text(parent: ast.AST, name: str, index: int | None) -> bool:
-    """Tell whether a field holds annotations, messages or what else is not mutated."""
+    """Whether a field holds annotations, messages or other code that is not mutated."""
     match parent:
         case ast.Raise() | ast.keyword(arg="strict") | ast.arg():
             return True
@@ -136,7 +136,7 @@ def is_text(parent: ast.AST, name: str, index: int | None) -> bool:
 
 
 def places(parent: ast.AST, returns_bool: bool) -> Iterator[tuple[ast.AST, str, int | None, ast.AST, bool]]:
-    """Yield every node below another one with where it stands and whether its function returns a truth value."""
+    """Yield every descendant of a node with its place and whether its function returns a truth value."""
     for name, value in ast.iter_fields(parent):
         for index, node in enumerate(value) if isinstance(value, list) else [(None, value)]:
             if not isinstance(node, ast.AST) or is_text(parent, name, index):
@@ -231,13 +231,13 @@ def apply(mutant: Mutant, functions: list[types.FunctionType], modules: list[typ
 
 
 def living() -> list[object]:
-    """All objects that the garbage collector knows, those that `conftest.py` has frozen among them."""
+    """All objects of the garbage collector, including those that `conftest.py` has frozen."""
     gc.unfreeze()
     return gc.get_objects()
 
 
 def caches_in(objects: list[object], folder: Path) -> list[functools._lru_cache_wrapper]:
-    """Caches of functions of a folder: what they hold since the tests were collected knows no mutation."""
+    """Caches of functions of a folder: their entries from the collection of tests are without mutation."""
     caches = [entry for entry in objects if isinstance(entry, functools._lru_cache_wrapper)]
     codes = [getattr(inspect.unwrap(entry), "__code__", None) for entry in caches]
     pairs = zip(caches, codes, strict=True)
@@ -245,7 +245,7 @@ def caches_in(objects: list[object], folder: Path) -> list[functools._lru_cache_
 
 
 def exchange_defaults(old: Mapping[str, object], new: Mapping[str, object]) -> None:
-    """Give functions, inside of what is wrapped around them, the defaults of others of the same name."""
+    """Give functions, unwrapped from decorators, the defaults of others of the same name."""
     for name, function in old.items():
         wrapped = callable(function) or isinstance(function, classmethod | staticmethod)
         inner, other = (inspect.unwrap(one) if wrapped else one for one in (function, new.get(name)))
@@ -264,7 +264,7 @@ def exchange_numbers(old: object, new: object) -> None:
 
 
 def in_child(work, seconds: float) -> tuple[str, bytes]:
-    """Run work in a forked child; return how it ended, ``done`` or ``timeout``, and what it returned."""
+    """Run work in a forked child; return its end, ``done`` or ``timeout``, and its result."""
     with tempfile.TemporaryFile() as answer:
         child = os.fork()
         if child == 0:
@@ -283,7 +283,7 @@ def in_child(work, seconds: float) -> tuple[str, bytes]:
                 os._exit(0)
         _, status = os.waitpid(child, 0)
         try:
-            os.killpg(child, signal.SIGKILL)  # what the tests have started
+            os.killpg(child, signal.SIGKILL)  # processes that the tests have started
         except (ProcessLookupError, PermissionError):
             pass
         answer.seek(0)
@@ -328,7 +328,7 @@ class Reached:
         result = {}
         signal.signal(signal.SIGVTALRM, stop)
         for item in items:
-            for cache in self.caches:  # else the first test alone would reach what it keeps
+            for cache in self.caches:  # else only the first test would reach the lines of cached results
                 cache.cache_clear()
             signal.setitimer(signal.ITIMER_VIRTUAL, LONGEST)
             self.calls, self.lines, start = Counter(), defaultdict(set), time.process_time()
@@ -362,7 +362,7 @@ class Mutation:
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_collection(self) -> None:
-        """Take from random tests their deadline: a busy machine kills no mutant."""
+        """Remove the deadline of random tests: a busy machine kills no mutant."""
         settings.register_profile("patient", settings.get_profile("reproducible"), deadline=None)
         settings.load_profile("patient")
 
@@ -380,7 +380,7 @@ class Mutation:
         self.caches = caches_in(objects, ROOT)
         del objects
         gc.collect()
-        gc.freeze()  # what children need not look at
+        gc.freeze()  # not searched in children
         items = {item.nodeid: item for item in session.items}
         reached = self.reached(session.items)
         self.seconds = {name: seconds for name, (seconds, _, _) in reached.items()}
@@ -488,7 +488,7 @@ class Rule:
         Regular expressions.
     reason : str
     held : list of str
-        Tests that fail where what the lines do is left out altogether.
+        Tests that fail without the lines.
     """
 
     module: str
@@ -498,7 +498,7 @@ class Rule:
     held: list[str] = field(default_factory=list)
 
     def explains(self, key: tuple[str, str, str]) -> bool:
-        """Tell whether a mutant is of the kind."""
+        """Whether the rule applies to a mutant."""
         module, line, mutation = key
         return bool(
             fnmatch.fnmatch(module, self.module) and re.search(self.line, line) and re.search(self.mutation, mutation)
@@ -506,7 +506,7 @@ class Rule:
 
 
 class Explanations:
-    """Mutants that no test needs to tell from the original, with the reason."""
+    """Mutants that are equivalent to the original, with the reason."""
 
     def __init__(self) -> None:
         entries = tomllib.loads(EQUIVALENTS.read_text(encoding="utf-8"))
@@ -514,7 +514,7 @@ class Explanations:
         self.rules = [Rule(**row) for row in entries["rule"]]
 
     def of(self, key: tuple[str, str, str]) -> str:
-        """Say whether a mutant is ``equivalent``, explained ``by rule``, or neither (an empty text)."""
+        """``equivalent``, ``by rule``, or an empty text for an unexplained mutant."""
         if key in self.single:
             return "equivalent"
         return "by rule" if any(rule.explains(key) for rule in self.rules) else ""
@@ -542,7 +542,7 @@ def report(options: argparse.Namespace) -> int:
 
 
 def main() -> int:
-    """Run the tests on the mutants where tests are given, and report."""
+    """Run the tests, if any are given, on the mutants, and report."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("modules", nargs="+", type=Path)
     parser.add_argument("--tests", nargs="*", default=[], help="without them the results so far are reported")

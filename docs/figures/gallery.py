@@ -29,7 +29,7 @@ def same_slip():
 
 
 def sampling_times():
-    """The sampling time that a bound on the slip rate needs."""
+    """Sampling time required for a bound on the slip rate."""
     fault = qd.load_fault("real-fault")
     times = [50, 100, 150, 200, 250, 300, 350, 400, 450]  # ms
     found = [qd.guarantee(fault, step=f"{time} ms") for time in times]
@@ -43,7 +43,7 @@ def sampling_times():
 
 
 def margins():
-    """How far an LQR and a PID are from instability."""
+    """Stability margins of an LQR and a PID."""
     fault = qd.load_fault("real-fault")
     lqr = qd.SampledLaw.from_gains([1.8e9, 3.0e8, 2.1e9, 1.0e9], step="184 ms", label="LQR")
     pid = qd.SampledLaw.from_pid(3e8, 1e8, 2e8, N=40, step="50 ms", label="PID")
@@ -55,7 +55,7 @@ def margins():
 
 
 def velocity_step():
-    """The friction law that a velocity step shows."""
+    """Friction law identified from a velocity step."""
     found = qd.identify(DATA / "records" / "sepiolite_2.csv")
     slip = 1e6 * found.record.load_point
     figure, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
@@ -67,7 +67,7 @@ def velocity_step():
 
 
 def blocks():
-    """Whether the blocks of a fault slide together."""
+    """Slip of the blocks of a fault under control."""
     chain = qd.load_chain(DATA / "three_blocks.toml")
     found = qd.guarantee(chain)
     run = simulate_blocks(chain, found.controller, duration=86400.0)
@@ -93,7 +93,7 @@ def seismic_cycle():
 
 
 def campaign():
-    """How errors spread over the parameters of the box."""
+    """Distribution of errors over the parameters of the box."""
     fault = qd.load_fault("lab-fault", box="ten-percent")
     problem = qd.campaign_problem(fault, qd.design(fault, "cta").controller, seed=1)
     with TemporaryDirectory() as folder:

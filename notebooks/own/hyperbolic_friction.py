@@ -1,4 +1,4 @@
-"""A friction law of one's own: weakening that never quite ends, μ = residual + drop/(1 + slip/length)."""
+"""User-defined friction law: hyperbolic weakening, μ = residual + drop/(1 + slip/length)."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -10,7 +10,7 @@ from quakedesign.fault import FrictionLaw
 
 @dataclass(frozen=True, kw_only=True)
 class HyperbolicWeakening(FrictionLaw):
-    """Friction that falls hyperbolically with slip [-]; made up for this notebook."""
+    """Friction that decreases hyperbolically with slip [-]; invented for this notebook."""
 
     name: ClassVar[str] = "hyperbolic-weakening"
     source: ClassVar[str] = "this notebook"
@@ -25,7 +25,7 @@ class HyperbolicWeakening(FrictionLaw):
         return self.residual + self.drop / (1 + slip / self.length)
 
     def extended(self, slip, rate):
-        """Friction coefficient [-], held for negative slip."""
+        """Friction coefficient [-], constant for negative slip."""
         return self.coefficient(sp.Max(slip, 0), rate)
 
     @property

@@ -1,4 +1,4 @@
-"""The plants on which Theorem 2 of the paper, taken as printed, fails (ERRATA 6, 7), with designs that hold."""
+"""Plants for which Theorem 2 as printed fails (ERRATA 6, 7), with designs that are proved."""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -58,7 +58,7 @@ class ExactDesign:
 
 
 def printed_design(example: Example) -> ExactDesign:
-    """K and Θ of Theorem 2 as printed, Q = Q0 + R·GᵀG; the theorem takes this for a proof."""
+    """K and Θ of Theorem 2 as printed, Q = Q0 + R·GᵀG; the theorem states that this is a proof."""
     g = (*example.printed, Fraction(0), Fraction(0))
     return _designed(example, times(example.R, outer(g, g)))
 

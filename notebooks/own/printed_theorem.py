@@ -124,7 +124,7 @@ _GRID = (-8, 8, 3201)
 
 
 def propose(question: TheoremProblem) -> tuple[list[Fraction], Fraction] | None:
-    """Six free entries of P and the split of D with about the largest margin; None where no margin is seen."""
+    """Six free entries of P and the split of D with about the largest margin; None without a positive margin."""
     split = _best_split(question)
     start = question.F(question.P((Fraction(0),) * 6), bound_of(question, split))
     sizes = [max(abs(v), Fraction(1, 10**40)) for v in _moments(start)]
@@ -215,7 +215,7 @@ def _entries(start: Matrix, L: Sequence[Fraction], extra: Matrix) -> list[Fracti
 
 
 def near(value: float | Fraction, bits: int) -> Fraction:
-    """Nearest number of a given count of binary digits; 0 for what is not finite."""
+    """Nearest number with a given number of binary digits; 0 if not finite."""
     if not math.isfinite(value) or value == 0:
         return Fraction(0)
     unit = Fraction(2) ** (math.floor(math.log2(abs(float(value)))) - bits)
@@ -405,7 +405,7 @@ Range = tuple[Fraction, Fraction]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BothTests:
-    """What the printed and the sound test say about one K.
+    """Results of the printed and the sound test for one K.
 
     Attributes
     ----------

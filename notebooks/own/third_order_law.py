@@ -1,4 +1,4 @@
-"""A homogeneous control law of one's own: a third-order sliding mode with nested signed powers."""
+"""User-defined homogeneous control law: a third-order sliding mode with nested signed powers."""
 
 import sympy as sp
 

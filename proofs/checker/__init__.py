@@ -1,1 +1,1 @@
-"""What `check.py` verifies files with: numbers, squares, polynomials, closed loops and guarantees (FORMAT.md)."""
+"""Modules of `check.py`: numbers, squares, polynomials, closed loops and guarantees (FORMAT.md)."""

@@ -52,7 +52,7 @@ def check_powers(proof: Any, size: int, where: str) -> None:
 
 
 def decide(document: dict[str, Any]) -> tuple[str, list[str]]:
-    """Verify a file: its verdict, and what was verified."""
+    """Verify a file: its verdict and statement."""
     read_object(document, "the file", (*CLAIM_KEYS, *(("negative",) if "negative" in document else PROOF_KEYS)))
     names = [read_name(name, "variables") for name in read_list(document["variables"], "variables", 1, MAX_VARIABLES)]
     need(len(set(names)) == len(names), "variables", "different from each other", names)
@@ -105,6 +105,6 @@ def refute(
     rests = not any(evaluate(entry, point) for entry in field)
     return [
         f"point: {named(dict(zip(names, point, strict=True)))}",
-        "conclusion: V <= 0 or its derivative is >= 0 there, so that this V does not prove it",
-        *(["the field vanishes there, so that no other V helps"] if rests else []),
+        "conclusion: V <= 0 or its derivative is >= 0 there, so that this V proves no such statement",
+        *(["the field vanishes there, so that no other V proves it"] if rests else []),
     ]

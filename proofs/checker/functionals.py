@@ -13,7 +13,7 @@ from .squares import MAX_REDUCED, is_positive_definite
 MAX_MONOMIALS = 2000  # of a basis before reduction
 DIGIT = 12  # bits of an exponent in a coded monomial; the largest exponent, of multiplier * polynomial, is 1998
 
-Coded = dict[int, int]  # integer coefficients by monomials, each one an integer, so that their products are sums
+Coded = dict[int, int]  # integer coefficients by monomials, coded as integers, so that products of monomials are sums
 
 
 def coded(polynomial: Polynomial, where: str) -> Coded:
@@ -57,7 +57,7 @@ def reduce(bases: dict[Product, list[int]], factors: dict[Product, Coded], kept:
     """Drop monomials whose diagonal Gram entries must be zero, as long as there are any.
 
     Where only positive diagonal entries contribute to a monomial that is not kept, they add up to zero: each is
-    zero, and its row with it. What hinders can only become less, so the order does not matter.
+    zero, and its row with it. Other contributions can only decrease, so the order does not matter.
     """
     hindering: Counter[int] = Counter()  # by monomial, the number of all other contributions
     diagonal: dict[int, list[tuple[Product, int]]] = defaultdict(list)

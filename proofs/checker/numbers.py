@@ -1,6 +1,6 @@
 """Rationals and polynomials: read strictly, computed exactly, every step counted.
 
-A polynomial maps tuples of exponents to nonzero fractions. What breaks a rule is `Refused`; `budget` counts what the
+A polynomial maps tuples of exponents to nonzero fractions. A broken rule raises `Refused`; `budget` counts what the
 arithmetic costs, before it is done, so that every file ends in bounded time and memory.
 """
 
@@ -12,7 +12,7 @@ from itertools import accumulate, product
 from math import lcm, prod
 from typing import Any, NoReturn
 
-# These bound what a hostile file can cost; an honest one is far below.
+# Limits of the cost of a hostile file; honest files stay far below.
 MAX_BYTES, MAX_NESTING = 4 * 2**20, 12
 MAX_POLYNOMIAL = 20_000  # terms
 MAX_DENOMINATOR_BITS = 2**14  # common denominator of a Gram matrix, of weights or of a polynomial
@@ -119,7 +119,7 @@ def read_object(value: Any, where: str, keys: Iterable[str] | None = None) -> di
 def read_rational(value: Any, where: str, *, positive: bool = False) -> Fraction:
     """Convert a rational in canonical form."""
     matches = type(value) is str and RATIONAL.fullmatch(value) is not None
-    need(matches, where, 'a string such as "-3/2", at most 400 digits above and below', value)
+    need(matches, where, 'a string such as "-3/2", each part of at most 400 digits', value)
     numerator, _, denominator = value.partition("/")
     number = Fraction(int(numerator), int(denominator or 1))
     need(str(number) == value, where, "in lowest terms", value)

@@ -27,7 +27,7 @@ from .numbers import (
 from .squares import check_identity, read_square
 
 MAX_VARIABLES, MAX_CONSTRAINTS, MAX_PRODUCTS = 16, 32, 1024
-KEPT = 300  # steps for a term that is kept, so that memory is bounded too
+KEPT = 300  # steps for a term in the cache, so that memory is bounded too
 
 STATEMENT_KEYS = ("format", "variables", "polynomial", "inequalities", "equalities", "products", "degree", "multiplier")
 
@@ -60,7 +60,7 @@ def read_product(value: Any, where: str, count: int) -> Product:
 
 
 def read_statement(document: dict[str, Any]) -> Statement:
-    """Read everything that the three kinds of proof share."""
+    """Read the common part of the three kinds of proof."""
     entries = read_list(document["variables"], "variables", 1, MAX_VARIABLES)
     variables, degree, size = [read_name(name, "variables") for name in entries], document["degree"], len(entries)
     need(len(set(variables)) == size, "variables", "different from each other", variables)
@@ -80,7 +80,7 @@ def read_statement(document: dict[str, Any]) -> Statement:
 
 
 def product_expander(statement: Statement) -> Expander:
-    """Return a function that expands a product of inequalities, and remembers it."""
+    """Return a function that expands a product of inequalities, with a cache."""
 
     @cache
     def expand_product(chosen: Product) -> Polynomial:
@@ -104,7 +104,7 @@ def terms_text(polynomial: Polynomial, statement: Statement, form: str = "{0}*{1
 
 
 def describe_statement(statement: Statement) -> list[str]:
-    """Describe what the verdict is about."""
+    """Describe the statement of the verdict."""
     products = ("*".join(f"[{index}]" for index in chosen) or "1" for chosen in statement.products)
     limits = [f"[{i}] = {terms_text(entry, statement)} >= 0" for i, entry in enumerate(statement.inequalities)]
     limits += [f"{terms_text(entry, statement)} = 0" for entry in statement.equalities]
@@ -160,7 +160,7 @@ def prove_squares(value: Any, statement: Statement) -> list[str]:
     for cofactor, equality in zip(cofactors, statement.equalities, strict=True):
         add_product(total, cofactor, equality)
     check_identity(statement.multiplier, statement.polynomial, total, "sos identity")
-    more = ["about nothing: the set is empty"] if is_empty(statement) else []
+    more = ["vacuous: the set is empty"] if is_empty(statement) else []
     return ["conclusion: the polynomial is >= 0 on the set (the degree of the identity is not verified)", *more]
 
 

@@ -14,7 +14,7 @@ FAULT = load_fault("real-fault")
 
 
 def held(law, slip):
-    """μ(x1), held at μ_max for x1 < 0."""
+    """μ(x1), with μ = μ_max for x1 < 0."""
     return law.residual + law.drop * np.exp(-np.maximum(slip, 0) / law.critical_slip)
 
 
@@ -24,7 +24,7 @@ def printed_law(law, slip):
 
 
 def row_12(friction: Callable = held) -> Finding:
-    """Push the fault backwards with a quarter of the paper's sine; look at the law on both sides of x1 = 0."""
+    """Drive the fault backwards with a quarter period of the paper's sine; evaluate the law on both sides of x1 = 0."""
     law = FAULT.friction
     slip = np.linspace(-3, 3, 6001)
     low, high = law.bounds
@@ -39,7 +39,7 @@ def row_12(friction: Callable = held) -> Finding:
     return Finding(
         bool(inside and agrees and run < 0 and wrong > high),
         f"from rest under −3.2e-4 sin(0.69t) m/s² the slip reaches {run:.2e} m < 0; at −1 m the printed law gives "
-        f"{wrong:.2f} > μ_max = {high:.4f} with slope {steep:.2f}/m; held at μ_max it keeps both bounds",
+        f"{wrong:.2f} > μ_max = {high:.4f} with slope {steep:.2f}/m; with μ = μ_max for x1 < 0 both bounds hold",
     )
 
 
@@ -86,7 +86,7 @@ def row_13(slowest: str = "1e-12") -> Finding:
     return Finding(
         bool(holds and both < 1e-15 and regularised(reached, theta) < least),
         f"logarithmic μ(1e-60 m/s) = {float(dives):.2f}; regularised μ(0) = {float(standing):.0f} with slope "
-        f"{float(slope):.1e} s/m; on V ≥ {slowest} m/s μ ≥ {float(least):.3f} for θ ≥ {float(theta):.0f} s; "
+        f"{float(slope):.1e} s/m; for V ≥ {slowest} m/s μ ≥ {float(least):.3f} at θ ≥ {float(theta):.0f} s; "
         f"ageing at V = 0 gives θ' = {float(ageing):.0f}, no equilibrium; the plant has order {order}",
     )
 
@@ -105,7 +105,7 @@ ROWS = (
     ErrataRow(
         number=12,
         printed="μ_res − Δμ e^{−x1/d_c} satisfies the friction bounds",
-        correct="only for x1 ≥ 0, which is not invariant; hold μ(x1 < 0) = μ_max",
+        correct="only for x1 ≥ 0, which is not invariant; set μ = μ_max for x1 < 0",
         kind="counterexample",
         check=row_12,
     ),

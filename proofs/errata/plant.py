@@ -52,7 +52,7 @@ def row_01(entries: Callable = correct_entries) -> Finding:
     right, wrong = float(worst[entries]), float(worst[printed_entries])
     return Finding(
         bool(right < 1e-25 < wrong and agrees),
-        f"20 random plants: off mpmath derivatives by at most {right:.0e}, the printed entries by up to {wrong:.3g}",
+        f"20 random plants: error against mpmath derivatives at most {right:.0e}, of the printed entries {wrong:.3g}",
     )
 
 
@@ -76,7 +76,7 @@ def row_02(unstable: Callable = either) -> Finding:
     called = bool(unstable(stiffness, -fault.specific_damping)) and derive(fault).unstable
     return Finding(
         wrong == 0 and both > 0 and called and round(pole, 3) == 0.468,
-        f"{wrong} of 4000 random plants misjudged ({both} with 'and'); the real fault's pole is {pole:+.4f} 1/s",
+        f"{wrong} of 4000 random plants misclassified ({both} with 'and'); the real fault's pole is {pole:+.4f} 1/s",
     )
 
 
@@ -156,7 +156,8 @@ def row_26(rest: tuple[float, float] = (7.098e-3, 0.7846)) -> Finding:
     late = 2**3 * (10 - 15 * 2 + 6 * 2**2)
     return Finding(
         bool(agrees and found[0] < 7.5e-3 and late > 1),
-        f"next rest at {found[0] * 1e3:.3f} mm and {found[1] * 1e3:.1f} mm, below 7.5 mm; r(2t_op) = {late} d_max",
+        f"next equilibrium at {found[0] * 1e3:.3f} mm and {found[1] * 1e3:.1f} mm, below 7.5 mm; "
+        f"r(2t_op) = {late} d_max",
     )
 
 
@@ -193,7 +194,7 @@ ROWS = (
     ErrataRow(
         number=26,
         printed="d_max = 7.1 mm and 7.5 mm; r(t) for every t",
-        correct="the next static rest is at 7.098 mm (784.6 mm); hold r after t_op",
+        correct="the next static equilibrium is at 7.098 mm (784.6 mm); r stays constant after t_op",
         kind="numeric reproduction",
         check=row_26,
     ),

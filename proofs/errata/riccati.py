@@ -104,7 +104,7 @@ def row_07(bound: Callable = diagonal_bound) -> Finding:
     return Finding(
         bool(worst < 0 and growth > 1.2 and covers and margin > -1e-9 and kept < 1),
         f"every constant vertex stable (slowest {worst:+.4f} 1/s), yet switching Δk̂ = ∓1 every {SOFT} and {STIFF} s at "
-        f"Δη̂ = −1 multiplies x by {growth:.3f} a period: ×48 after {until:.0f} s. With W (w = {split:.2f}) the same "
+        f"Δη̂ = −1 multiplies x by {growth:.3f} per period: ×48 after {until:.0f} s. With W (w = {split:.2f}) the same "
         f"period gives {kept:.3f} and V̇ ≤ −xᵀQ0x at every vertex (least eigenvalue {margin:+.0e})",
     )
 
@@ -120,7 +120,7 @@ def correct_rest_pressure(friction, N, sigma, k, r0, start, phi):
 
 
 def row_08(rest: Callable = correct_rest_pressure) -> Finding:
-    """Solve the shifted plant for rest at r0, measure from there, and let a straight friction law meet the bound."""
+    """Solve the shifted plant for its equilibrium at r0, shift to it, and compare linear weakening with the bound."""
     r0, y, q, phi, value, moved = sp.symbols("r_0 y q phi mu_0 mu_1", positive=True)
     balance = plant.shifted_acceleration().replace(plant.disturbance, lambda *_: phi)
     at = balance.replace(plant.mu, lambda *_: value).subs({plant.x1: r0, plant.x2: 0})
@@ -142,14 +142,14 @@ def row_08(rest: Callable = correct_rest_pressure) -> Finding:
     far = float(rest(straight, FAULT.authority, FAULT.effective_normal_stress, SPRING, 0.2, law.bounds[1], 0))
     return Finding(
         bool(same and shifted and enclosed and integral == -r0 and free and round(lowest / MEGA, 2) == -5.67),
-        f"p* reaches {lowest / MEGA:.2f} MPa on the real fault; for straight weakening at r0 = 0.2 m the increment of "
-        f"friction exceeds the printed bound by {1 - far / FAULT.effective_normal_stress:.3f}; "
-        f"at the origin ξ1' = {integral}, and rest at r0 needs k4 ≠ 0",
+        f"p* reaches {lowest / MEGA:.2f} MPa on the real fault; for linear weakening at r0 = 0.2 m the increment of "
+        f"friction exceeds the printed bound by a factor of {1 - far / FAULT.effective_normal_stress:.3f}; "
+        f"at the origin ξ1' = {integral}, and an equilibrium at r0 needs k4 ≠ 0",
     )
 
 
 def loop_at_rest(still: sp.Expr, r0: sp.Symbol) -> tuple[sp.Expr, bool]:
-    """ξ1' of the toolkit's e-LQR at the origin, and whether ξ2* of rest at r0 exists if and only if k4 ≠ 0."""
+    """ξ1' of the toolkit's e-LQR at the origin, and whether ξ2* of an equilibrium at r0 exists iff k4 ≠ 0."""
     law = control_law("elqr").from_values((1, 1, 1, 1), feedback="state")
     origin = Signals(slip=0, slip_rate=0, slip_error=-r0, slip_rate_error=0, integrals=(0, 0))
     k1, k4, xi2 = sp.symbols("k1 k4 xi2")
@@ -173,8 +173,8 @@ def row_09(nominal: Fraction | None = None) -> Finding:
     two = float(np.linalg.eigvalsh((pair + pair.T) / 2).min())
     return Finding(
         bool(least == 0 and printed < 0 and single and two < 0 and used == least_authority(fault)),
-        f"ten-percent box: ΔB from {float(printed):+.2e} m²/kg with μ_res·N̂, from {float(least):+.0e} with "
-        f"μ_res·N̂_min; two inputs with R^−1 = [[1, 0.9], [0.9, 1]] and ΔB = diag(1, 0) ≥ 0 leave an "
+        f"ten-percent box: least ΔB {float(printed):+.2e} m²/kg with μ_res·N̂, {float(least):+.0e} with "
+        f"μ_res·N̂_min; two inputs with R^−1 = [[1, 0.9], [0.9, 1]] and ΔB = diag(1, 0) ≥ 0 give an "
         f"eigenvalue {two:+.3f}",
     )
 
@@ -222,8 +222,9 @@ def row_11(bound: Callable = lambda g1, g2, x1, x2: g1 * abs(x1) + g2 * abs(x2))
     late = float(np.abs(run.outputs[-2000:] - run.outputs[-2000:].mean()).max())
     return Finding(
         bool(covered and printed > 0 and excess > 0 and abs(late / gain - 1) < 0.01 and late > 0),
-        f"{printed} of 5000 points leave the printed bound, none the sum of both; at the origin the sine exceeds every "
-        f"such bound by {excess:.1e} m/s², and the loop oscillates by {late:.3g} m ({gain:.3g} m by its gain)",
+        f"{printed} of 5000 points violate the printed bound, none the sum of both; at the origin the sine exceeds "
+        f"every such bound by {excess:.1e} m/s², and x1 keeps oscillating with amplitude {late:.3g} m (frequency "
+        f"response: {gain:.3g} m)",
     )
 
 

@@ -72,7 +72,7 @@ def balanced(field: Any, began: float, size: int) -> np.ndarray:
 
 
 def linear_reverse_share() -> tuple[float, float]:
-    """Share of the task with x2 < 0 for the e-LQR, from its frequency response, and its swing [m/s] half-way."""
+    """Share of the task with x2 < 0 for the e-LQR, from its frequency response, and its amplitude [m/s] half-way."""
     law, task, w = REAL.friction, REAL.reference, REAL.disturbance.frequency
     s = np.linspace(0, 1, 8001)
     r = task.target_slip * s**3 * (10 - 15 * s + 6 * s**2)
@@ -115,7 +115,7 @@ def row_14(order: float = 2.0) -> Finding:
         f"slip rate < 0 for {shares['cta', 0.184]:.0%} (2-CTA) and {shares['dia', 0.184]:.0%} (2-DIA) of the time at "
         f"184 ms, {shares['cta', 0.00184]:.0%} at 1.84 ms; rms rate error ∝ T_s^{slopes[0]:.2f}, T_s^{slopes[1]:.2f} "
         f"({errors['cta', 0.184]:.1e}, {errors['cta', 0.0184]:.1e}, {errors['cta', 0.00184]:.1e} m/s); e-LQR with the "
-        f"sine {linear:.1%} of the task, swing {swing:.2e} m/s (simulated {simulated:.2e})",
+        f"sine: {linear:.1%} of the task, amplitude {swing:.2e} m/s (simulated {simulated:.2e})",
     )
 
 
@@ -177,7 +177,8 @@ def row_21(widths: tuple[float, float] = (100, 1)) -> Finding:
         bool(unbounded and good < LIMIT < bad and fine[1e-5] > LIMIT and min(held.values()) > LIMIT),
         f"e-LQR at 10 µs with the disturbance: |x1| ≤ {good:.1e} m for λ_d = {widths[0]}, {bad:.1e} m for {widths[1]}, "
         f"{fine[1e-5]:.1e} m for the printed 1e-5; 2-CTA without disturbance {slow[100]:.1e} m for 100 and "
-        f"{slow[1e5]:.1e} m for 1e5; held for 1 ms at least {min(held.values()):.1e} m for λ_d = 1 … 1e6, all laws",
+        f"{slow[1e5]:.1e} m for 1e5; zero-order hold over 1 ms: at least {min(held.values()):.1e} m for "
+        "λ_d = 1 … 1e6, all laws",
     )
 
 
@@ -218,8 +219,8 @@ def row_22(said: dict[str, tuple] = RADII) -> Finding:
     hidden = amplification(poles, REAL.sampling_time)
     return Finding(
         bool(right and hidden < 1),
-        "spectral radius with a hold: " + ", ".join(lines) + f"; a Runge–Kutta step of 184 ms through the law has "
-        f"{hidden:.6f} and hides it",
+        "spectral radius with zero-order hold: " + ", ".join(lines) + "; a Runge–Kutta step of 184 ms through the law "
+        f"has {hidden:.6f} and hides the instability",
     )
 
 

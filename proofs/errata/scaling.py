@@ -109,8 +109,8 @@ def row_20(xi_factor: Callable = lambda by, law: by["slip"] * by["time"] if law 
         factor_off = max(factor_off, float(np.nanmax(np.abs(used / xi_factor(by, name) - 1))))
     return Finding(
         worst < 1e-9 and factor_off < 1e-6,
-        f"p^R = λ_p·p^L to {worst:.0e}; ξ1 grows by λ_p = {by['p']:.0f} in both sliding modes and by λ_δλ_t = "
-        f"{by['slip'] * by['time']:.0f} in the e-LQR (off by {factor_off:.0e}): one factor for all is 41 times wrong",
+        f"p^R = λ_p·p^L to {worst:.0e}; ξ1 scales by λ_p = {by['p']:.0f} in both sliding modes and by λ_δλ_t = "
+        f"{by['slip'] * by['time']:.0f} in the e-LQR (error {factor_off:.0e}): the ratio of both is 41",
     )
 
 

@@ -39,7 +39,7 @@ def matched_along_reference() -> dict[str, np.ndarray]:
 
 
 def row_15(amplitude: float = 3.2e-4) -> Finding:
-    """Divide |ḣ| of the paper's run, taken at both ends of β, by the L̄ that the gains can bear at all."""
+    """Divide |ḣ| of the paper's run, taken at both ends of β, by the largest L̄ that the gains admit."""
     shake, along = FAULT.disturbance, matched_along_reference()
     rate = amplitude * shake.frequency / np.array([along["beta"].max(), along["beta"].min()])
     gains = {name: published("real-fault")[name].gains for name in ("cta", "dia")}
@@ -60,8 +60,8 @@ def row_15(amplitude: float = 3.2e-4) -> Finding:
         bool(holds and round(tracking, 2) == 0.82 and room.min() < 5.7e-3 / 1000 and f"{loosest:.0e}" == "8e-07"),
         f"|ḣ| = {rate[0]:.1f} … {rate[1]:.1f} is {ratio['cta'][0]:.0f} … {ratio['cta'][1]:.0f} times the 2-CTA's bound "
         f"{limit['cta']:.4f} and {ratio['dia'][0]:.0f} … {ratio['dia'][1]:.0f} times the 2-DIA's {limit['dia']:.4f}; "
-        f"tracking alone uses {tracking:.2f}; the slope term admits |e2| ≤ {loosest:.1e} m/s for any friction of the "
-        f"bounds, {alone:.1e} m/s for this law and {room.min():.1e} m/s while tracking",
+        f"tracking alone takes {tracking:.2f} of the 2-CTA's; the slope term keeps to it for |e2| ≤ {loosest:.1e} m/s "
+        f"with any friction within the bounds, {alone:.1e} m/s with this law and {room.min():.1e} m/s while tracking",
     )
 
 
@@ -89,8 +89,8 @@ def row_16(rate: Callable = correct_rate) -> Finding:
     part = (steep - FAULT.specific_stiffness) / beta
     return Finding(
         bool(worst < 1e-20 and toolkit < 1e-20),
-        f"formula off mpmath by {float(worst):.0e}, the toolkit's by {float(toolkit):.0e}; the control enters by "
-        f"−η̂(ν + h), and by μ_x2 as well; on the real fault the slope term is {part:.2g}·e2 and damping adds "
+        f"error against mpmath {float(worst):.0e}, of the toolkit's formula {float(toolkit):.0e}; the control enters "
+        f"through −η̂(ν + h) and μ_x2; on the real fault the slope term is {part:.2g}·e2 and damping adds "
         f"{FAULT.specific_damping / beta:.2g}·e2'",
     )
 
@@ -224,7 +224,7 @@ def row_18(vertices: int = 4) -> Finding:
     return Finding(
         bool(corners == vertices and signs and at[2] < 0 < at[4]),
         f"no term in β², ḣ² or βḣ: {corners} vertices; the β-part is never positive for the 2-DIA (largest "
-        f"{parts['dia'][0]:+.1e}), both signs for the 2-CTA (up to {parts['cta'][0]:+.1e}): one V proves β = 1 "
+        f"{parts['dia'][0]:+.1e}) and has both signs for the 2-CTA (up to {parts['cta'][0]:+.1e}): one V proves β = 1 "
         f"(V̇ ≤ {at[2]:+.1e}) and not β = 40 ({at[4]:+.1e})",
     )
 
@@ -288,7 +288,7 @@ ROWS = (
     ErrataRow(
         number=18,
         printed="β(t,e) uncertain: “similar arguments”",
-        correct="one V for the whole range: V̇ affine in β and ḣ without product, 4 vertices; 2-DIA: b_m is worst",
+        correct="one V for the whole range: V̇ affine in β and ḣ without product, 4 vertices; 2-DIA: worst at b_m",
         kind="symbolic identity",
         check=row_18,
     ),

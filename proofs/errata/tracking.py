@@ -22,7 +22,7 @@ GAINS = np.array([float(gain) for gain in published("real-fault")["elqr"].gains.
 
 
 def friction(slip):
-    """μ(x1) of the real fault, held at μ_max for x1 < 0."""
+    """μ(x1) of the real fault, with μ = μ_max for x1 < 0."""
     return LAW.residual + LAW.drop * np.exp(-np.maximum(slip, 0) / LAW.critical_slip)
 
 
@@ -39,7 +39,7 @@ def rest_pressure(slip, rate=0.0):
 
 
 def row_23(slip: float = 0.027) -> Finding:
-    """Ask the published law for p at a slip error of 27 mm; run the same law with a pump that gives 5 MPa."""
+    """Evaluate p of the published law at a slip error of 27 mm; run the same law with p ≥ −5 MPa."""
     asked = GAINS[0] * slip
     opening = SIGMA / GAINS[0]
     r0, pump = 0.335, 5e6
@@ -55,8 +55,8 @@ def row_23(slip: float = 0.027) -> Finding:
     return Finding(
         bool(round(asked / 1e6, -1) == 50 and asked > SIGMA and pump < needed and worst[0] < 1e-2 < 0.1 < worst[1]),
         f"k1·{slip * 1e3:.0f} mm = {asked / 1e6:.1f} MPa opens the fault (σ' = {SIGMA / 1e6:.0f} MPa, reached at "
-        f"{opening * 1e3:.1f} mm); holding {r0} m needs {needed / 1e6:.2f} MPa of suction: with a pump of 5 MPa and a "
-        f"start 1 mm off the fault ends {worst[1]:.2f} m away, without a bound {worst[0]:.0e} m",
+        f"{opening * 1e3:.1f} mm); the equilibrium at {r0} m needs p = −{needed / 1e6:.2f} MPa: from an error of 1 mm "
+        f"the run ends with {worst[1]:.2f} m where p ≥ −5 MPa, with {worst[0]:.0e} m without the bound",
     )
 
 
@@ -150,7 +150,7 @@ def row_29(feedback: str = "error") -> Finding:
             and round(printed[2] / 1e9, 1) == 1.5
             and abs(printed[1] / -8e7 - 1) < 0.1
         ),
-        f"largest |e1| = {worse[0] * 1e3:.3f} mm fed back from the {other}, {better[0] * 1e3:.4f} mm from the "
+        f"largest |e1| = {worse[0] * 1e3:.3f} mm with feedback of the {other}, {better[0] * 1e3:.4f} mm of the "
         f"{feedback}; k1·max|r̈|/k4 = {said * 1e3:.2f} mm; k1x1 reaches {printed[2] / 1e9:.2f} GPa, "
         f"ξ2 = {printed[1]:.2g} m s²",
     )
@@ -174,7 +174,7 @@ ROWS = (
     ErrataRow(
         number=29,
         printed="e-LQR feeds back k1x1 and k2x2",
-        correct="feed back x1−r and x2−ṙ: the term −k1r̈/k4 of the error and 1.5 GPa of cancellation vanish",
+        correct="feed back x1−r and x2−ṙ: no error −k1r̈/k4 and no cancellation of 1.5 GPa",
         kind="numeric reproduction",
         check=row_29,
     ),

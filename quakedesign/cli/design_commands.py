@@ -135,7 +135,7 @@ class DesignOptions(WellOptions):
 
     @property
     def _laws(self) -> str:
-        """Laws that are asked for: of the slip alone the only one that there is."""
+        """Requested laws; with the slip alone measured the only one available."""
         if self.measured != "slip" or self.controller == "elqr":
             return self.controller
         if self.controller != "all":

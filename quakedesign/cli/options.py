@@ -498,7 +498,7 @@ class ActuatorOptions:
 
 
 def _stage(stage: type[Stage], values: Mapping[str, Any], step: float) -> Stage | None:
-    """One stage; None where it is not asked for."""
+    """One stage; None if not requested."""
     first, *others = stage.options
     if values[first.name] != first.default:
         return stage.asked(step, **{option.name: values[option.name] for option in stage.options})
@@ -821,7 +821,7 @@ def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], optio
 
 
 def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """What a controlled run was asked for, the pump and the transducer made of their options."""
+    """Requested options of a controlled run, with pump and transducer built from theirs."""
     from quakedesign.loop.sensing import Transducer
 
     others = {name: value for name, value in changed.items() if name not in (*_PUMP, *_READING)}
@@ -833,7 +833,7 @@ def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any
 
 
 def _named(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()) -> dict[str, Any]:
-    """What was asked for, by the name that a run has for it; refuses what does not apply."""
+    """Requested options by their names in a run; rejects options that do not apply."""
     if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
         kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
         raise ParameterError(

@@ -93,10 +93,10 @@ def fault_schema() -> Json:
         disturbance=_table(DISTURBANCE),
         block={
             "type": "array",
-            "description": "tables [[block]], in a row; friction and stress are the fault's unless given",
+            "description": "tables [[block]], ordered along the chain; default friction and stress: the fault's",
             "items": _table(BLOCK, friction=friction),
         },
-        well={"type": "array", "description": "tables [[well]], from one end of the row", "items": _table(WELL)},
+        well={"type": "array", "description": "tables [[well]], ordered along the chain", "items": _table(WELL)},
         diffusivity=_property(DIFFUSION["diffusivity"]),
     )
     schema["required"].append("friction")

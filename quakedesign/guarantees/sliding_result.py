@@ -173,8 +173,8 @@ def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
         return ""
     return (
         f"no controller whose pressure stays within {LowerBound(most).quantity('Pa')} of what the reference needs can "
-        f"hold the fault through rock of L^2/D above {far.quantity('s')} (nominal parameters, linearised, against this "
-        "stress from one time on)"
+        f"hold the fault through a diffusion path of L^2/D above {far.quantity('s')} (nominal parameters, linearised, "
+        "against this stress from one time on)"
     )
 
 

@@ -128,7 +128,7 @@ def guarantee_stick_slip(
     if unknown := setup.given().keys() - TAKEN:
         raise ParameterError(
             "a guarantee on the stick-slip plant is proved for an exact slip rate, bounded noise of the slip and a "
-            f"pressure that acts at once. Received {', '.join(sorted(unknown))}. Omit the quantity, or omit plant."
+            f"pressure without delay. Received {', '.join(sorted(unknown))}. Omit the quantity, or omit plant."
         )
     task = uncertain_plant(fault)
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)

@@ -149,7 +149,7 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
-    """Whether a record has another law with state than the fault names, where it was not told which to take."""
+    """Whether a record has another law with state than the fault names, and none was requested."""
     named, law = fault.friction, identification.law
     if identification.rival is None or named.equilibrium is not law.equilibrium or named.name == law.name:
         return []

@@ -99,7 +99,7 @@ def growth_at_rest(law: LinearLaw, step: Fraction) -> float | None:
 
 
 def winds_up(law: LinearLaw) -> bool:
-    """Whether the eigenvalue 1 of the update has a Jordan block: by itself the law then ramps, as a double integral."""
+    """Whether the eigenvalue 1 of the update has a Jordan block: the law then ramps in open loop (double integral)."""
     if not law.states:
         return False
     rows = [[v - (i == j) for j, v in enumerate(row)] for i, row in enumerate(law.update)]
@@ -112,14 +112,14 @@ def warning_at_rest(law: LinearLaw, step: Fraction, *, limited: bool = False) ->
     time = growth_at_rest(law, step)
     if time:
         return (
-            "NOT for a fault that sticks: by itself the law is unstable, and while friction holds the fault at rest "
+            "NOT for a stick-slip fault: the law is unstable in open loop, and while friction holds the fault at rest "
             f"its pressure grows e-fold in {time:.3g} s: use a law whose matrix A has no eigenvalue outside the unit "
             "circle"
         )
     if limited or not winds_up(law):
         return ""
     return (
-        "MAY WIND UP on a fault that sticks: the law has a double integral (the eigenvalue 1 of A has a Jordan block), "
+        "MAY WIND UP on a stick-slip fault: the law has a double integral (the eigenvalue 1 of A has a Jordan block), "
         "which ramps the pressure while friction holds the fault at rest: run simulate before use, or use one integral"
     )
 
@@ -216,7 +216,7 @@ class SampledController(Controller):
         return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
 
     def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
-        """The pressure that is applied, what that is more than is asked for, over T_s, and the limit's states after."""
+        """The applied pressure, its excess over the commanded one divided by T_s, and the next states of the limit."""
         commanded = _combined((*self.law.output, *self.law.feedback), self._read(signals))
         commanded += self._of_reference(signals)[-1]
         if self.rest_limit is None:

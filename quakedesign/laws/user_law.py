@@ -27,7 +27,7 @@ from quakedesign.laws.sampled_law import MOST_STATES, LinearLaw, Matrix, Row, st
 # The law.
 
 SIGNALS = ("slip_error", "slip_rate_error", "slip", "slip_rate", "reference", "reference_rate")
-"""What a law may be given: x1 − r, x2 − r′, x1, x2, r and r′ [m, m/s]."""
+"""Signals that a law may measure: x1 − r, x2 − r′, x1, x2, r and r′ [m, m/s]."""
 OUTPUT = "pressure"
 _PLACES: dict[str, tuple[int | None, int | None]] = {
     "slip_error": (0, None),
@@ -42,22 +42,22 @@ _PLACES |= {"reference": (None, 0), "reference_rate": (None, 1)}
 class SampledLaw(SampledController):
     """A user-defined sampled linear law: p = Cz + Dy and z⁺ = Az + By once every T_s, z = 0 at first, all exact.
 
-    Built by `from_statespace`, `from_gains`, `from_pid` or `load`; taken by `guarantee`, `simulate`, `loop_transfer`,
+    Built by `from_statespace`, `from_gains`, `from_pid` or `load`; input of `guarantee`, `simulate`, `loop_transfer`,
     `compare`, `campaign_problem` and `export_controller`.
 
     Attributes
     ----------
     gains : mapping of str to Fraction
-        Read off the law: p = −k1·e1 − k2·e2 − Σ gain·state.
+        Gains of the law: p = −k1·e1 − k2·e2 − Σ gain·state.
     law : LinearLaw
     step : Fraction
         T_s [s].
     delay, lag, diffusion, longest : Fraction
         Path between law and fault in runs, see `Sampling` [s].
     rest_limit : RestLimit, optional
-        None: the law is not told what a limit cuts off.
+        None: the limited pressure is not fed back to the law.
     label : str
-        Name for people.
+        Name in texts.
     notes : tuple of str
         What was changed when floats became exact numbers.
     """

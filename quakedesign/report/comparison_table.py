@@ -67,22 +67,22 @@ def compare(
     ----------
     fault : Fault
     designs : sequence of Design, Controller or SampledLaw
-        Designed controllers; one without a controller is reported and not run. Given laws are assessed first.
+        Designs; one without a controller is reported and not run. Given laws are assessed first.
     setup : LoopSetup
-        Of the given laws; a design has its own.
+        Loop setup of the given laws; a design has its own.
     with_published : bool
-        Add the paper's gains, where the fault has any, with their verdicts and premises; not beside designs that act
-        behind a delay, a lag or rock, which those do not know.
+        Add the paper's gains, where the fault has any, with their verdicts and premises; not with designs for a delay,
+        a lag or a diffusion path.
     scheme, published_scheme : str
-        Of the runs of designed and of published gains, see `quakedesign.loop.schemes`; ``continuous``, as in the
-        paper, unless given. Labels tell them apart where they differ. A law of samples runs as it was designed, as all
-        designs do that are not continuous.
+        Schemes of the runs of designed and of published gains, see `quakedesign.loop.schemes`; default ``continuous``,
+        as in the paper. Labels name them where they differ. A sampled law runs as designed, as do all designs that
+        are not continuous.
     whole_task : bool
-        Run all of a task of friction with a state, however slow.
+        Run the whole task of friction with a state, of any duration.
     plant : str, optional
-        Of the runs of friction without a state: ``stick-slip`` unless given, or ``printed``, as of `simulate`.
+        Plant of the runs of friction without a state: ``stick-slip`` (default) or ``printed``, as in `simulate`.
     progress : callable, optional
-        Called with what is being done and the fraction done [-].
+        Called with the present step and the fraction done [-].
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 

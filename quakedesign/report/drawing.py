@@ -319,7 +319,7 @@ def drawn_once(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], sh
 
 
 def _stated(alt: Mapping[str, str], shown: Any) -> bytes | None:
-    """All that drawings depend on: contents, settings and fonts; None if they cannot be told."""
+    """All inputs of drawings: contents, settings and fonts; None if they are unknown."""
     import matplotlib as mpl
     from matplotlib.font_manager import fontManager
 

@@ -94,7 +94,7 @@ def write_folder(
     command: str = "",
     tell: Callable[[str, float], None] = lambda _what, _done: None,
 ) -> dict[str, Any]:
-    """Write certificates, figures, results and the page into a folder that appears whole.
+    """Write certificates, figures, results and the page into a folder, atomically.
 
     Parameters
     ----------

@@ -202,7 +202,7 @@ def gain_map_lines(drawn: GainMap) -> list[str]:
 
 
 def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
-    """Write the figure ``map``, ``map.csv``, ``results.json`` and all certificates into a folder that appears whole.
+    """Write the figure ``map``, ``map.csv``, ``results.json`` and all certificates into a folder, atomically.
 
     Returns
     -------

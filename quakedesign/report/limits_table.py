@@ -121,7 +121,7 @@ def _box(limits: Limits) -> str:
 
 def _path(proof: SlidingProof) -> str:
     """What the design that is proved stands behind."""
-    ways = {"a lag of": proof.held.lag, "rock of L^2/D =": proof.held.diffusion}
+    ways = {"a lag of": proof.held.lag, "a diffusion path of L^2/D =": proof.held.diffusion}
     lines = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
     return f" behind {' and '.join(lines)}" if lines else ""
 
@@ -176,7 +176,7 @@ def limits_figure(limits: Limits) -> Any:
 
 
 def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
-    """Write the figure ``limits`` and ``results.json`` into a folder that appears whole; return its content."""
+    """Write the figure ``limits`` and ``results.json`` into a folder, atomically; return its content."""
     values = limits.to_dict()
     with whole_folder(folder) as partial:
         write_figures(partial, {"limits": limits_figure(limits)}, formats)

@@ -415,7 +415,7 @@ REST_LIMITS = (
     "a guarantee that begins 'on the plant without stick' is for friction continued linearly to negative slip rates; "
     "for the stick–slip plant the worst case found is then reported, which is no proof",
 )
-_WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "rock of L^2/D ="}
+_WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "a diffusion path of L^2/D ="}
 SLIDING_LIMITS = (
     "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
     "of the run nor of the proof",
@@ -509,7 +509,7 @@ def _way(comparison: "Compared") -> str:
     """What the pressure of the runs goes through."""
     paths = (e.design.setup.path.items() for e in comparison.of("designed"))
     stages = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
-    return f"the pressure in the runs acts {'through ' + ', '.join(stages) if stages else 'at once'}"
+    return f"the pressure in the runs acts {'through ' + ', '.join(stages) if stages else 'without delay'}"
 
 
 def _tables(comparison: "Compared") -> dict[str, Any]:

@@ -43,7 +43,7 @@ FOOTNOTE = (
 
 
 def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
-    """Write ``results.json`` and a folder ``figures`` into a folder that appears whole; return its content."""
+    """Write ``results.json`` and the subfolder ``figures`` into a folder, atomically; return its content."""
     values = report.to_dict()
     with whole_folder(folder) as partial:
         (partial / "figures").mkdir()

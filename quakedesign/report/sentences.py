@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# How far a proof reaches: to the loop that ran and its task, or to which premise, and how far that fails.
+# Scope of a proof: the loop that ran and its task, or the premises that fail, with ratios.
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
-"""Premises of a linear law's stability that its certified peaks do without."""
+"""Premises of a linear law's stability that its certified peaks do not need."""
 
 
 def grade(entry: "Entry") -> str:
-    """Verdict on one controller, and what of its loop and task the proof leaves out."""
+    """Verdict on one controller, and the parts of its loop and task that the proof does not cover."""
     if entry.proof is not None:
         other = f"{entry.design.other_step_first}; " if entry.design.other_step else ""
         return f"{other}{_guaranteed(entry.proof)}{_unmet(entry)}"
@@ -61,7 +61,7 @@ def _unmet(entry: "Entry") -> str:
 
 
 def _unstable_with_hold(entry: "Entry") -> bool:
-    """Whether a run with p acting at once hides what a sampled controller would do."""
+    """Whether a run in continuous time hides that the law is unstable with zero-order hold."""
     if entry.run is None or entry.zero_order_hold is None:
         return False
     return entry.run.provenance["scheme"] == "continuous" and entry.zero_order_hold.runs.verdict is Verdict.REFUTED
@@ -78,7 +78,7 @@ def _failing(premise: Premise) -> str:
 
 
 def _hold_gaps(entry: "Entry") -> list[str]:
-    """What the way in which the run carries out the law takes from the proof."""
+    """Reasons in the scheme of the run why the proof does not cover it."""
     if entry.run is None:
         return []
     scheme, step = entry.run.provenance["scheme"], entry.run.provenance["step"]
@@ -99,14 +99,14 @@ def _hold_gaps(entry: "Entry") -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# What is said of a run first: outcome, pressure, and whether that was what its task needs.
+# Headline of a run: outcome, pressure, and whether the pressure was sufficient for the task.
 
 _NEGLIGIBLE = 1e-6
 """Of the larger end of a range of pressures: a smaller end is said to be zero."""
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
-    """Outcome of a run, and of one that is too short when its event would begin; its pressure, and why too little."""
+    """Outcome of a run, the expected onset if it is too short, its pressure, and a shortfall of pressure."""
     extremes = pressure_extremes(run)
     pressure = pressure_sentence(*extremes) if extremes else None
     parts = [outcome_sentence(run), waiting_sentence(run, fault), pressure, shortfall(run, fault)]
@@ -124,13 +124,13 @@ def outcome_sentence(run: Trajectory) -> str:
 
 
 def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
-    """When the event of a run without control would begin that ends before; None for other runs."""
+    """Expected onset of the event in a run without control that ends earlier; None for other runs."""
     event = waiting(run, fault)
     if event is None:
         return None
     text = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
     if event.onset is None:
-        return f"{text}: nothing has pushed it forward; without --duration it is nudged"
+        return f"{text}: no forward disturbance acts; without --duration the run adds one"
     return f"{text}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
 
 
@@ -158,7 +158,7 @@ def _percent(share: float) -> str:
 
 
 # ----------------------------------------------------------------------
-# What is said about an e-LQR: certified margins, sampling and peaks, in lines for people.
+# Lines about an e-LQR: certified margins, sampling and peaks.
 
 
 def hold_sentences(stability: HeldLoop) -> list[str]:
@@ -180,7 +180,7 @@ def _proved_up_to(stability: HeldLoop) -> str:
 
 
 def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
-    """How fast the fault can slip at most in continuous time, for every class of disturbances that was asked for."""
+    """Bound of the slip rate in continuous time, for every requested class of disturbances."""
     lines = [
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
@@ -190,7 +190,7 @@ def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
     if not lines:
         reasons = {proved.reason for proved in peaks.values() if not proved.proved}
         return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
-    return "certified from rest, p acting at once: slip rate below " + ", ".join(lines)
+    return "certified from rest in continuous time: slip rate below " + ", ".join(lines)
 
 
 def verdict_lines(judged: LinearVerdict) -> list[str]:
@@ -208,7 +208,7 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
 
 
 def margin_lines(analysis: Analysis) -> list[str]:
-    """Decay rate and margins, each beside its limit; or a vertex that is not stable."""
+    """Decay rate and margins, each with its limit; or a vertex that is not stable."""
     lines, decay, slope, span = [], analysis.decay, analysis.slope, analysis.span
     if analysis.unstable_at:
         lines.append(f"not stable {_near(analysis.unstable_at)}")
@@ -225,16 +225,16 @@ def margin_lines(analysis: Analysis) -> list[str]:
 
 
 def _near(vertex: Sequence[Fraction]) -> str:
-    """A corner of the box, nearly: its exact numbers are in the JSON facts."""
+    """A corner of the box, rounded: its exact numbers are in the JSON facts."""
     return "near β = {:.4g}, s = {:.4g} 1/s^2, w = {:.4g} 1/s".format(*map(float, vertex))
 
 
 # ----------------------------------------------------------------------
-# What is said of a comparison: outcome and verdict of every controller with what breaks it, domains, schemes.
+# Lines about a comparison: outcome and verdict of every controller with failing conditions, domains, schemes.
 
 
 def guarantee_lines(entry: "Entry") -> list[str]:
-    """What is guaranteed of the loop as it runs, the worst found and what no controller can do; for designed laws."""
+    """Guarantee of the sampled loop, worst case found and performance limits; for designed laws."""
     if entry.guarantee is None:
         return []
     reason = entry.design.details.get("reason") if entry.guarantee.proved else None
@@ -244,12 +244,12 @@ def guarantee_lines(entry: "Entry") -> list[str]:
 
 
 def limit_lines(entry: "Entry") -> list[str]:
-    """Those of `guarantee_lines` that say what cannot be had: by no controller, and by designs of this kind."""
+    """Performance limits in `guarantee_lines`: of every controller, and of designs of this kind."""
     return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_reach(entry)]
 
 
 def _reach(entry: "Entry") -> list[str]:
-    """How long T_s and a delay may be for designs of the same kind, as far as the search of a design goes."""
+    """Largest T_s and delay that the search of a design found for designs of the same kind."""
     certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}
     if not certified:
         return []
@@ -261,7 +261,7 @@ def _reach(entry: "Entry") -> list[str]:
 
 
 def brief(entry: "Entry") -> str:
-    """What is guaranteed, and the headline."""
+    """Guarantee and headline."""
     return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
 
 
@@ -271,32 +271,32 @@ HEADLINE = 200
 
 
 def headline(entry: "Entry") -> str:
-    """Outcome of the run, the verdict, and of the `sentences` that follow as many as `HEADLINE` characters hold."""
+    """Outcome of the run, the verdict, and as many further `sentences` as fit into `HEADLINE` characters."""
     every = sentences(entry)
     return "; ".join(every[: _fitting(every)])
 
 
 def remarks(entry: "Entry") -> list[str]:
-    """The `sentences` for which the headline has no place."""
+    """The `sentences` that do not fit into the headline."""
     every = sentences(entry)
     return every[_fitting(every) :]
 
 
 def beside_guarantee(lines: Sequence[str], entry: "Entry") -> list[str]:
-    """What is told of a controller, without a reason that its `guarantee_lines` have given."""
+    """Lines about a controller, without a reason that its `guarantee_lines` have given."""
     reason, guaranteed = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
     stated = bool(reason) and str(reason) in guaranteed
     return [line for line in lines if not (stated and line.endswith(str(reason)))]
 
 
 def _fitting(lines: Sequence[str]) -> int:
-    """How many sentences, joined, make a headline."""
+    """Number of sentences that fit into a headline."""
     lengths = accumulate(len(sentence) + len("; ") for sentence in lines)
     return max(1, sum(length <= HEADLINE + len("; ") for length in lengths))
 
 
 def sentences(entry: "Entry") -> list[str]:
-    """All that is said of a run and of its proof, what matters most first, without full stops."""
+    """All sentences about a run and its proof, most important first, without full stops."""
     design = entry.design
     if design.controller is None:
         return _because(Verdict.UNDECIDED, design.details.get("reason", "no gains with a proof were found"))
@@ -318,7 +318,7 @@ def sentences(entry: "Entry") -> list[str]:
 
 
 def part_of_task(run: Trajectory, fault: Fault) -> str:
-    """How much of the task a run shows that does not show all of it; empty for one that ended of itself."""
+    """Part of the task that an incomplete run shows; empty for complete runs and for those that ended early."""
     task, last = fault.reference.operation_time, float(run.time[-1])
     if last > (1 - _WHOLE) * task or not run.outcome.harmless:
         return ""
@@ -358,7 +358,7 @@ def _step_verdict(entry: "Entry") -> list[str]:
 
 
 def _premises(entry: "Entry") -> list[str]:
-    """Every premise that fails, and what the proof is about besides."""
+    """Every premise that fails, and further conditions of the proof."""
     premises = entry.design.conditions
     design, texts = (
         entry.design,
@@ -387,7 +387,7 @@ def _sampled(design: Design) -> bool:
 
 
 def domain_sentence(domain: Domain) -> str:
-    """Where the certificate speaks although the control itself moves h, and what limits it."""
+    """Domain in which the certificate holds with the effect of the control on h, and what limits it."""
     which = (
         "certified domain" if domain.feedforward == "none" else f"certified domain, {domain.feedforward} feed-forward"
     )
@@ -417,7 +417,7 @@ FEEDFORWARD_COLUMNS = ("feed-forward", "along_reference", "level_set", "domain |
 
 
 def scheme_sentence(comparison: "Compared") -> str:
-    """How the pressure of the runs was computed."""
+    """Schemes that computed the pressure of the runs."""
     runs: dict[str, list[str]] = {}
     for entry in comparison.entries:
         if entry.run:
@@ -448,17 +448,17 @@ _SAID = {
 
 
 # ----------------------------------------------------------------------
-# What is said of a run of a fault whose friction has a state, free or held in slow sliding.
+# Lines about a run of a fault whose friction has a state, without control or in controlled slow sliding.
 
 _MOST_EVENTS = 8
-_LOCKED = 0.5  # of what it is loaded by: a fault that slips less stores the rest
+_LOCKED = 0.5  # of the loading displacement: a fault that slips less is locked
 FASTEST_PLATE = 1e-8
-"""Rate of loading [m/s] that no plate has: 0.3 m a year."""
-_LABORATORY = 10.0  # length of a fault [m] below which what loads it is a machine
+"""Loading rate [m/s] above that of every plate: 0.3 m a year."""
+_LABORATORY = 10.0  # length of a fault [m] below which a machine loads it
 
 
 def state_run_lines(result: dict[str, Any]) -> list[str]:
-    """Lines for people, from the JSON of `run_state`: outcome, cycle, events."""
+    """Lines from the JSON of `run_state`: outcome, cycle, events."""
     outcome, cycle, events = result["outcome"], result["cycle"], result["slip_events"]
     least, largest = (p / 1e6 for p in result["pressure"])
     state = ", ".join(f"{name} = {value:.4g} s" for name, value in result["start"]["state"].items())
@@ -473,8 +473,8 @@ def state_run_lines(result: dict[str, Any]) -> list[str]:
         lines.append("steady sliding is unstable here, but nothing disturbs it: start late, or give a pressure")
     if outcome["kind"] == "creep" and result["slip"] < _LOCKED * result["loading_rate"] * result["duration"]:
         lines.append(
-            "it does not creep for good: it slips far less than it is loaded, and the run ends before what is stored "
-            "goes; the recurrence interval that design tells, or a longer --duration, shows the event"
+            "it is not in steady creep: it slips far less than it is loaded, and the run ends before the event; set a "
+            "longer --duration, such as the recurrence interval that design reports"
         )
     if cycle["recurrence_interval"] is not None:
         lines.append(f"recurrence interval {lasting(cycle['recurrence_interval'])}")
@@ -488,13 +488,13 @@ def state_run_lines(result: dict[str, Any]) -> list[str]:
 
 
 def cycle_sentences(comparison: "Compared") -> list[str]:
-    """Seismic cycle of a fault without control, and where its run and proof begin; none without a cycle."""
+    """Seismic cycle of a fault without control, and initial state of run and proof; none without a cycle."""
     run, fault = comparison.uncontrolled, comparison.fault
     return [] if run.cycle is None else [_cycle(run, run.cycle, fault), steady_start_sentence(run, fault)]
 
 
 def _cycle(run: Trajectory, cycle: dict[str, float | None], fault: Fault) -> str:
-    """What a fault whose friction has a state does without control, with its last complete event."""
+    """Behaviour of a fault with rate-and-state friction without control, with its last complete event."""
     if run.failed:
         return f"Without control: unknown, since its cycle could not be computed ({run.failed.rstrip('.')})"
     peak = f"slip rate up to {run.outcome.peak_slip_rate:.3g} m/s"
@@ -506,7 +506,7 @@ def _cycle(run: Trajectory, cycle: dict[str, float | None], fault: Fault) -> str
 
 
 def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
-    """Where run and proof of slow sliding begin, and how much of the slip of an earthquake their task takes."""
+    """Initial state of run and proof of slow sliding, and share of the task in the slip of an earthquake."""
     task = fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
     text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
@@ -519,20 +519,20 @@ def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
 
 
 def _loading(run: Trajectory, fault: Fault) -> str:
-    """The rate of loading of a cycle, its plant, and that the rate may be one that nobody has chosen."""
+    """Loading rate and plant of a cycle, with a warning of a loading rate above that of plates."""
     moved = "with inertia" if run.provenance["plant"] == "smooth" else "quasi-dynamic"
     rate = fault.friction.operating_rate
     loaded = f"loaded at {rate:.3g} m/s ({moved})"
     if rate <= FASTEST_PLATE or fault.length < _LABORATORY:
         return loaded
     return (
-        f"{loaded}, FASTER than any plate: that is reference_rate of [friction]; for how often it breaks put in the "
-        "rate of the plates there, such as '1 nm/s' (30 mm a year)"
+        f"{loaded}, FASTER than any plate: that is reference_rate of [friction]; for the recurrence interval enter "
+        "the plate rate, such as '1 nm/s' (30 mm a year)"
     )
 
 
 def left_out_lines(comparison: "Compared") -> list[str]:
-    """Laws that are not for this fault, each reason once."""
+    """Laws that are not available for this fault, each reason once."""
     named: dict[str, list[str]] = {}
     for name, why in comparison.left_out.items():
         named.setdefault(why, []).append(control_laws()[name].title)
@@ -540,7 +540,7 @@ def left_out_lines(comparison: "Compared") -> list[str]:
 
 
 def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") -> str:
-    """What is proved of the law of a run, and which options of the run the proof does not know; empty without one."""
+    """Proof of the law of a run, and the options of the run that the proof does not cover; empty without one."""
     if sentence is None:
         return ""
     if outside:
@@ -551,7 +551,7 @@ def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") ->
 
 
 def exceeded_line(metrics: "Metrics", least: Bound, largest: Bound) -> str:
-    """How the pressures of a run [Pa] exceed proved ones; empty if they do not."""
+    """Excess of the pressures of a run [Pa] over proved ones; empty if there is none."""
     low, high = metrics.min_pressure, metrics.max_pressure
     if low is None or high is None or (low >= least and high <= largest):
         return ""
@@ -560,23 +560,23 @@ def exceeded_line(metrics: "Metrics", least: Bound, largest: Bound) -> str:
 
 
 def sliding_run_lines(result: dict[str, Any]) -> list[str]:
-    """Lines for people, from the JSON of `run_sliding`: outcome, errors, pressure, and what is proved."""
+    """Lines from the JSON of `run_sliding`: outcome, errors, pressure, and proof."""
     outcome, metrics = result["outcome"], result["metrics"]
     least, largest = (p / 1e6 for p in result["pressure"])
     path = "".join(f", through a {name.replace('_', ' ')}" for name in result["stages"])
     path += f", through a lag of {result['lag']:.4g} s" if result["lag"] else ""
-    path += f", through rock of L^2/D = {result['diffusion']:.4g} s" if result["diffusion"] else ""
+    path += f", through a diffusion path of L^2/D = {result['diffusion']:.4g} s" if result["diffusion"] else ""
     shaken = f", under a shear stress of up to {result['stress'] / 1e3:.4g} kPa" if result["stress"] else ""
     return [
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "
         f"{result['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
-        f"held over {result['step']:.4g} s{path}{shaken}, for {lasting(result['duration'])}; without control errors "
-        f"grow by {result['growth_rate']:.3g} 1/s",
+        f"zero-order hold over {result['step']:.4g} s{path}{shaken}, for {lasting(result['duration'])}; without "
+        f"control errors grow by {result['growth_rate']:.3g} 1/s",
         f"|ln(V/V_r)| at most {metrics['max_log_rate']:.3g}, slip error at most {metrics['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law commands at most "
-        f"{metrics['max_asked'] / 1e6:.3g} MPa beside what the reference needs",
+        f"{metrics['max_asked'] / 1e6:.3g} MPa more than the reference needs",
         proved_line((result["guarantee"] or {}).get("sentence"), result["outside"])
-        or "no guarantee: what is said was seen in this run",
+        or "no guarantee: all values are of this run",
     ]
 
 

@@ -67,7 +67,7 @@ def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True
 
 
 def _whole(entry: "Entry") -> list[str]:
-    """All that is told of a controller in lines."""
+    """All lines about a controller."""
     others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
     return [
         *guarantee_lines(entry),

@@ -48,17 +48,17 @@ are not finite are not caught: check measurement and pressure.
 _USE_OF_ONE = {
     "told": " and the pressure [Pa] that was applied since the last call",
     "written": "the fluid pressure [Pa]",
-    "limited": "Where pump or valve limit the pressure, tell it what was applied: the law does not wind up then, as in "
-    "simulate --saturation; else give a null pointer.",
+    "limited": "Where pump or valve limit the pressure, pass the applied one: the law then does not wind up, as in "
+    "simulate --saturation; else pass a null pointer.",
 }
 _PLAN = "planned pressure"  # fact that only laws of blocks in slow sliding have
 _USE_OF_WELLS = {
     "told": "",
     "written": "the fluid pressure [Pa]{beside} of CONTROLLER_PRESSURES wells",
-    "limited": "{plan}Where pump or valve limit a pressure, the law winds up: they must let the proved pressures pass.",
+    "limited": "{plan}Where pump or valve limit a pressure, the law winds up: they must allow the proved pressures.",
 }
 _ADDED = """Add the planned pressure (below) to each, continuously in time and not in steps: the proof assumes that the
-plan reaches the fault as it is, while what is written here goes through the lag that it was proved with. """
+plan reaches the fault unchanged, while the pressure written here passes through the lag of the proof. """
 _TOLD_TO_IT = " and the pressure [Pa] applied since the last call"
 _APPLIED = """
    applied may be a null pointer: then it was the pressure of the last call. Before the first call it is 0."""
@@ -477,7 +477,7 @@ def _after(loop: ClosedLoop, scheme: Sampled, counter: ca.SX, state: ca.SX, step
 def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
     """Limits of use of a sampled law: another T_s, a fault at rest, and the stages between law and fault."""
     own = controller.sampling
-    path = {"a delay of": own.delay, "a lag of": own.lag, "rock of L^2/D =": own.diffusion} if own else {}
+    path = {"a delay of": own.delay, "a lag of": own.lag, "a diffusion path of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
     behind = f"designed for {between} between controller and fault: the pressure is that commanded at the valve"
     by_a_clock = (

@@ -18,7 +18,7 @@ from quakedesign.fault import Fault, fault_toml
 from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.loop import Actuator, Scheme, simulation_scheme
-from quakedesign.loop.schemes.base import MOST_SUBSTEPS, NoClock
+from quakedesign.loop.schemes.base import MOST_SUBSTEPS, AperiodicClock
 from quakedesign.loop.sensing import Sensor
 from quakedesign.simulation import stepping
 from quakedesign.simulation.adaptive import require_smooth, smooth_march
@@ -198,7 +198,7 @@ def by_no_clock(
     if sampling is None or step is None or not (sampling.longest or clock):
         return step, numbers
     if isinstance(scheme, str):
-        clock = NoClock.of(sampling.step, sampling.longest)
+        clock = AperiodicClock.of(sampling.step, sampling.longest)
         numbers = numbers | {"clock": clock}
     return (step / clock.shortest if clock else step), numbers
 

@@ -41,7 +41,7 @@ class SlidingRun(LoopTrajectory):
     """
 
     theta: "np.ndarray" = signal("state of friction", "s")
-    asked: "np.ndarray" = signal("pressure that the law asks for beside that of the reference", "Pa")
+    asked: "np.ndarray" = signal("pressure commanded in addition to that of the reference", "Pa")
     stress: "np.ndarray" = signal("shear stress disturbance", "Pa")
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":

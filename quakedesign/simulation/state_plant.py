@@ -307,7 +307,7 @@ class PressurePath:
             return cls(lag=meant.lag, diffusion=meant.diffusion, stages=stages)
         if [type(stage) for stage in flowing] not in ([Lag], [Diffusion], [Lag, Diffusion]):
             raise ParameterError(
-                "the pressure of slow sliding goes through a lag, rock, or both. Received "
+                "the pressure of slow sliding takes a lag, a diffusion path, or both. Received "
                 f"{', '.join(stage.name for stage in flowing)}. Leave out the others."
             )
         by_name = {stage.name: stage for stage in flowing}

@@ -90,7 +90,7 @@ class ChainLimits:
         if self.stress is not None:
             assumed[-1] = assumed[-1].replace(")", ";")
             assumed += [f"for stress of {quantity(self.stress, 'Pa')} on every block, pressures within"]
-            assumed += [f"{quantity(self.largest_pressure, 'Pa')} of the plan, rock of {self.diffusivity:g} m^2/s)"]
+            assumed += [f"{quantity(self.largest_pressure, 'Pa')} of the plan, diffusivity {self.diffusivity:g} m^2/s)"]
         parts = [
             f"{chain.name}: limits of every controller, {len(chain.blocks)} blocks, "
             f"{counted(len(chain.wells), 'well')}",

@@ -139,7 +139,7 @@ Results = tuple[Certificate | None, dict[str, Any], list[str]]
 
 
 def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, decay: bool) -> Results:
-    """Verdict for one bound, with the decay if that is asked for."""
+    """Verdict for one bound, with the decay if requested."""
     loop = closed_loop(name, gains, lipschitz=lipschitz, gain_range=ends)
     limit, bound, fast = necessary_limit(loop, name), rational(lipschitz, "lipschitz"), None
     hopeless = limit is not None and bound >= limit

@@ -67,7 +67,7 @@ _latex = by_equilibrium(rest=_at_rest, sliding=_with_state)
 
 
 def law_latex(law: Controller | None) -> list[str]:
-    """Pressure that a law asks for while a fault moves and the rates of its states, in four digits; none of no law."""
+    """Commanded pressure of a law while a fault moves, and rates of its states, in four digits; empty without law."""
     if law is None:
         return []
     law = law.while_moving

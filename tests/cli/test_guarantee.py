@@ -131,7 +131,7 @@ def test_a_law_that_is_unstable_by_itself_is_not_for_a_fault_that_sticks():
         states = rows @ states + seen @ np.array([1e-6, 0.0])
         sizes.append(np.abs(states).max())
     assert found.grows_at_rest == pytest.approx(0.184 * 20 / np.log(sizes[-1] / sizes[-21]), rel=1e-6)
-    assert found.lines()[1].startswith("NOT for a fault that sticks: by itself the law is unstable")
+    assert found.lines()[1].startswith("NOT for a stick-slip fault: the law is unstable in open loop")
     held = qd.guarantee(fault, plant="printed")
     assert held.proved
     assert held.grows_at_rest is None  # it has an integral, and grows no faster than a line
@@ -174,7 +174,9 @@ def test_where_no_controller_can_hold_the_fault_the_nearest_rock_that_is_proved_
     monkeypatch.setattr(GUARANTEE, "nearest_setup", lambda *_, **__: ("diffusion", near))
     code, out, _ = call("real-fault", "--diffusion", "180 s")
     assert code == 1
-    assert out.startswith("none: no controller that withdraws at most 50 MPa can hold the fault through rock of L^2/D")
+    assert out.startswith(
+        "none: no controller that withdraws at most 50 MPa can hold the fault through a diffusion path"
+    )
     assert "with a diffusion time L^2/D of 7 s: on the plant without stick, from rest, " in out
     assert "command limits" not in out
 

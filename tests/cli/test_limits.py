@@ -90,7 +90,7 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
     assert said.splitlines()[1] == "(any shear stress of at most 25 kPa, T_s = 300 s)"
-    assert "proved: of an e-LQR designed for this table behind rock of L^2/D = 833 s, for a, b and D_c" in " ".join(
+    assert "of an e-LQR designed for this table behind a diffusion path of L^2/D = 833 s, for a, b and D_c" in " ".join(
         said.split()
     )
     assert "another design has other bounds" in " ".join(said.split())
@@ -205,7 +205,9 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     patch = ("crustal-patch", "--stress", "25 kPa")
     assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert f"table behind rock of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
+    assert (
+        f"behind a diffusion path of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
+    )
     assert "D = 2 m^2/s" in told
     assert run(*patch, "--diffusion", "9 s") == run(*patch, "--diffusivity", "2") == 0
     near = ExactSetup(diffusion=asked[0].diffusion)
@@ -218,7 +220,9 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     assert asked == [near]  # no design is looked for behind what is impossible
     told = " ".join(capsys.readouterr().out.split())
     assert "L^2/D = 1e+10 s: INFEASIBLE for every controller" in told
-    assert f"table behind rock of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
+    assert (
+        f"behind a diffusion path of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
+    )
     assert set(spreads) == {0}
     assert run(*patch, "--diffusion", "9 s", "--spread", "0.01") == 0
     assert spreads[-2:] == [Fraction(1, 100)] * 2

@@ -137,7 +137,7 @@ def test_a_controlled_run_says_that_it_tracks(capsys, patch, tmp_path):
     code, said, _ = run(capsys, "simulate", patch, *given, *more, "--out", str(out))
     assert code == 0
     assert said.splitlines()[1].strip().startswith("tracked: peak slip rate")
-    assert "through rock of L^2/D = 500 s" in said
+    assert "through a diffusion path of L^2/D = 500 s" in said
     assert "no guarantee" in said
     assert out.exists()
     found = json.loads(run(capsys, "simulate", patch, *given, *more, "--json")[1])

@@ -1,4 +1,4 @@
-"""A page in headless Chromium: what it logs, what it asks the network for, what it looks like when it is printed."""
+"""A page in headless Chromium: its log, its network requests, and its printed layout."""
 
 import json
 import re
@@ -6,7 +6,7 @@ import shutil
 import subprocess
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-WIDTH, HEIGHT = 703, 1047  # of what is printed on A4 within the margins of the page [CSS pixels]
+WIDTH, HEIGHT = 703, 1047  # printed area of A4 within the margins [CSS pixels]
 _QUIET = ("--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking")
 _QUIET += ("--host-resolver-rules=MAP * ~NOTFOUND",)
 _PROBE = """<script>
@@ -28,7 +28,7 @@ document.body.append(probe);
 
 
 def opened(page, folder, *, width, media=""):
-    """What a script in a copy of a page finds, lines on its console, addresses that it asked for.
+    """Result of a script in a copy of a page, lines on its console, requested addresses.
 
     With ``media="print"`` the copy shows on the screen what would be printed.
     """
@@ -51,6 +51,6 @@ def opened(page, folder, *, width, media=""):
 
 
 def asked(log):
-    """Addresses that pages asked for; the browser's own requests have no origin."""
+    """Addresses that pages requested; the browser's own requests have no origin."""
     told = [event.get("params", {}) for event in json.loads(log.read_text(encoding="utf-8"))["events"]]
     return {p["url"] for p in told if "url" in p and p.get("initiator", "not an origin") != "not an origin"}

@@ -1,4 +1,4 @@
-"""Parts of a user's own, one of every kind, as they would stand in a file outside the package."""
+"""User-defined parts, one of every kind, as in a file outside the package."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -52,12 +52,12 @@ class PID(Controller):
 
     @classmethod
     def design(cls, problem):
-        """Poles of a triple −2 (1/s) at the middle of nothing: stiff enough for both faults of the paper."""
+        """Gains for a triple pole at −2 1/s without a plant: stiff enough for both faults of the paper."""
         return problem.assessed(cls.from_values(("1e8", "1e8", "1e7")))
 
 
 class Mislaid(PID):
-    """Says that its loop is that of a PID, and pushes the other way."""
+    """Declares the loop of a PID, with the sign of the pressure reversed."""
 
     name: ClassVar[str] = "mislaid"
 
@@ -67,7 +67,7 @@ class Mislaid(PID):
 
 @dataclass(frozen=True, kw_only=True)
 class OwnTwisting(ContinuousTwisting):
-    """2-CTA with base gains of one's own."""
+    """2-CTA with user-defined base gains."""
 
     name: ClassVar[str] = "own-twisting"
     title: ClassVar[str] = "own twisting"
@@ -116,7 +116,7 @@ class Hyperbolic(FrictionLaw):
 
 @dataclass(frozen=True, kw_only=True)
 class Smoothing(SampledStage):
-    """Mean of what is asked for now and what was asked for a sample ago."""
+    """Mean of the present commanded pressure and that of the last sample."""
 
     name: ClassVar[str] = "smoothing"
 
@@ -130,7 +130,7 @@ class Smoothing(SampledStage):
 
 @dataclass(frozen=True, kw_only=True)
 class Halved(Explicit):
-    """The law at the measured state, its integral states moved half as far."""
+    """The law at the measured state, with half the increment of its integral states."""
 
     name: ClassVar[str] = "halved"
 
@@ -141,7 +141,7 @@ class Halved(Explicit):
 
 @dataclass(frozen=True, kw_only=True)
 class Offset(SlipStage):
-    """An instrument whose zero is somewhere else."""
+    """An instrument with an offset."""
 
     hardware: ClassVar[bool] = True
 
@@ -160,7 +160,7 @@ class Offset(SlipStage):
 
 @dataclass(frozen=True, kw_only=True)
 class Backward(Sensor):
-    """Slip as it is, slip rate by a difference of the last two."""
+    """Exact slip, slip rate as difference of the last two."""
 
     period: float
 

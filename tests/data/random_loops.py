@@ -1,4 +1,4 @@
-"""Faults and loops at random, each by its number."""
+"""Random faults and loops, each given by its number."""
 
 from dataclasses import replace
 from fractions import Fraction as F
@@ -38,7 +38,7 @@ def random_task(number: int) -> tuple[FaultPlant, F]:
 
 
 def random_loop(number: int) -> tuple[FaultPlant, SampledLoop, SlowGain | None] | None:
-    """A loop of any kind, with a delay, a lag, rock, noise and a start or without; None where there is no law."""
+    """A loop of any kind, with or without delay, lag, diffusion, noise and initial errors; None without a law."""
     random = np.random.default_rng(10**6 + number)
     task, step = random_task(number)
     period, around, measured = float(step), {}, "slip-and-rate"

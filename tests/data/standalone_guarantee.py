@@ -1,4 +1,4 @@
-"""The standalone modules that verify guarantees as one, with all their names; one is replaced in all of them."""
+"""The checker's modules for guarantees as one module with all their names; a patch applies to all of them."""
 
 import importlib.util
 from pathlib import Path

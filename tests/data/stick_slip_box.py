@@ -1,4 +1,4 @@
-"""A small file of the kind stick_slip: five facets that bound a box, and a few more within it. It proves nothing."""
+"""A small file of the kind stick_slip: five facets that bound a box, and a few more. It is not a proof."""
 
 import copy
 import json
@@ -85,7 +85,7 @@ def period_of(document):
 
 
 def changed(document, *changes):
-    """A copy with other entries: pairs of a path, and a value or what makes it of the old one."""
+    """A copy with changed entries: pairs of a path, and a value or a function of the old one."""
     document = copy.deepcopy(document)
     for path, new in changes:
         holder = document
@@ -101,14 +101,14 @@ def times(share):
 
 
 def refused(document, reason=None):
-    """The standalone checker refuses it, for a reason."""
+    """The standalone checker refuses it with a reason."""
     with pytest.raises(CHECK.Refused, match=reason):
         CHECK.check(json.dumps(document))
     return True
 
 
 def package_refuses(document):
-    """Whether the package does not read or prove it."""
+    """Whether the package refuses or does not prove it."""
     try:
         claim = read_guarantee(document)
     except CertificateError:

@@ -1,4 +1,4 @@
-"""Of many cases a few run by default, and the others with -m slow."""
+"""A few of many cases run by default, the others with -m slow."""
 
 import pytest
 

@@ -421,7 +421,7 @@ def test_a_refutation_by_hand_is_refuted(make):
 
 def test_the_statement_says_everything_that_was_verified():
     assert verify(weighted_pair()).statement == (
-        "law weighted-pair: no name is verified, the verdict is about the field below",
+        "law weighted-pair: names are not verified, the verdict is on the field below",
         "gains and constants: k = 2",
         "domain: cells; states with weights: x = 2, y = 1",
         "uncertain, measurable in time: d in [-1/2, 1/2]",
@@ -1450,7 +1450,7 @@ def test_each_file_gets_a_block(write):
         f"{refutation}: refuted",
         f"{broken}: invalid: a key must be unique in its object. Received 'format'",
     ]
-    assert any("no name is verified" in line for line in lines)
+    assert any("names are not verified" in line for line in lines)
 
 
 @pytest.mark.parametrize(

@@ -214,9 +214,9 @@ def test_the_statement_is_printed():
     assert lines[:3] == ("x' = 1*x^3 + -1*x", "V = 1*x^2", "level: 1")
     assert lines[-1].startswith("conclusion: every solution that starts where V < level remains there and tends to")
     assert "from everywhere" in checker.check(json.dumps(everywhere())).statement[-1]
-    assert "no other V helps" in checker.check(json.dumps(refuted())).statement[-1]
+    assert "no other V proves it" in checker.check(json.dumps(refuted())).statement[-1]
     for document in (refuted("2", "5"), turning()):
-        assert "no other V helps" not in checker.check(json.dumps(document)).statement[-1]
+        assert "no other V proves it" not in checker.check(json.dumps(document)).statement[-1]
     documents = (refuted(), refuted("2", "5"), turning(), cubic())
     assert [load(json.dumps(document)).equilibrium for document in documents] == [True, False, False, False]
 

@@ -83,7 +83,7 @@ def test_both_prove_a_loop_through_rock_and_refuse_what_does_not_follow(monkeypa
     raw = document()
     kept.append(find(task := checker.read_task(raw), checker.read_loop(raw["loop"], task), checker.Slow(2, F(1, 4))))
     assert claim().check() is Verdict.PROVED
-    assert "rock of distance^2/diffusivity = 1/10 s" in checker.verify(raw)[2]
+    assert "diffusion path of distance^2/diffusivity = 1/10 s" in checker.verify(raw)[2]
     for key in raw["claims"]:
         forged = document()
         forged["claims"][key] = str(F(raw["claims"][key]) * F(99, 100))

@@ -203,7 +203,7 @@ def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path
 
 SLIDING = json.loads((PATH.parent / "certificates" / "sliding_crustal-patch.json").read_text(encoding="utf-8"))
 NEGATIVE = [
-    (HELD, ("loop", "of_reference"), [["0", "0"], ["0", "0"]], "of_reference must not be zero where it is given"),
+    (HELD, ("loop", "of_reference"), [["0", "0"], ["0", "0"]], "of_reference must not be zero if given"),
     (HELD, ("start",), {"slip": "0", "rate": "0"}, "a bound of the start must be above 0"),
     (HELD, ("start",), {"slip": "-1/9", "rate": "1/9"}, "bounds of the initial slip and slip rate"),
     (HELD, ("start",), {"slip": "1/9", "rate": "-1/9"}, "bounds of the initial slip and slip rate"),
@@ -236,19 +236,19 @@ def test_a_largest_step_is_claimed_where_it_counts_alone_and_has_to_be_for_a_pum
     wide = STEPS | {"least_pressure": str(rest[0]), "largest_pressure": str(rest[1])}
     enough = changed(PACED, (("claims",), wide), (("loop", "pump", "rate"), "45"))
     said = checker.verify(enough)
-    assert said[2].endswith(", a pump of 45 Pa/s that is never at its limits")
-    assert said[6].endswith(" Pa, from sample to sample by at most 5 Pa")
-    with pytest.raises(checker.Refused, match="must be made within the ramp of the pump"):
+    assert said[2].endswith(", a pump of 45 Pa/s whose limits are never reached")
+    assert said[6].endswith(" Pa, changes of at most 5 Pa per sample")
+    with pytest.raises(checker.Refused, match="must fit into the ramp of the pump"):
         checker.verify(changed(enough, (("loop", "pump", "rate"), "449/10")))
     with pytest.raises(checker.Refused, match="claim largest_step must follow"):
         checker.verify(changed(enough, (("claims", "largest_step"), "499/100")))
     missing = {name: v for name, v in wide.items() if name != "largest_step"}
     for raw, claims, why in (
-        (enough, missing, "needs a claim of the largest step"),
+        (enough, missing, "needs the claim largest_step"),
         (
             HELD,
             wide,
-            "of a loop with jitter or a pump of some rate alone",
+            "with jitter or a pump rate only",
         ),
     ):
         with pytest.raises(checker.Refused, match=why):
@@ -256,10 +256,10 @@ def test_a_largest_step_is_claimed_where_it_counts_alone_and_has_to_be_for_a_pum
         with pytest.raises(CertificateError, match=why):
             read_guarantee(changed(raw, (("claims",), claims)))
     assert checker.verify(changed(JITTERY, (("claims",), missing)))[2].endswith(
-        "measurements within 1/9 s of their instants, pressures within that and 1/7 s more"
+        "measurements within 1/9 s of their instants, pressures within that plus 1/7 s"
     )
     mean = changed(JITTERY, (("loop", "jitter", "mean"), "1/9"), (("claims",), missing))
-    assert ", each a mean over 1/9 s around its time, measurements within 1/9 s" in checker.verify(mean)[2]
+    assert ", each averaged over 1/9 s around its instant, measurements within 1/9 s" in checker.verify(mean)[2]
     assert read_guarantee(changed(JITTERY, (("claims",), missing))).claims.largest_step is None
 
 
@@ -283,7 +283,7 @@ def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
     assert "valve" not in "".join(checker.verify(BEHIND | {"claims": fewer})[3:])
     with pytest.raises(checker.Refused, match="least_asked, largest_asked"):
         checker.verify(BEHIND | {"claims": fewer | {"least_asked": claims["least_asked"]}})
-    with pytest.raises(checker.Refused, match="without a lag and rock"):
+    with pytest.raises(checker.Refused, match="claims on the valve pressure need a lag"):
         checker.verify(HELD | {"claims": claims})
 
 
@@ -298,12 +298,12 @@ def test_what_is_claimed_at_the_valve_may_touch_the_limits_of_its_pump_and_not_p
     for least, largest, holds in (("-8", "10", True), ("-79/10", "10", False), ("-8", "99/10", False)):
         pumped = changed(raw, (("loop", "pump"), {"least": least, "largest": largest}), (("claims",), claims))
         if holds:
-            assert checker.verify(pumped)[2].endswith(", a pump from -8 Pa to 10 Pa that is never at its limits")
+            assert checker.verify(pumped)[2].endswith(", a pump from -8 Pa to 10 Pa whose limits are never reached")
         else:
-            with pytest.raises(checker.Refused, match="must stay within what the pump can do"):
+            with pytest.raises(checker.Refused, match="must stay within the limits of the pump"):
                 checker.verify(pumped)
     fewer = changed(BEHIND, (("loop", "pump"), {"least": "-8", "largest": "10"}))
-    with pytest.raises(checker.Refused, match="a pump behind which there is a lag or rock needs claims of it"):
+    with pytest.raises(checker.Refused, match="a pump before a lag or diffusion path needs claims on its pressure"):
         checker.verify(fewer)
 
 
@@ -330,7 +330,7 @@ def test_the_package_reads_claims_about_the_valve_behind_a_lag_alone_and_both_or
         with pytest.raises(CertificateError, match="both of least_asked and largest_asked, or neither"):
             parse_guarantee(json.dumps(BEHIND | {"claims": HELD["claims"] | {name: both[name]}}))
     for raw in (HELD, CONTINUOUS):
-        with pytest.raises(CertificateError, match="without a lag and rock"):
+        with pytest.raises(CertificateError, match="claims on the valve pressure need a lag"):
             parse_guarantee(json.dumps(raw | {"claims": HELD["claims"] | both}))
 
 
@@ -391,10 +391,10 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     claims = dict(zip(CLAIMS, (F(1, 3), F(2, 3), F(1, 7), F(-1, 3), F(2, 3)), strict=True))
     raw = changed(HELD, (("loop", "delay"), "1/3"), (("loop", "lag"), "2/3"))
     assert checker.statement(raw, task, claims, F(1, 3)) == [
-        'fault "a fault" (a name; the data in the file are what counts), friction any function of slip and slip rate '
-        "within its bounds and slopes, continued to negative slip rates, parameters constant",
-        "derived accelerations: of a slip error [-0.3334, 0.6667] 1/s^2, of a slip-rate error less [-0.6667, 0.3334] "
-        "1/s, of a pressure 0.6667 m^2/kg times [1, 0.3334]",
+        'fault "a fault" (a label; the data of the file define it), friction any function of slip and slip rate '
+        "within its bounds and slopes, linearly continued to negative slip rates, parameters constant",
+        "derived accelerations: per slip error [-0.3334, 0.6667] 1/s^2, per slip-rate error minus [-0.6667, 0.3334] "
+        "1/s, per pressure 0.6667 m^2/kg times [1, 0.3334]",
         "law with 1 states, every 1 s, 1/3 s late, lag 2/3 s",
         "disturbance: any acceleration of at most 0.3333 m/s^2 that starts at 0 and changes by at most 0.1428 m/s^3; "
         "from rest, along the reference, for all t >= 0; small gain 0.3334",
@@ -404,8 +404,8 @@ def test_the_statement_has_every_number_on_its_outer_side_and_those_of_the_distu
     ]
     task.change, task.name = None, "größe"
     lines = checker.statement(changed(CONTINUOUS), task, claims, F(1, 3))
-    assert lines[0].startswith('fault "gr\\xf6\\xdfe" (a name')
-    at_once = "for a pressure that acts at once (continuous time), which no sampled controller has"
+    assert lines[0].startswith('fault "gr\\xf6\\xdfe" (a label')
+    at_once = "in continuous time (pressure without sampling or delay), which excludes sampled controllers"
     assert lines[2] == f"law with 1 states, {at_once}"
     assert lines[3].startswith("disturbance: any acceleration of at most 0.3333 m/s^2; from rest")
 
@@ -435,15 +435,15 @@ def test_a_layer_in_numbers():
 @pytest.mark.parametrize("lag", ["0", "1/3"])
 def test_the_statement_says_what_rock_there_is(lag):
     raw = changed(LAYERED, (("loop", "lag"), lag))
-    said = f"law with 1 states, every 1 s, 0 s late, lag {lag} s, rock of distance^2/diffusivity = 2 s"
+    said = f"law with 1 states, every 1 s, 0 s late, lag {lag} s, diffusion path of distance^2/diffusivity = 2 s"
     assert checker.statement(raw, checker.read_task(raw), dict.fromkeys(CLAIMS, F(1)), F(1, 3))[2] == said
     claim, lagging = read_guarantee(raw), "" if lag == "0" else ", through a lag of 0.333334 s"
     assert (
-        f"with zero-order hold over 1 s{lagging}, through rock of L^2/D = 2 s from well to fault, for every"
+        f"with zero-order hold over 1 s{lagging}, through a diffusion path of L^2/D = 2 s, for every"
         in claim.sentence()
     )
     assert json.loads(guarantee_text(claim)) == raw
-    assert "rock" not in read_guarantee(HELD).sentence()
+    assert "diffusion path" not in read_guarantee(HELD).sentence()
 
 
 @pytest.mark.parametrize(
@@ -452,7 +452,7 @@ def test_the_statement_says_what_rock_there_is(lag):
 def test_the_statement_says_what_is_measured_and_how_well(seen, feedback, alone):
     claims = dict.fromkeys(CLAIMS, F(1))
     raw = changed(HELD, (("loop", "measured"), [["1", seen]]), (("loop", "feedback"), ["1", feedback]))
-    told = " of the slip alone" if alone else ""
+    told = ", slip alone measured" if alone else ""
     said = f"law with 1 states{told}, every 1 s, 0 s late, lag 0 s"
     assert checker.statement(raw, checker.read_task(raw), claims, F(1, 3))[2] == said
     raw = changed(raw, (("loop", "noise"), {"slip": "1/9", "rate": "0" if alone else "1/7"}))
@@ -524,7 +524,7 @@ def test_a_slow_gain_is_read_to_its_limits_and_needs_friction_of_slip_and_sample
             checker.read_slow({"parts": 2, "growth": "1"} | wrong, task, loop)
     at_once = checker.read_loop(CONTINUOUS["loop"], task)
     for given, other in ((jumpy, loop), (task, at_once), (jumpy, at_once)):
-        with pytest.raises(checker.Refused, match="friction of the slip alone and a law of samples"):
+        with pytest.raises(checker.Refused, match="friction of the slip alone and a sampled law"):
             checker.read_slow({"parts": 2, "growth": "1"}, given, other)
 
 
@@ -562,12 +562,12 @@ def test_the_slip_error_on_which_a_slow_gain_rests_stays_below_its_claim(monkeyp
         monkeypatch.setattr(checker, "bounds", lambda *given: asked.append(given) or ([slip, F(0), F(0)], F(1, 2)))
         return checker.verify(raw)[0]
 
-    first = 'fault "a fault" (a name; the data in the file are what counts), friction any function of the slip alone '
-    first += "within its bounds and slopes, continued to negative slip rates, parameters constant"
+    first = 'fault "a fault" (a label; the data of the file define it), friction any function of the slip alone '
+    first += "within its bounds and slopes, linearly continued to negative slip rates, parameters constant"
     assert [verified(slow, F(999, 1000)), verified(steady, F(1))] == [first, first]
     assert [given[2:] for given in asked] == [(checker.Slow(3, F(1, 9)), F(1)), (None, F(1))]
     for slip in (F(1), F(2)):
-        with pytest.raises(checker.Refused, match="the slip error that moves the input gain must stay below its claim"):
+        with pytest.raises(checker.Refused, match="with a slow gain the slip error must stay below its claim"):
             verified(slow, slip)
     with pytest.raises(checker.Refused, match="the file"):
         verified(steady | {"more": "1"}, F(0))

@@ -106,7 +106,7 @@ def test_a_gain_that_may_jump_or_acts_at_once_is_not_slow_whatever_is_claimed(fr
     raw = document()
     raw["fault"]["friction"] |= friction
     raw["loop"] = raw["loop"] if friction else CONTINUOUS
-    with pytest.raises(checker.Refused, match="slow_gain needs friction of the slip alone and a law of samples"):
+    with pytest.raises(checker.Refused, match="slow_gain needs friction of the slip alone and a sampled law"):
         checker.verify(copy.deepcopy(raw))
     with pytest.raises(
         CertificateError, match=r"input gain needs friction that depends on the slip alone|unknown field `slow_gain`"
@@ -204,7 +204,7 @@ def test_a_slip_error_that_moves_the_gain_without_end_is_said(monkeypatch):
     monkeypatch.setattr(statement, "best_bounds", grows)
     found = guarantee(TASK, HELD, SLOW)
     assert isinstance(found, NoProof)
-    assert "moves it further" in found.reason
+    assert "bounds the input gain that it implies" in found.reason
 
 
 def test_a_loop_that_is_not_stable_at_an_end_of_the_range_has_none():

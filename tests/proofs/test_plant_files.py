@@ -150,7 +150,7 @@ def test_a_loop_that_is_not_stable_is_refused_at_once():
 
 def test_a_load_that_the_law_does_not_hold_is_refused_by_both():
     document = edited(("law", "A"), [["1/2"]])
-    with pytest.raises(CertificateError, match="hold every load"):
+    with pytest.raises(CertificateError, match="balance every load"):
         read_guarantee(document)
     with pytest.raises(CHECK.Refused, match=re.escape("balance every load")):
         CHECK.check(json.dumps(document))

@@ -188,7 +188,7 @@ def on(inequalities=(), equalities=(), squares=(), polynomial=None):
 
 
 ON_FIRST = {"product": [0], "basis": [[0]], "gram": ["1"]}
-ABOUT_NOTHING = "about nothing: the set is empty"
+VACUOUS = "vacuous: the set is empty"
 SETS = [
     (on([{"0": "-1", "2": "-1"}], squares=[ON_FIRST]), True),
     (on(equalities=[{"0": "-1", "2": "-1"}]), True),
@@ -202,7 +202,7 @@ SETS = [
 def test_a_proof_on_a_set_without_points_says_so(document, empty, tmp_path):
     for verdict, said in (standalone(document) or ("", []), package(document, tmp_path) or ("", [])):
         if verdict:
-            assert (verdict, ABOUT_NOTHING in said) == ("proved", empty)
+            assert (verdict, VACUOUS in said) == ("proved", empty)
         else:
             assert not empty
 
@@ -219,7 +219,7 @@ def test_a_guarantee_without_disturbance_or_distance_says_so():
         bounds = {name: F(value) for name, value in given["claims"].items()}
         text = " ".join(sliding.statement(given, sliding.read_fault(given), bounds, 1, F(1, 2)))
         sentence = read_guarantee(given).sentence()
-        assert ("about nothing" in text, "about nothing" in sentence) == (distance == "0",) * 2
+        assert ("vacuous" in text, "vacuous" in sentence) == (distance == "0",) * 2
         assert ("none (stress 0)" in text, "without disturbance" in sentence) == (stress == "0",) * 2
 
 

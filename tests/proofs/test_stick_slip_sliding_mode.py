@@ -91,7 +91,7 @@ def test_a_root_needs_the_gains_of_a_deadbeat_step(name):
     assert STICK.read_law(document["loop"]).pull
     assert read_guarantee(document).held.law.pull
     other = changed(document, (("loop", name), times("9/8")))
-    assert refused(other, "of a sliding mode target_gain must be rate_gain, and return_rate 1/step")
+    assert refused(other, "a sliding mode must have target_gain = rate_gain")
     with pytest.raises(CertificateError, match="a sliding mode must have target_gain = rate_gain and return_rate = 1/"):
         read_guarantee(other)
 
@@ -102,7 +102,7 @@ def test_a_root_needs_the_gains_of_a_deadbeat_step(name):
         ([], "a sum must be a list of its terms"),
         ([TERM] * 17, "a sum must be a list of its terms, at most 16"),
         ([TERM | {"of": [TERM] * 15}] * 2, "at most 16 terms"),
-        ([TERM | {"factor": ["-1", "1"]}], "a factor must have two ends"),
+        ([TERM | {"factor": ["-1", "1"]}], "a factor must be two ends"),
         (TERM, "a sum must be a list of its terms"),
     ],
 )

@@ -75,7 +75,7 @@ def test_the_table_has_proved_bounds_rounded_up_beside_the_worst_found_and_the_r
     assert law.split() == ["e-LQR", "tracked", "14.9", "13.7", "11.7", "3.34", "1.3", "0.64", "-0.119", "…", "1.81"]
     assert name == "a law with a long name"
     assert other.split() == ["slow", "slip", "–", "–", "20", "–", "–", "–", "-0.8", "…", "0"]
-    assert worst == "worst: worst case found; pressure (p < 0: withdrawal): range proved, else run's"
+    assert worst == "worst: worst case found; pressure (p < 0: withdrawal): proved, else simulated"
     assert tracked == "tracked: slip error <= 2 % of target, slip rate <= reference + 1 % of the peak"
     assert max(map(len, lines)) <= 80
 

@@ -309,7 +309,7 @@ def test_an_integral_that_pushes_beyond_what_was_applied_stays_as_it_was_before(
             "another T_s",
             {"delay": F(1, 50), "lag": F(2), "diffusion": F(300)},
             F(1, 2),
-            ["another T_s", "a delay of 0.02 s, a lag of 2 s, rock of L^2/D = 300 s between", "once every 0.25 s"],
+            ["another T_s", "of 0.02 s, a lag of 2 s, a diffusion path of L^2/D = 300 s between", "once every 0.25 s"],
         ),
         ("", {}, F(1, 2), ["to be called periodically, once every 0.25 s"]),
         (None, None, None, []),
@@ -327,7 +327,7 @@ def test_what_is_said_first_is_what_a_law_is_for(other, path, longest, said):
 def test_a_law_that_is_unstable_at_rest_is_exported_with_a_warning(eigenvalue, warned):
     system = SimpleNamespace(A=[[eigenvalue]], B=[[1]], C=[[1]], D=[[1e8]], dt=0.25)
     law = SampledLaw.from_statespace(system, inputs=["slip_error"])
-    said = [line for line in _remarks(LAB, law) if line.startswith("NOT for a fault that sticks")]
+    said = [line for line in _remarks(LAB, law) if line.startswith("NOT for a stick-slip fault")]
     assert bool(said) == warned
     assert not warned or f"e-fold in {0.25 / np.log(1.1):.3g} s" in said[0]
 

@@ -200,7 +200,7 @@ def test_one_well_in_the_middle_reaches_the_modes_that_are_even(capsys, tmp_path
     assert max(map(len, found.lines())) <= 80
     told = "\n".join(found.lines())
     assert "4 unstable modes out of reach" in told
-    assert "for stress of 10 kPa on every block, pressures within\n1 MPa of the plan, rock of 1 m^2/s" in told
+    assert "for stress of 10 kPa on every block, pressures within\n1 MPa of the plan, diffusivity 1 m^2/s" in told
     path = tmp_path / "blocks.toml"
     text = (DATA / "three_sliding_blocks.toml").read_text()
     path.write_text(text.split("[[well]]")[0] + '[[well]]\nposition = "7.5 km"\n')

@@ -277,7 +277,7 @@ def test_none_names_what_fails():
 
 def test_a_double_integral_is_said_to_wind_up_while_the_fault_is_at_rest(stuck):
     double = qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7, 1e6], step="0.184")
-    assert double.warning_at_rest.startswith("MAY WIND UP on a fault that sticks: the law has a double integral")
+    assert double.warning_at_rest.startswith("MAY WIND UP on a stick-slip fault: the law has a double integral")
     assert double.warning_at_rest in qd.guarantee(REAL, law=double).lines()
     for once in ([3e8, 2.5e8, 5e7], [3e8, 2.5e8]):
         assert qd.SampledLaw.from_gains(once, step="0.184").warning_at_rest == ""
@@ -430,7 +430,7 @@ def test_runs_of_a_law_that_is_unstable_at_rest_carry_its_warning(tmp_path, caps
     for eigenvalue, warned in ((1.1, True), (0.9, False)):
         (tmp_path / "law.json").write_text(json.dumps(law | {"A": [[eigenvalue]]}))
         assert run("simulate", "real-fault", "--law", tmp_path / "law.json", "--duration", "2 s") == 0
-        assert ("NOT for a fault that sticks" in capsys.readouterr().out) == warned
+        assert ("NOT for a stick-slip fault" in capsys.readouterr().out) == warned
 
 
 def cells():

@@ -17,18 +17,18 @@ MAX_PARTS = 16  # of the range of a slow input gain
 
 @dataclass
 class Slow:
-    """Cut the range of beta into so many parts; what is past counts e^(growth*t) times, t ago."""
+    """Number of parts of the range of beta; an input t ago has the weight e^(growth*t)."""
 
     parts: int
     growth: Fraction
 
 
 def read_slow(value: Any, task: Task, loop: Loop) -> Slow:
-    """Read how the slow change of beta is used: friction of the slip alone, and a law of samples."""
+    """Read the use of a slowly varying beta: friction of the slip alone, and a sampled law."""
     given = keys(value, "slow_gain", "parts", "growth")
     parts, growth = given["parts"], number(given["growth"], "growth")
     need(type(parts) is int and 1 <= parts <= MAX_PARTS and growth > 0, "slow_gain needs 1 to 16 parts, growth > 0")
-    need(task.steady_beta and bool(loop.events), "slow_gain needs friction of the slip alone and a law of samples")
+    need(task.steady_beta and bool(loop.events), "slow_gain needs friction of the slip alone and a sampled law")
     return Slow(parts, growth)
 
 
@@ -40,7 +40,7 @@ def with_gain(loop: Loop, gain: Fraction, growth: Fraction) -> Loop:
 
 
 def slow_gains(task: Task, loop: Loop, slow: Slow) -> list[list[list[Fraction]]]:
-    """Gains of every input, and of one more, the past of what enters as the first, one part after another."""
+    """Gains of every input, and of one more, the past of the first, one part after another."""
     width = (task.beta[1] - task.beta[0]) / slow.parts
     parts = []
     for part in range(slow.parts):
@@ -57,8 +57,8 @@ ONE_OVER_E = Fraction(3679, 10000)  # from above
 def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fraction(0)) -> tuple[Row, Fraction]:
     """Bounds of |e1|, |e2| and b|p − p*|, and the small gain (FORMAT.md, A guarantee); the best of both classes.
 
-    Where the valve's pressure is not the fault's, its b|p − p*| is a fourth; where its last step counts, b times that
-    is the last.
+    Where the valve's pressure is not the fault's, its b|p − p*| is a fourth; where its last step is bounded, b times
+    that is the last.
     With a slow gain they hold while the slip error stays below `slip`.
     """
     spread = None
@@ -80,11 +80,11 @@ def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fr
 def of_class(
     task: Task, loop: Loop, found: list[list[list[Fraction]]], spread: tuple[Fraction, Fraction] | None = None
 ) -> tuple[Row, Fraction]:
-    """The same of one class of disturbances, from the gains of every input.
+    """The same for one class of disturbances, from the gains of every input.
 
-    `spread`: how far a slow beta is off that of a nominal loop by itself, and by its past.
+    `spread`: deviation of a slow beta from that of the nominal loop, now and in the past.
     """
-    pushes = len(loop.outputs) - loop.asked - loop.stepped  # up to there outputs are errors and what acts on the fault
+    pushes = len(loop.outputs) - loop.asked - loop.stepped  # outputs before it are errors and pressures on the fault
     half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
     force, drift, coupling, shifted = inputs(task, half[2])
     half[2] = spread[0] if spread else half[2]
@@ -105,11 +105,11 @@ def of_class(
     if not loop.events and len(loop.inputs) == 4:
         own += [task.reference_acceleration, task.reference_jerk]
         shares += [none] * 2
-    if loop.layer:  # the fourth output bounds what its modes leave out
+    if loop.layer:  # the fourth output bounds the truncation error
         if loop.fade:
             shares.append([*none])
         shares[-1 if loop.fade else 0][3] = half[2]  # it acts as b(p - p*) does, in the small gain
-        shares += [[*none[:3], Fraction(1), *none[4:]]] * 2  # what is awaited, and told of it
+        shares += [[*none[:3], Fraction(1), *none[4:]]] * 2  # b*Y, and its measurement
         own += [Fraction(0)] * (len(shares) - len(own))
     if loop.pulse:
         own.append(Fraction(0))
@@ -127,7 +127,7 @@ def of_class(
 
 
 def peaks_of(found: list[list[list[Fraction]]], own: Row, shares: list[Row]) -> tuple[Row, Fraction]:
-    """Bounds of the outputs, and the small gain, from gains by input, output and piece, and what bounds the inputs."""
+    """Bounds of the outputs, and the small gain, from gains by input, output and piece, and bounds of the inputs."""
     table = [
         [max(sum(c * g for c, g in zip(share, at, strict=True)) for at in zip(*of, strict=True)) for of in found]
         for share in shares
@@ -173,7 +173,7 @@ def radius(table: list[Row]) -> Fraction:
 
 
 def inputs(task: Task, half_beta: Fraction) -> tuple[Fraction, Fraction, Fraction, Fraction]:
-    """Bounds of the force and the drift, the coupling from e2 to the drift, and what the push is shifted by."""
+    """Bounds of the force and the drift, the coupling from e2 to the drift, and the shift of the push."""
     if task.change is None:
         return task.reference_force + task.amplitude, task.drift, Fraction(0), Fraction(0)
     if not task.steady_beta:

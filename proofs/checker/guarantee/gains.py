@@ -1,7 +1,7 @@
-"""L1 norms: bounds of every output for an input of size 1, for a start away from rest, and with a layer's modes.
+"""L1 norms: bounds of every output for an input of size 1, for an initial condition, and with a diffusion path.
 
-With R what the modes n < MODES leave out (FORMAT.md, Layer), A its area after a unit step, less it, and Y what of it
-the steps so far will still bring, x2 = e2 - beta0*b*Y takes the place of e2 in the loop.
+With R the truncation error of the modes n < MODES (FORMAT.md, Layer), A its area after a unit step, and Y what the
+steps so far will still add to it, x2 = e2 - beta0*b*Y takes the place of e2 in the loop.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,7 +17,7 @@ from .reading import Refused, Row, need
 
 STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
 Sums = list[int]  # one for every output, in units of 2^-BITS
-LATE = 1 << 12  # what is left of the past after those is below a 4096th
+LATE = 1 << 12  # the past before those is below 1/4096
 
 
 def gains(
@@ -51,7 +51,7 @@ def gains(
 
 
 def since_event(flow: Flow, outputs: Fixed) -> Iterator[tuple[Sums, Sums, Sums]]:
-    """What came since the event, in every piece: bounds at both ends, and of what may lie above both of them."""
+    """Sums since the event, in every piece: bounds at both ends, and of the excess over both in between."""
     if flow.near:
         yield from near_event(flow, flow.near, outputs)
         return
@@ -71,7 +71,7 @@ def since_event(flow: Flow, outputs: Fixed) -> Iterator[tuple[Sums, Sums, Sums]]
 
 
 def faded(flow: Flow, outputs: Fixed, i: int) -> tuple[Sums, Sums, Sums]:
-    """The same of what fades: pieces that have passed, and all that the present one may bring."""
+    """The same for a fading input: pieces that have passed, and the most that the present one may add."""
     size, chord = outputs.size(), flow.pieces[i] ** 2 / 8
     first = last = [0] * len(size.rows)
     ends = [(outputs * now).sums() for now in (flow.entry, flow.steps[i] * flow.entry)]
@@ -88,7 +88,7 @@ def faded(flow: Flow, outputs: Fixed, i: int) -> tuple[Sums, Sums, Sums]:
 
 
 def near_event(flow: Flow, here: Near, outputs: Fixed) -> Iterator[tuple[Sums, Sums, Sums]]:
-    """The same of a pulse: the larger of both its sides, and what is there before the next event already."""
+    """The same for a pulse: the larger of both its sides, and its part before the next event."""
     none, left, phase = [0] * len(outputs.rows), sum(flow.pieces), outputs
     square = flow.generator * flow.generator
     for step, h, within in zip(flow.steps, flow.pieces, flow.nears, strict=True):
@@ -137,7 +137,7 @@ def flow_gains(loop: Loop, entry: Row) -> Row:
         further = (step.size() * near).size()
         near = Fixed([list(map(max, *lines)) for lines in zip(near.rows, further.rows, strict=True)])
         step, piece = step * step, 2 * piece
-    raise Refused("the nominal loop must be stable, and seen to be")
+    raise Refused("the nominal loop must be stable, as shown by its sums")
 
 
 def add_areas(sums: list[list[int]], heights: Fixed, bends: Fixed, piece: Fraction) -> None:
@@ -219,9 +219,9 @@ def start_gains(loop: Loop) -> list[list[Fraction]]:
 
 
 def followed(flows: list[Flow], start: Fixed, rows: int) -> tuple[Fixed, Fixed, list[int]]:
-    """States at the beginning of K periods; W^-1 after them, and what no W times a state exceeds, ever.
+    """States at the beginning of K periods; W^-1 after them, and a bound of W times the state for all later periods.
 
-    K = 2^j periods, until a 1024th of these bounds is left but for the slowest mode, which has to fall.
+    K = 2^j periods, until 1/1024 of these bounds remains except for the slowest mode, which has to decay.
     """
     size, count = len(start.rows), len(start.rows[0])
     period = flows[0].whole
@@ -230,7 +230,7 @@ def followed(flows: list[Flow], start: Fixed, rows: int) -> tuple[Fixed, Fixed, 
     row, columns, even = slowest(period), start, [1 << BITS] * count
     for _ in range(DOUBLINGS):
         width = 2 * len(columns.rows[0])
-        need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must forget its start sooner: it takes too long")
+        need(2 * width * size * (size + rows) <= MAX_WORK, "the loop must decay faster: the check takes too long")
         columns, period = columns.beside(period * columns), period * period
         place, seen, back = seen_alone(row, largest(columns.size(), even))
         most = largest((seen * columns).size(), even)
@@ -241,7 +241,7 @@ def followed(flows: list[Flow], start: Fixed, rows: int) -> tuple[Fixed, Fixed, 
         falls = all(product(line, most) <= v for line, v in zip(left, most, strict=True))
         if falls and all(SHARE * product(line, quick) <= v for line, v in zip(left, most, strict=True)):
             return columns, far, most
-    raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
+    raise Refused(f"the nominal loop must be stable, as shown within {2**DOUBLINGS} periods")
 
 
 def product(line: list[int], values: list[int]) -> Fraction:
@@ -278,7 +278,7 @@ def on_pieces(flow: Flow, outputs: Fixed, columns: Fixed, weights: list[int]) ->
 
 @dataclass
 class Awaited:
-    """b*Y over its bound: where it enters the flow, how it fades, what it adds to e2, what the law is told of it."""
+    """b*Y over its bound: its entry in the flow, its decay, its share of e2, its effect on the measurement."""
 
     entry: Row
     fade: Fade | None
@@ -287,7 +287,7 @@ class Awaited:
 
 
 def loop_gains(loop: Loop, gain: Fraction) -> list[list[Row]]:
-    """Gains of every input: of the loop, of what is awaited and told of it where there is rock, of the start."""
+    """Gains of every input: of the loop, of b*Y and its measurement with a diffusion path, of the initial condition."""
     found = []
     if loop.layer:
         loop, awaited = without_area(loop, gain)
@@ -303,7 +303,7 @@ def loop_gains(loop: Loop, gain: Fraction) -> list[list[Row]]:
 
 
 def pulse_entry(loop: Loop, gain: Fraction) -> Row:
-    """Where a pressure at the valve enters: the slip rate, or what that behind a lag is more than the valve's."""
+    """Entry of a pressure at the valve: the slip rate, or the pressure behind a lag minus the valve's."""
     entry = [Fraction(0)] * len(loop.flow)
     if loop.asked:
         well = len(entry) - 2

@@ -14,9 +14,9 @@ from .reading import Refused, Row, need
 
 @dataclass
 class Near:
-    """What it is in one flow: columns that begin with its event, each with a bound of what it is off, in size.
+    """A pulse in one flow: columns that begin with its event, each with a bound of its error in size.
 
-    `soon` bounds in size what is there in the last part, `reach` long, before the next event, beside `ahead` as it is.
+    `ahead` is its part before the next event, over a time `reach`, and `soon` bounds the error of that in size.
     """
 
     sides: list[tuple[Fixed, Fixed]]
@@ -25,7 +25,7 @@ class Near:
     reach: Fraction
 
     def halves(self) -> tuple[Fixed, Fixed]:
-        """Half the sum and half the difference of both sides, whose sizes add up to the larger; what both are off."""
+        """Half the sum and half the difference of both sides, whose sizes add up to the larger; errors of both."""
         (one, off), (other, far) = self.sides
         less = Fixed([[-v for v in line] for line in other.rows], other.error)
         both = (one + other).beside(one + less).scaled(Fraction(1, 2))
@@ -49,7 +49,7 @@ def near_of(flow: list[Row], majorant: list[Row], event: Fixed, entry: Fixed, mo
 
 
 def with_next(here: Near | None, majorant: list[Row], entry: Fixed, moved: Fixed, pulse: Pulse) -> Near:
-    """What is there before the next event as well: at most |c*b| + early*|c|*|e^{A.}|*|A*b|, over `before`."""
+    """The part before the next event as well: at most |c*b| + early*|c|*|e^{A.}|*|A*b|, over `before`."""
     soon = (exponential(majorant, pulse.early).size() * moved.size()).size()
     sides = here.sides if here else []
     scaled = soon.scaled(pulse.early * pulse.before).size()
@@ -57,7 +57,7 @@ def with_next(here: Near | None, majorant: list[Row], entry: Fixed, moved: Fixed
 
 
 DOUBLINGS = 12  # at most 4096 periods are summed
-SHARE = 1024  # what is left of the past after those is below a 1024th, but for what the slowest mode leaves
+SHARE = 1024  # the past before those is below 1/1024, except for the slowest mode
 IN_COLUMNS = 6  # doublings of columns, after which rows are doubled
 TURNS, ROOM = 8, 1 << 40  # of sums that are solved for to bound themselves
 MAX_WORK = 3 * 10**7  # products of integers
@@ -131,7 +131,7 @@ def cut(
 
 
 def pulsed(loop: Loop, flows: list[Flow], pulse: Pulse) -> list[Flow]:
-    """The same of an input that is there near one event alone."""
+    """The same for an input near one event only."""
     most = majorant(loop.flow)
     for place, flow in enumerate(flows):
         moved, here = flow.generator * flow.entry, None
@@ -179,13 +179,13 @@ def pieces(flow: Flow, later: Fixed | None) -> Fixed:
 
 
 def diagonal(rest: Fixed) -> Fixed:
-    """One column for every entry that is not 0."""
+    """One column for every nonzero entry."""
     corner = [i for i, (v,) in enumerate(rest.rows) if v]
     return Fixed([[v if i == j else 0 for j in corner] for i, (v,) in enumerate(rest.rows)])
 
 
 def near_pieces(flow: Flow, here: Near, later: Fixed | None) -> Fixed:
-    """The same of a pulse: what comes of both its sides is at most the larger, and what they are off."""
+    """The same for a pulse: at most the larger of both its sides, plus their errors."""
     if not here.sides:
         return Fixed([[0] for _ in flow.event.rows])
     whole = flow.steps[0]
@@ -198,7 +198,7 @@ def near_pieces(flow: Flow, here: Near, later: Fixed | None) -> Fixed:
 
 @dataclass
 class Past:
-    """All periods before: columns of some, which stand for others after each of the maps, and what bounds the rest."""
+    """All earlier periods: columns of some, of others by each of the maps, and a bound of the rest."""
 
     columns: Fixed
     far: Fixed
@@ -217,7 +217,7 @@ class Past:
 
 
 def past(flows: list[Flow], rows: int) -> Past:
-    """Sum 2^j periods until a 1024th of every sum is left, and what the slowest mode, seen alone, leaves."""
+    """Sum 2^j periods until 1/1024 of every sum remains, and the remainder of the slowest mode, taken alone."""
     *earlier, flow = flows
     period, columns = flow.whole, pieces(flow, None)
     for flow in reversed(earlier):
@@ -228,7 +228,7 @@ def past(flows: list[Flow], rows: int) -> Past:
     for doubling in range(DOUBLINGS):
         width = len(columns.rows[0])
         work = 2 * (width << len(maps)) * size * (size + rows)
-        need(work <= MAX_SUMS, "the loop must forget its past sooner: it takes too long")
+        need(work <= MAX_SUMS, "the loop must decay faster: the check takes too long")
         if doubling < IN_COLUMNS:
             following = period * columns
             columns, more = columns.beside(following), sums_of_product(seen, following)
@@ -242,10 +242,10 @@ def past(flows: list[Flow], rows: int) -> Past:
         quick = Fixed([[v * (j != place)] for j, v in enumerate(sums)])
         if all(v * SHARE <= total for (v,), total in zip((left * quick).rows, sums, strict=True)):
             return Past(columns, far, whole_sums(left, sums, place), maps)
-    raise Refused(f"the nominal loop must be stable, and seen to be within {2**DOUBLINGS} periods")
+    raise Refused(f"the nominal loop must be stable, as shown within {2**DOUBLINGS} periods")
 
 
-@lru_cache(maxsize=16)  # all inputs of a loop ask for the same ones
+@lru_cache(maxsize=16)  # the same for all inputs of a loop
 def stacked(rows: Fixed, maps: tuple[Fixed, ...]) -> Fixed:
     """Rows as they are and after each of the maps, above those after two of them, and so on."""
     if not maps:
@@ -267,7 +267,7 @@ def folded(sums: list[int], count: int) -> list[int]:
 
 @lru_cache(maxsize=4)
 def slowest(period: Fixed) -> list[int]:
-    """What the slowest mode is seen along, if there is one: a row of what is left of all states after long, in size.
+    """Left eigenvector of the slowest mode, if there is one: a row of a high power of the map, in size.
 
     That with the largest entry on the diagonal, which is the same in all units of the states.
     """
@@ -280,7 +280,7 @@ def slowest(period: Fixed) -> list[int]:
 
 
 def seen_alone(row: list[int], sums: list[int]) -> tuple[int, Fixed, Fixed]:
-    """Unit rows W but for the given one, in place of that of the state that counts most, and its inverse."""
+    """Unit rows W except for the given one, which replaces that of the largest contribution, and the inverse of W."""
     size = len(row)
     place = max(range(size), key=lambda i: abs(row[i]) * sums[i])
     seen, back = ([[(i == j) << BITS for j in range(size)] for i in range(size)] for _ in range(2))
@@ -305,7 +305,7 @@ def whole_sums(left: Fixed, sums: list[int], place: int) -> Fixed:
         (y << BITS) + sum(map(int.__mul__, line, found)) <= v << BITS
         for y, line, v in zip(sums, left.rows, found, strict=True)
     )
-    need(closed, "the nominal loop must be stable, and its past must fade")
+    need(closed, "the nominal loop must be stable and decay")
     return Fixed([[v] for v in found])
 
 

@@ -1,4 +1,4 @@
-"""Samples that follow no clock: a set that the state at the samples never leaves, as a file states it (FORMAT.md)."""
+"""Aperiodic sampling: an invariant set of the state at the samples, as a file states it (FORMAT.md)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class Reach:
 
 
 def read_reach(value: Any, loop: Loop) -> Reach:
-    """Read the set and what bounds it, of the sizes of the loop."""
+    """Read the set and its bases, in the dimensions of the loop."""
     given = keys(value, "reach", "inputs", "facets", "at_samples", "between")
     size, facets = len(reduced(loop.events[0][0])[0]), given["facets"]
     need(type(facets) is list and size <= len(facets) <= MAX_FACETS, f"reach needs {size} to {MAX_FACETS} facets")
@@ -67,7 +67,7 @@ def bounds_within(task: Task, loop: Loop, reach: Reach) -> tuple[Row, Fraction]:
     of_force = sum(c * v for c, v in zip(half, peaks, strict=True))
     shares = [of_force, coupling * peaks[1], *[Fraction(0)] * len(loop.told)]
     for least, share, bound in zip(own, shares, reach.inputs, strict=True):
-        need(least + share <= bound, "the inputs must stay within the bounds for which the set is")
+        need(least + share <= bound, "the inputs must stay within the bounds that reach gives")
     parts = zip(shares, reach.inputs, strict=True)
     small = max((share / bound for share, bound in parts if bound), default=Fraction(0))
     return [peaks[0], peaks[1], peaks[2] + shifted], small
@@ -91,7 +91,7 @@ def reduced(event: list[Row]) -> tuple[list[Row], list[Row]]:
 
 
 class Between:
-    """From a sample to the next one: what keeps rows of the state small."""
+    """Bounds of rows of the state from a sample to the next one."""
 
     def __init__(self, loop: Loop, reach: Reach) -> None:
         self.loop, self.facets = loop, reach.facets
@@ -150,7 +150,7 @@ class Between:
         return found
 
     def step_of(self, time: Fraction) -> tuple[Fixed, Fixed]:
-        """What the flow makes of a row within a time, and a bound of that at any time before."""
+        """Map of the flow over a time, and a bound of it at any earlier time."""
         return exponential(self.loop.flow, time), exponential(majorant(self.loop.flow), time).size()
 
     def inverse_of(self, basis: Basis) -> Fixed:

@@ -12,12 +12,12 @@ from .root import Root, read_root
 from .task import Task
 
 MAX_STATES, MAX_LAW_STATES, MAX_PERIODS = 20, 12, 8
-MODES, PI = 8, Fraction(314159265358979323846, 10**20)  # of a layer of rock; PI is below pi by less than SHORT of it
+MODES, PI = 8, Fraction(314159265358979323846, 10**20)  # modes of a diffusion path; PI is below pi by less than SHORT
 SHORT = Fraction(1, 10**20)
-SHORTEST = 32  # a layer takes at least the 32nd part of a step
-EVEN = [Fraction(i, 8) for i in range(9)]  # where a flow between two events is cut
+SHORTEST = 32  # L^2/D of a diffusion path is at least 1/32 of a step
+EVEN = [Fraction(i, 8) for i in range(9)]  # ends of pieces of a flow between two events
 HALVES = [Fraction(i, 2) for i in range(3)]
-BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # before a lag or a layer
+BENT = [Fraction(i, 128) for i in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)]  # the same with a lag or path
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 
 
@@ -42,7 +42,7 @@ class Fade:
     floor: Fraction
 
     def weight(self, time: Fraction) -> Fraction:
-        """What is left after a time, at most: e^x is larger than the first terms of its sum."""
+        """Upper bound after a time: e^x is larger than the first terms of its sum."""
         x = self.rate * time
         return self.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24) + self.floor
 
@@ -52,16 +52,16 @@ class Loop:
     """Flow x' = Ax, then events (map, time until the next one; none in continuous time), inputs, the implicit step.
 
     The first two inputs flow; those of the implicit step and of the noise, if there are any, enter with the first
-    event. Where a law is told of the reference itself (`referred`), two more come before these: one that flows, and
-    one that enters with the first event, both bounded by the rate of the reference. `noise` bounds what the measured
-    e1 and e2 are off, an input each where it is not 0. Without events there may be two inputs more, the second and
+    event. If the reference itself is an input of the law (`referred`), two more come before these: one that flows, and
+    one that enters with the first event, both bounded by the rate of the reference. `noise` bounds the measurement
+    errors of e1 and e2, an input each where it is not 0. Without events there may be two inputs more, the second and
     third derivatives of the reference.
-    With a layer of rock, L^2/D = `layer`, a fourth output bounds what its modes leave out; where `fade` is given, that
-    is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start` has the
-    columns of the box from which it starts, none where that is rest. `pump` has its limits as told. Where the
-    valve's last step counts it is the last output, `stepped`, and `pulse` says when it may be made. `off` is by how
-    much measurements are early or late, and `told` says which of e1 and e2 have an input for that and noise. Where
-    samples follow no clock each comes `step` to `longest` after the last; else that is 0.
+    With a diffusion path, L^2/D = `layer`, a fourth output bounds the truncation error of its modes; where `fade` is
+    given, that is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start`
+    has the columns of the box of initial conditions, none at rest. `pump` has its limits as the file states them. Where
+    the last step of the valve is bounded it is the last output, `stepped`, and `pulse` says when it may occur. `off` is
+    the jitter of measurements, and `told` lists those of e1 and e2 that have an input for jitter and noise. With
+    aperiodic sampling each interval is `step` to `longest`; else `longest` is 0.
     """
 
     flow: list[Row]
@@ -88,23 +88,23 @@ class Loop:
 
 @dataclass
 class Held:
-    """A law of samples as a file states it, and the places of the pressure's states in its loop."""
+    """A sampled law as a file states it, and the places of the pressure's states in its loop."""
 
     step: Fraction
     delay: Fraction
     lag: Fraction
-    diffusion: Fraction  # 0 without a layer
+    diffusion: Fraction  # 0 without a diffusion path
     update: list[Row]
     measured: list[Row]
     output: Row
     feedback: Row
     root: Root | None
     noise: tuple[Fraction, Fraction]
-    first: list[Row]  # what the law makes of slip and slip rate before its first sample
-    jitter: Row  # of measurements, of pressures besides, and over how long a measurement is a mean
+    first: list[Row]  # states of the law at its first sample, by initial slip and slip rate
+    jitter: Row  # of measurements, of pressures in addition, and averaging time of a measurement
     pump: dict[str, Fraction]
-    longest: Fraction  # interval from sample to sample; 0 where they follow a clock
-    referred: list[Row]  # what the reference and its rate add to the law's states, and last to the pressure
+    longest: Fraction  # longest sampling interval; 0 if periodic
+    referred: list[Row]  # gains of reference and its rate on the law's states and, last, on the pressure
 
     def __post_init__(self) -> None:
         whole, self.part = self.delay // self.step, self.delay % self.step  # arrival after a sample
@@ -122,10 +122,10 @@ class Held:
 
 
 def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0), Fraction(0))) -> Loop:
-    """Build the error loop: e1, e2, the law's states, pressures on their way, valve, and what lies behind it.
+    """Build the error loop: e1, e2, the law's states, pressures on their way, valve, and states behind it.
 
-    That is: where there is a lag, the well's pressure less the valve's; modes of a layer of rock, less the well's.
-    Where a layer has no lag before it, the last state is the last step of the valve. `errors`: e1, e2 at first.
+    These are: with a lag, the well's pressure minus the valve's; modes of a diffusion path, minus the well's.
+    With a diffusion path and no lag, the last state is the last step of the valve. `errors`: initial e1, e2.
     """
     if type(value) is dict and "rates" in value:
         need(not any(errors), "a law in continuous time must start at rest")
@@ -138,7 +138,7 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     events = [([[line[0] - slope * line[size], *line[1:size]] for line in sample], law.part or step)]
     events += [(arrival, step - law.part)] if law.part else []
     inputs = [unit(size)[1], drift_of(law, task.b), *([[line[size] for line in sample]] if root else [])]
-    told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # what the law makes of both
+    told = [[line[k] - (i == k) for i, line in enumerate(events[0][0])] for k in (0, 1)]  # of measurement errors
     heard = [k for k in (0, 1) if law.noise[k] or (law.off and (k == 0 or root or uses_rate(*law.fed)))]
     inputs += [reference_of(law), [line[-1] for line in sample]] if law.referred else []
     inputs += [told[k] for k in heard]
@@ -150,7 +150,7 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     loop = replace(loop, off=law.off, told=heard, longest=law.longest, referred=bool(law.referred))
     plain = not (law.delay or law.path or law.watched or root or any(errors) or any(map(any, law.first)))
     need(
-        plain or not law.longest, "samples that follow no clock must be of a linear law from rest, its pressure at once"
+        plain or not law.longest, "aperiodic sampling must have a linear law from rest, without delay, path and jitter"
     )
     if not law.watched:
         return loop
@@ -166,63 +166,63 @@ def read_held(value: Any) -> Held:
     implicit = "root" in more
     root = read_root(given["root"]) if implicit else None
     step, delay, lag = (number(given[k], k) for k in ("step", "delay", "lag"))
-    need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step > 0, delay of 0 to 8 steps, lag >= 0")
+    need(step > 0 and 0 <= delay <= MAX_PERIODS * step and lag >= 0, "step must be > 0, delay 0 to 8 steps, lag >= 0")
     n = count_states(given["states"])
     update, seen = matrix(given["update"], "update", n, n), matrix(given["measured"], "measured", n, 2 + implicit)
     output, feedback = row(given["output"], "output", n), row(given["feedback"], "feedback", 2 + implicit)
     noise = read_noise(given["noise"]) if "noise" in more else (Fraction(0), Fraction(0))
     need(implicit or not noise[1] or uses_rate(seen, feedback), "noise of the slip rate needs a law that measures it")
     time = number(given.get("diffusion", "0"), "diffusion")
-    need("diffusion" not in more or SHORTEST * time >= step, "diffusion must take at least the 32nd part of a step")
+    need("diffusion" not in more or SHORTEST * time >= step, "diffusion must be at least 1/32 of step")
     first = matrix(given["first"], "first", n, 2) if "first" in more else [[Fraction(0)] * 2] * n
-    if "applied" in more:  # of limits that are never reached: read, and no part of the proof
+    if "applied" in more:  # limits that are never reached: read, and no part of the proof
         row(given["applied"], "applied", n)
     jitter = read_jitter(given["jitter"]) if "jitter" in more else [Fraction(0)] * 3
     pump = read_pump(given["pump"]) if "pump" in more else {}
     longest = number(given["longest"], "longest") if "longest" in more else Fraction(0)
     need("longest" not in more or longest > step, "the longest interval must be longer than step")
     referred = matrix(given["of_reference"], "of_reference", n + 1, 2) if "of_reference" in more else []
-    need("of_reference" not in more or any(map(any, referred)), "of_reference must not be zero where it is given")
-    need(not (referred and (time or longest or root)), "of_reference must stand without rock, root and longest")
+    need("of_reference" not in more or any(map(any, referred)), "of_reference must not be zero if given")
+    need(not (referred and (time or longest or root)), "of_reference must be given without diffusion, root and longest")
     parts = (step, delay, lag, time, update, seen, output, feedback, root, noise, first, jitter, pump, longest)
     law = Held(*parts, referred)
-    need(not (law.watched and time), "jitter and the rate of a pump must not be told of a loop through rock")
+    need(not (law.watched and time), "jitter and a pump rate must not be given with diffusion")
     need(law.size <= MAX_STATES, f"the loop must have at most {MAX_STATES} states")
     return law
 
 
 def read_jitter(value: Any) -> Row:
-    """Read by how much measurements are early or late, pressures besides, and over how long one is a mean."""
+    """Read the jitter of measurements, of pressures in addition, and the averaging time."""
     mean = ("mean",) if type(value) is dict and "mean" in value else ()
     found = [*numbers(value, "jitter", "measured", "delay", *mean).values()]
-    need(min(found) >= 0 and any(found), "jitter must be >= 0, some of it above")
-    need(not mean or found[2] > 0, "a mean must be over some time")
+    need(min(found) >= 0 and any(found), "jitter must be >= 0, and not all 0")
+    need(not mean or found[2] > 0, "mean must be > 0 if given")
     return found if mean else [*found, Fraction(0)]
 
 
 def read_pump(value: Any) -> dict[str, Fraction]:
-    """Read limits of the pressure, and of its rate with the time in which it is what was asked for."""
+    """Read limits of the pressure, and of its rate with the time in which the commanded value is reached."""
     paced = type(value) is dict and "rate" in value
     limited = not paced or not set(value) <= {"rate", "ramp"}
     found = numbers(value, "pump", *(("least", "largest") if limited else ()), *(("rate", "ramp") if paced else ()))
     if limited:
         low, high = found["least"], found["largest"]
-        need(low <= 0 <= high and low != high, "a pump needs a range with 0 in it")
+        need(low <= 0 <= high and low != high, "the range of a pump must contain 0, and more")
     need(not paced or min(found["rate"], found["ramp"]) > 0, "rate and ramp of a pump must be > 0")
     return found
 
 
 def pulse_of(law: Held) -> Pulse | None:
-    """When the valve's pressure may differ from that on schedule; refused where that reaches another sample."""
+    """When the valve's pressure may differ from the scheduled one; refused if that reaches another sample."""
     off, ramp, before = sum(law.jitter[:2]), law.pump.get("ramp", Fraction(0)), law.part or law.step
     after = law.step - law.part
     apart = off <= before and off + ramp <= after and 2 * off + ramp <= law.step and 2 * law.off <= law.step
-    need(apart, "a pressure must begin and end to change between two samples, and those must keep their order")
+    need(apart, "every pressure must change between two samples only, and samples must keep their order")
     return Pulse(int(law.part > 0), off, off + ramp, off, off + ramp / 2) if off or ramp else None
 
 
 def flow_of(law: Held, task: Task) -> tuple[list[Row], Row]:
-    """The flow between events, and what the states say of the fault's pressure."""
+    """The flow between events, and the fault's pressure as a row over the states."""
     push = [Fraction(i == law.valve or (i == law.well and law.lag > 0)) for i in range(law.size)]  # modes follow
     flow = zeros(law.size)
     flow[0][1] = Fraction(1)
@@ -261,7 +261,7 @@ def maps_of(law: Held, b: Fraction) -> tuple[list[Row], list[Row]]:
 
 
 def drift_of(law: Held, b: Fraction) -> Row:
-    """What a change of the steady pressure does to the states, which are counted from those that ask for it."""
+    """Effect of a change of the steady pressure on the states, measured from those that command it."""
     still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(law.update)]
     steady = steady_states(still, law.output, [Fraction(0)] * law.own, Fraction(1))
     behind = [Fraction(0)] * (law.size - law.well)
@@ -269,7 +269,7 @@ def drift_of(law: Held, b: Fraction) -> Row:
 
 
 def reference_of(law: Held) -> Row:
-    """What a change of the reference does to the states, which are counted from those that ask for p* there."""
+    """Effect of a change of the reference on the states, measured from those that command p* there."""
     still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(law.update)]
     *rates, pressed = [-line[0] for line in law.referred]
     moved = steady_states(still, law.output, rates, pressed)
@@ -277,7 +277,7 @@ def reference_of(law: Held) -> Row:
 
 
 def starts_of(law: Held, errors: Sequence[Fraction]) -> list[Row]:
-    """Columns of the box of starts: both errors with what the law makes of them, and what it makes of the noise."""
+    """Columns of the box of initial conditions: both errors with the law's states for them, and those for the noise."""
     found = []
     for k in (0, 1):
         made = [line[k] for line in law.first] + [Fraction(0)] * (law.size - 2 - law.own)
@@ -287,7 +287,7 @@ def starts_of(law: Held, errors: Sequence[Fraction]) -> list[Row]:
 
 
 def with_left_out(loop: Loop, law: Held) -> Loop:
-    """The loop with a bound of what the modes of a layer leave out: of the well's flow, or fading after its steps."""
+    """The loop with a bound of the truncation error of the modes: of the well's flow, or fading after its steps."""
     size, time, high = law.size, law.diffusion, abs(mode_share(MODES))
     rate, floor = mode_rate(MODES, time), 6 * MODES * SHORT
     cut = replace(loop, cuts=BENT, past_cuts=HALVES, layer=time)
@@ -302,29 +302,29 @@ def with_left_out(loop: Loop, law: Held) -> Loop:
 
 
 def read_noise(value: Any) -> tuple[Fraction, Fraction]:
-    """Bounds of what the measured slip and slip rate are off."""
+    """Bounds of the measurement errors of slip and slip rate."""
     slip, rate = numbers(value, "noise", "slip", "rate").values()
     need(slip >= 0 and rate >= 0, "bounds of the noise must be >= 0")
     return slip, rate
 
 
 def uses_rate(measured: list[Row], feedback: Row) -> bool:
-    """Whether a law without an implicit step does anything with the slip rate."""
+    """Whether a law without an implicit step uses the slip rate."""
     return any(line[1] for line in (*measured, feedback))
 
 
 def mode_rate(number: int, time: Fraction) -> Fraction:
-    """How fast a mode of a layer decays, from below, for L^2/D = time."""
+    """Decay rate of a mode of a diffusion path, from below, for L^2/D = time."""
     return ((2 * number + 1) * PI / 2) ** 2 / time
 
 
 def mode_share(number: int) -> Fraction:
-    """What a mode of a layer takes of a step, its size from above."""
+    """Share of a mode of a diffusion path in a step, its size from above."""
     return (-1) ** number * 4 / ((2 * number + 1) * PI)
 
 
 def read_continuous(value: Any, task: Task) -> Loop:
-    """Build the error loop of a law whose pressure acts at once: e1, e2 and the law's states."""
+    """Build the error loop of a law in continuous time: e1, e2 and the law's states."""
     parts = ("states", "rates", "measured", "output", "feedback")
     given = keys(value, "loop", *parts, *(["of_reference"] if "of_reference" in value else []))
     n = count_states(given["states"])
@@ -348,7 +348,9 @@ def read_continuous(value: Any, task: Task) -> Loop:
 def count_states(names: Any) -> int:
     """Number of a law's states, after checking their names."""
     sound = type(names) is list and len(names) <= MAX_LAW_STATES and all(type(v) is str for v in names)
-    need(sound and all(NAME.fullmatch(v) for v in names) and len(set(names)) == len(names), "states must be names")
+    need(
+        sound and all(NAME.fullmatch(v) for v in names) and len(set(names)) == len(names), "states must be unique names"
+    )
     return len(names)
 
 
@@ -366,7 +368,7 @@ def steady_states(own: list[Row], output: Row, rates: Row, asked: Fraction) -> R
         chosen = [v / chosen[column] for v in chosen]
         table = [[a - line[column] * c for a, c in zip(line, chosen, strict=True)] for line in table]
         pivots.append((column, chosen))
-    need(not any(line[n] for line in table), "the law must be able to ask for a constant pressure without errors")
+    need(not any(line[n] for line in table), "the law must be able to command any constant pressure at zero errors")
     for column, line in reversed(pivots):
         found[column] = line[n] - sum(v * f for v, f in zip(line, found, strict=False))
     return found

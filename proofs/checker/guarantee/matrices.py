@@ -144,7 +144,7 @@ def sum_of_places(count: int) -> int:
 def bounded(value: Fixed) -> Fixed:
     """Refuse numbers that only an unstable or absurd loop can have."""
     largest = max(map(abs, chain([value.error], *value.rows)))
-    need(largest <= LARGEST, "the nominal loop must be stable, its numbers of ordinary size")
+    need(largest <= LARGEST, "the nominal loop must be stable, with numbers below 2^192")
     return value
 
 
@@ -161,7 +161,7 @@ def column(values: Sequence[Fraction]) -> Fixed:
 def exponential(flow: list[Row], time: Fraction) -> Fixed:
     """e^{At} by a Taylor sum at t/2^j and squaring."""
     norm = max(sum(map(abs, line)) for line in flow) * time
-    need(norm <= 1 << 12, "the flow must change by a factor of ordinary size between two events")
+    need(norm <= 1 << 12, "the flow between two events must have a norm of at most 4096")
     halvings = int(norm).bit_length()  # to a norm below 1
     base = fixed([[v * time / 2**halvings for v in line] for line in flow])
     term = total = fixed(unit(len(flow)))
@@ -169,7 +169,7 @@ def exponential(flow: list[Row], time: Fraction) -> Fixed:
     for k in range(1, terms):
         term = (term * base).scaled(Fraction(1, k))
         total = total + term
-    # what is left out is below 2/n!, n terms: less than the unit that the error of the exact first term has to spare
+    # the remainder after n terms is below 2/n!: less than the unit of error that the exact first term does not use
     for _ in range(halvings):
         total = total * total
     return total
@@ -180,7 +180,7 @@ def exponentials(flow: list[Row], times: Row) -> list[Fixed]:
     return shared_exponentials(tuple(map(tuple, flow)), tuple(times), BITS)
 
 
-@lru_cache(maxsize=16)  # all inputs of a loop ask for the same ones
+@lru_cache(maxsize=16)  # the same for all inputs of a loop
 def shared_exponentials(flow: tuple[tuple[Fraction, ...], ...], times: tuple[Fraction, ...], _: int) -> list[Fixed]:
     """The same, computed once in so many bits."""
     grain = times[0] / lcm(*((times[0] / time).numerator for time in times))

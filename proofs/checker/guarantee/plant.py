@@ -15,10 +15,10 @@ from .matrices import BITS, Fixed, exponential, fixed, unit
 from .reading import Row, entries, keys, lower, matrix, need, number, row, upper
 
 MOST, MOST_LAW, MOST_LOOP, MOST_PIECES, MOST_PERIODS = 40, 48, 96, 64, 8
-AT_ONCE, LEFT, FAINT = (8, 256), 1024, 60  # periods in columns, share that is left of sums, bits by which none is 0
+AT_ONCE, LEFT, FAINT = (8, 256), 1024, 60  # periods in columns, remaining share of sums, bits by which none is 0
 MOST_WORK = 12 * 10**8
-BEYOND = 64  # times as many periods as may be followed, within which the map of one that forgets is small
-SWEEPS = 8  # in which units are chosen
+BEYOND = 64  # factor on the periods that may be followed, within which the map of a stable loop is small
+SWEEPS = 8  # of the choice of units
 COARSE, PLACE, HALF = 58, 128, 64  # bits of entries that are multiplied at once, and of the places of their products
 
 
@@ -35,7 +35,7 @@ class Sector:
 
 @dataclass
 class Plant:
-    """What the file says of the plant."""
+    """The plant as the file states it."""
 
     A: list[Row]
     B: list[Row]
@@ -50,7 +50,7 @@ class Plant:
 
 @dataclass
 class Law:
-    """What it says of the law."""
+    """The law as the file states it."""
 
     step: Fraction
     delay: Fraction
@@ -62,7 +62,7 @@ class Law:
 
 @dataclass
 class Loop:
-    """Flow, jumps with the times that follow, columns of inputs, noise and starts, rows that are bounded."""
+    """Flow, jumps with the times that follow, columns of inputs, noise and initial conditions, bounded rows."""
 
     flow: list[Row]
     segments: list[tuple[list[Row], Fraction]]
@@ -94,8 +94,8 @@ def verify(document: dict[str, Any]) -> list[str]:
     count = len(plant.outputs)
     for sector, bound, most in zip(plant.sectors, bounds[count:], numbers, strict=False):
         half = (sector.high - sector.low) / 2
-        need(not half or half * bound < most, "the numbers for the sectors must close the small gain")
-        need(sector.within is None or bound < sector.within, "an argument must stay where its sector holds")
+        need(not half or half * bound < most, "the inputs of the sectors must satisfy the small-gain condition")
+        need(sector.within is None or bound < sector.within, "an argument must stay within the bound of its sector")
     found = bounds[:count] + bounds[count + len(plant.sectors) :]
     need(all(a <= b for a, b in zip(found, claims, strict=True)), "the claims must follow from the rest")
     return [*statement(plant, law, names, claims), *entries(document)]
@@ -133,7 +133,7 @@ def read_plant(value: Any) -> Plant:
     n = len(given["A"])
     need(type(given["B"]) is list and len(given["B"]) == n and type(given["B"][0]) is list, "B must have a row a state")
     m = len(given["B"][0])
-    need(1 <= m <= MOST, "there must be controls")
+    need(1 <= m <= MOST, f"B must have 1 to {MOST} columns")
     C = table(given["C"], "C", n)
     disturbances, loads, sectors = [], [], []
     for one in listed(given["disturbances"], "disturbances"):
@@ -163,7 +163,7 @@ def read_law(value: Any, seen: int, controls: int) -> Law:
     """Read the law."""
     given = keys(value, "law", "step", "delay", "A", "B", "C", "D")
     step, delay = number(given["step"], "step"), number(given["delay"], "delay")
-    need(step > 0 and 0 <= delay <= MOST_PERIODS * step, "step > 0, delay of 0 to 8 steps")
+    need(step > 0 and 0 <= delay <= MOST_PERIODS * step, "step must be > 0, delay 0 to 8 steps")
     need(type(given["A"]) is list and len(given["A"]) <= MOST_LAW, f"a law has at most {MOST_LAW} states")
     q = len(given["A"])
     A, B = matrix(given["A"], "A of the law", q, q), matrix(given["B"], "B of the law", q, seen)
@@ -177,7 +177,7 @@ def dot(left: Sequence[Fraction], right: Sequence[Fraction]) -> Fraction:
 
 
 def loop_of(plant: Plant, law: Law) -> Loop:
-    """The loop: states of the plant and the law, controls on their way, the youngest first, controls that act."""
+    """The loop: states of the plant and the law, delayed controls, the latest first, controls that act."""
     n, m, q = len(plant.A), len(plant.B[0]), len(law.A)
     part = law.delay % law.step
     queue = int(law.delay // law.step) + (1 if part else 0)
@@ -202,7 +202,7 @@ def loop_of(plant: Plant, law: Law) -> Loop:
     asked = [spread([dot(d, c) for c in seen], none, own) for own, d in zip(law.C, law.D, strict=True)]
     known = [spread([dot(b, c) for c in seen], none, own) for own, b in zip(law.A, law.B, strict=True)]
     units = unit(size)
-    waiting = [units[n + q + i] for i in range(m * queue)]  # rows that read what is on its way
+    waiting = [units[n + q + i] for i in range(m * queue)]  # rows that read delayed controls
     jump = [*units[:n], *known, *(asked + waiting)[: m * queue], *((asked + waiting)[-m:] if not part else units[-m:])]
     segments = [(jump, part or law.step)]
     if part:
@@ -225,7 +225,7 @@ def loop_of(plant: Plant, law: Law) -> Loop:
 
 
 def balance(law: Law, control: Row) -> Row:
-    """A state of the law that stays and asks for this, by elimination."""
+    """An equilibrium of the law that commands this control, by elimination."""
     q = len(law.A)
     lines = [[*(v - (i == j) for j, v in enumerate(line)), Fraction(0)] for i, line in enumerate(law.A)]
     lines += [[*line, wanted] for line, wanted in zip(law.C, control, strict=True)]
@@ -236,7 +236,7 @@ def balance(law: Law, control: Row) -> Row:
             chosen = [v / chosen[place] for v in chosen]
             lines = [[a - line[place] * c for a, c in zip(line, chosen, strict=True)] for line in lines]
             pivots.append((place, chosen))
-    need(not any(line[q] for line in lines), "the law must balance every load without an error")
+    need(not any(line[q] for line in lines), "the law must balance every load at zero error")
     found = [Fraction(0)] * q
     for place, line in reversed(pivots):
         found[place] = line[q] - dot(line[:q], found)
@@ -250,7 +250,7 @@ def rows_of(plant: Plant, found: "Responses", numbers: Row) -> Row:
         most if sector.high > sector.low else Fraction(0) for sector, most in zip(plant.sectors, numbers, strict=True)
     ]
     noises = [size for size in plant.noise if size]
-    need(min(numbers, default=Fraction(0)) >= 0, "numbers for the sectors must be >= 0")
+    need(min(numbers, default=Fraction(0)) >= 0, "inputs of the sectors must be >= 0")
     return [
         first + dot(gains, sizes) + dot(heard, noises)
         for first, gains, heard in zip(found.start, found.inputs, found.told, strict=True)
@@ -262,7 +262,7 @@ def rows_of(plant: Plant, found: "Responses", numbers: Row) -> Row:
 
 @dataclass
 class Responses:
-    """Bounds of every row: from the box of starts, for each input and each noise of size 1."""
+    """Bounds of every row: for the box of initial conditions, each input and each noise of size 1."""
 
     start: Row
     inputs: list[Row]
@@ -286,7 +286,7 @@ class Segment:
 
 
 def segment_of(flow: list[Row], jump: list[Row], time: Fraction, pieces: int) -> Segment:
-    """Cut a flow."""
+    """Cut a flow into pieces."""
     most = [[max(v, Fraction(0)) if i == j else abs(v) for j, v in enumerate(line)] for i, line in enumerate(flow)]
     step, powers = exponential(flow, time / pieces), [fixed(unit(len(flow)))]
     for _ in range(pieces):
@@ -296,7 +296,7 @@ def segment_of(flow: list[Row], jump: list[Row], time: Fraction, pieces: int) ->
 
 
 class Sums:
-    """Upper sums of one loop: of the rows at all ends of pieces, which act on the state before a period."""
+    """Upper sums of one loop: of the rows at all ends of pieces, applied to the state before a period."""
 
     def __init__(self, loop: Loop, pieces: int) -> None:
         self.loop, self.size, self.count, self.pieces = loop, len(loop.flow), len(loop.rows), pieces
@@ -349,7 +349,7 @@ class Sums:
         return ends[0].above(*ends[1:], self.unit) * part.jump
 
     def own(self, part: Segment, entry: Fixed) -> tuple[Fixed, Fixed]:
-        """Columns of an input over a segment, at its end, and a bound of what these leave out."""
+        """Columns of an input over a segment, at its end, and a bound of their quadrature error."""
         ends, h = [power * entry for power in part.powers], part.h
         widths = [h / 2, *[h] * (self.pieces - 1), h / 2]
         blocks = [end.scaled(width) for end, width in zip(ends, widths, strict=True)]
@@ -371,7 +371,7 @@ class Sums:
         height = len(rows.rows)
         each = height * self.size * (len(now.rows[0]) + self.size)  # work of a period
         need(AT_ONCE[0] * each <= MOST_WORK, "the loop must be smaller, or its flow cut into fewer pieces")
-        turned, leap = [now], period  # products of few powers: of many maps, one after another, all digits are lost
+        turned, leap = [now], period  # products of few powers: a long product of maps loses all digits
         while len(turned) < AT_ONCE[0] or (
             2 * len(turned) * each <= MOST_WORK and len(turned) < AT_ONCE[1] and not shrinks(leap)
         ):
@@ -386,7 +386,7 @@ class Sums:
         require_fading(leap, at_once, each)
         totals, free = [[0] * len(widths) for _ in rows.rows], [0] * height
         while True:
-            need(until * each <= MOST_WORK, "the nominal loop must be stable, and forget its past soon")
+            need(until * each <= MOST_WORK, "the nominal loop must be stable and decay fast")
             for _ in range((until - done) // at_once):
                 for r, found in enumerate(grouped(known, columns, lengths)):
                     totals[r] = [a + b for a, b in zip(totals[r], found, strict=False)]
@@ -403,20 +403,20 @@ class Sums:
         for i, part in enumerate(parts):
             wide = [v + 2 * v // LEFT + 1 for v in part]
             closed = zip(part, times(far, wide), wide, strict=True)
-            need(all(a + b <= x for a, b, x in closed), "the nominal loop must be stable, and its past must fade")
+            need(all(a + b <= x for a, b, x in closed), "the nominal loop must be stable and decay")
             sums[i] = [a + b for a, b in zip(sums[i], times(beyond, wide), strict=True)]
         if starts:
-            need(all(a <= b for a, b in zip(times(far, most), most, strict=True)), "the free response must fade")
+            need(all(a <= b for a, b in zip(times(far, most), most, strict=True)), "the free response must decay")
             free = list(map(max, free, times(beyond, most)))
         return sums, free
 
     def whole(self, totals: list[list[int]], i: int, rest: Fixed, count: int) -> list[int]:
-        """Sums for an input with what its columns leave out, by those for unit columns."""
+        """Sums for an input with the quadrature error of its columns, by those for unit columns."""
         used = [(count + j, v) for j, (v,) in enumerate(rest.rows) if v]
         return [line[i] + sum((line[j] * v >> BITS) + 1 for j, v in used) for line in totals]
 
     def peaks(self, part: Segment, i: int, before: list[int], s: int) -> Row:
-        """Bounds of all rows in a segment for an input, from what came before the segment."""
+        """Bounds of all rows in a segment for an input, from sums before the segment."""
         flowing = i < len(self.entries)
         entry = self.entries[i] if flowing else self.told[i - len(self.entries)]
         if s and not flowing:
@@ -435,7 +435,7 @@ class Sums:
     def chords(
         self, part: Segment, before: list[int], since: list[list[int]] | None = None, bend: list[int] | None = None
     ) -> Row:
-        """The larger of both ends of every piece, and what chords leave out."""
+        """The larger of both ends of every piece, plus the error of chords."""
         units = Fixed([[v] for v in before[-self.size :]])
         bent = ((self.rows * self.square).size() * part.within * units).sums()
         bent = [a + b for a, b in zip(bent, bend or [0] * self.count, strict=True)]
@@ -508,7 +508,7 @@ def over(value: int, factor: Fraction) -> int:
 
 
 def times(far: Fixed, part: list[int]) -> list[int]:
-    """What a matrix of sizes makes of bounds, rounded up."""
+    """Product of a matrix of sizes and bounds, rounded up."""
     return [(sum(map(int.__mul__, line, part)) >> BITS) + 1 for line in far.rows]
 
 
@@ -524,16 +524,16 @@ def shrinks(leap: Fixed) -> bool:
 
 
 def require_fading(leap: Fixed, periods: int, work: int) -> None:
-    """Refuse a map of some periods none of whose powers is small, far beyond those that are followed."""
+    """Refuse a map of some periods whose powers stay large, far beyond the periods that are followed."""
     power = leap
     while max(map(max, power.size().rows)) >> BITS:
-        need(periods * work <= BEYOND * MOST_WORK, "the nominal loop must be stable, and forget its past soon")
+        need(periods * work <= BEYOND * MOST_WORK, "the nominal loop must be stable and decay fast")
         need(max(map(max, power.size().rows)) >> BITS + 80 == 0, "the nominal loop must be stable")
         power, periods = power * power, 2 * periods
 
 
 def fades(far: Fixed, part: list[int]) -> bool:
-    """Whether a small share of bounds is left."""
+    """Whether only a small share of bounds remains."""
     return all(a * LEFT <= b for a, b in zip(times(far, part), part, strict=True))
 
 

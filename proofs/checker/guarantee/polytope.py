@@ -13,7 +13,7 @@ from .matrices import BITS, LARGEST
 from .reading import Row, need
 
 ONE = 1 << BITS
-GRAIN = 40  # bits of a multiplier behind the point
+GRAIN = 40  # binary places of a multiplier
 TRIED = 8  # vertices, best ones first
 NEAR = 1e-6  # by which a vertex may lie outside, against its constraint
 FLAT = 1e-12  # pivots below which a basis counts as dependent
@@ -32,7 +32,7 @@ class Near:
     def of(cls, value: Fraction) -> "Near":
         """A rational; one that is a multiple of the unit is itself."""
         at, more = divmod(value.numerator << BITS, value.denominator)
-        need(abs(at) <= LARGEST, "numbers of a period must be of ordinary size")
+        need(abs(at) <= LARGEST, "numbers of a period must be below 2^192")
         return cls(at, int(more > 0))
 
     def __add__(self, other: "Near") -> "Near":
@@ -63,7 +63,7 @@ NOTHING = Near(0, 0)
 
 
 def inverse(rows: list[list[float]]) -> list[list[float]] | None:
-    """Inverse of a small matrix in floating point; none where a pivot is as good as 0."""
+    """Inverse of a small matrix in floating point; None if a pivot is nearly 0."""
     many = len(rows)
     work = []
     for i, line in enumerate(rows):
@@ -85,7 +85,7 @@ def inverse(rows: list[list[float]]) -> list[list[float]] | None:
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """(row + more)·z + constant + beside: rationals, and numbers that are known closely."""
+    """(row + more)·z + constant + beside: rationals, and numbers with error bounds."""
 
     row: Row
     constant: Fraction
@@ -94,7 +94,7 @@ class Function:
 
 
 class Polytope:
-    """Points z with constraints row·z <= end, written as u = z/sizes, |u_i| <= 1; of u_i with a sign that is known.
+    """Points z with constraints row·z <= end, written as u = z/sizes, |u_i| <= 1; some u_i have a known sign.
 
     Where there is a fourth entry, the slip until a stop, the last constraint says that it is at most so many
     times the second.
@@ -125,12 +125,12 @@ class Polytope:
         self.places = [place for place, _, _ in self.found]
 
     def largest(self, function: Function, facet: int | None = None) -> int:
-        """An upper bound of a function, in units; of what a `facet` becomes the least found, or one up to 1."""
+        """An upper bound of a function, in units; for the image of a `facet` the least one, or the first up to 1."""
         moved = [v.times(size) for v, size in zip(function.more, self.sizes, strict=True)]
         scaled = [Near.of(v * size) + m for v, size, m in zip(function.row, self.sizes, moved, strict=True)]
         constant = Near.of(function.constant) + function.beside
         above = constant.at + constant.off
-        need(max(abs(f.at) for f in scaled) <= LARGEST, "numbers of a period must be of ordinary size")
+        need(max(abs(f.at) for f in scaled) <= LARGEST, "numbers of a period must be below 2^192")
         floats = [f.at / ONE for f in scaled]
         values = [sum(map(float.__mul__, floats, place)) for place in self.places]
         best = max(values)
@@ -144,7 +144,7 @@ class Polytope:
         return min(found)
 
     def by_vertex(self, scaled: Sequence[Near], floats: list[float], number: int) -> int:
-        """By multipliers of the constraints that meet there."""
+        """By multipliers of the constraints that meet at a vertex."""
         _, basis, columns = self.found[number]
         raw = [sum(map(float.__mul__, floats, column)) for column in columns]
         shares = [max(round(v * (1 << GRAIN)), 0) if isfinite(v) else 0 for v in raw]
@@ -157,7 +157,7 @@ class Polytope:
         return total + self.rest(left, self.signs)
 
     def second(self, function: Function, moved: Sequence[Near], facet: int) -> int:
-        """By the facet itself, which is at most 1, and what the function is more; exact where it is rational."""
+        """By the facet itself, which is at most 1, and the difference from it; exact where that is rational."""
         left = [v - n for v, n in zip(function.row, self.lines[facet][0], strict=True)]
         if len(left) == 4:  # the slip until a stop is at most so many times the second
             left[1], left[3] = left[1] - max(left[3], Fraction(0)) * self.lines[-1][0][1], Fraction(0)
@@ -171,6 +171,6 @@ class Polytope:
         return ONE + total.at + total.off
 
     def rest(self, left: Sequence[Near], signs: Sequence[int]) -> int:
-        """Bound of what multipliers leave, by the signs that are known."""
+        """Bound of the remainder of the multipliers, by the known signs."""
         signed = (abs(v) if not sign else Near(sign * v.at, v.off) for v, sign in zip(left, signs, strict=True))
         return sum(v.above().at for v in signed)

@@ -1,4 +1,4 @@
-"""What a certificate of the kind ``guarantee`` is read with: texts, rationals, rows, and why a file is refused."""
+"""Reading of certificates of a guarantee: texts, rationals, rows, and why a file is refused."""
 
 import json
 import re
@@ -13,8 +13,8 @@ from ..numbers import Refused
 RATIONAL = re.compile(r"-?(0|[1-9][0-9]{0,399})(/[1-9][0-9]{0,399})?")
 Row = list[Fraction]
 NAMES = ("name", "states")  # nothing depends on them
-LISTED = 64  # entries of a list that are printed
-LONGEST = 24  # characters of a fraction that are printed
+LISTED = 64  # most entries of a list that is printed
+LONGEST = 24  # most characters of a fraction that is printed
 
 
 def need(condition: bool, reason: str) -> None:
@@ -32,7 +32,7 @@ def keys(value: Any, where: str, *names: str) -> dict[str, Any]:
 def number(value: Any, where: str) -> Fraction:
     """Rational in canonical form."""
     canonical = type(value) is str and RATIONAL.fullmatch(value) is not None
-    need(canonical, f'{where} must be a rational such as "-3/2", at most 400 digits above and below')
+    need(canonical, f'{where} must be a rational such as "-3/2", each part of at most 400 digits')
     top, _, bottom = value.partition("/")
     found = Fraction(int(top), int(bottom or 1))
     need(str(found) == value, f"{where} must be in lowest terms")
@@ -80,7 +80,7 @@ def exact(value: Fraction) -> str:
 
 
 def inside(low: Fraction, high: Fraction) -> str:
-    """A range that something was verified for: a point as it is, else the ends that are shown lie inside of it."""
+    """A verified range: a point exactly, else ends rounded inward."""
     if low == high:
         return f"= {exact(low)}"
     for digits in range(4, 16):
@@ -91,9 +91,9 @@ def inside(low: Fraction, high: Fraction) -> str:
 
 
 def entries(document: dict[str, Any]) -> list[str]:
-    """Everything that a file states, claims included: every entry but names, SI units, and what tells it from others.
+    """All entries of a file except names, in SI units, the claims included, and its hash.
 
-    What is rounded is marked; the SHA-256 is that of all entries but names and claims, as JSON with sorted keys.
+    Rounded numbers are marked; the SHA-256 is that of all entries except names and claims, as JSON with sorted keys.
     """
     parts = {key: unnamed(value) for key, value in document.items() if key not in ("format", "kind")}
     claims = parts.pop("claims")
@@ -130,7 +130,7 @@ def written(value: Any, name: str = "") -> Iterator[str]:
 
 
 def plain(value: Any) -> str:
-    """An entry of a list, or a list; a long one by how many entries it has."""
+    """An entry of a list, or a list; a long one by its number of entries."""
     if type(value) is list:
         many = leaves(value)
         return f"({many} entries)" if many > LISTED else f"[{', '.join(map(plain, value))}]"
@@ -141,13 +141,13 @@ def plain(value: Any) -> str:
 
 
 def leaves(value: Any) -> int:
-    """How many entries there are; an empty list is one."""
+    """Number of entries; an empty list is one."""
     parts = value.values() if type(value) is dict else value if type(value) is list else []
     return sum(map(leaves, parts)) or 1
 
 
 def short(value: Fraction) -> str:
-    """A number itself in at most 15 digits or as a short fraction, else about it in six digits."""
+    """A number exactly, in at most 15 digits or as a short fraction, else rounded to six digits."""
     numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)
     for text in (f"{float(numerator / denominator):.15g}", str(value)):
         if len(text) <= LONGEST and "n" not in text and Fraction(text) == value:

@@ -32,13 +32,13 @@ def read_root(value: Any) -> Root:
 
 
 def read_sum(value: Any) -> Sum:
-    """Terms: ends of the factor, power, and what it is a power of."""
+    """Terms: ends of the factor, power, and its base."""
     need(type(value) is list and 0 < len(value) <= MAX_TERMS, "a sum must be a list of its terms, at most 16")
     found = []
     for term in value:
         given = keys(term, "a term", "factor", "power", "of")
         factor, power, inner = row(given["factor"], "factor", 2), number(given["power"], "power"), given["of"]
-        need(0 <= factor[0] <= factor[1], "a factor must have two ends that are ordered and not negative")
+        need(0 <= factor[0] <= factor[1], "a factor must be two ends in order, not negative")
         need(0 <= power.numerator <= MAX_POWER and power.denominator <= MAX_POWER, "powers must be p/q with p, q <= 6")
         plain = type(inner) is str
         need(not plain or inner in ("slip", "rate"), "a term must be of slip, of rate or of a sum")

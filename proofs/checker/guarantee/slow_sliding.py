@@ -1,7 +1,7 @@
 """Verify certificate files of the kind ``slow_sliding`` (FORMAT.md) with the Python standard library alone.
 
-From a fault with rate-and-state friction, ranges of its constants, and a controller's matrices to a bound of the slip
-rate. The loop's path of the pressure, its impulse responses and the small gain are those of the kind ``guarantee``.
+From a fault with rate-and-state friction, ranges of its constants, and a controller's matrices to a bound on the slip
+rate. The pressure's path, the impulse responses and the small gain are those of the kind ``guarantee``.
 """
 
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ Range = tuple[Fraction, Fraction]
 
 @dataclass
 class Fault:
-    """Rock, plan and disturbance in SI units; one box of constants at a time."""
+    """Elastic constants, reference and disturbance in SI units; one box of constants at a time."""
 
     name: str
     inertia: Fraction
@@ -48,22 +48,22 @@ class Fault:
     regularised: bool
 
     def load(self) -> Fraction:
-        """Rate of the shear stress that sliding at the first rate takes off."""
+        """Rate at which sliding at the first rate releases shear stress."""
         return self.stiffness * self.rate
 
     def drift(self) -> Fraction:
-        """How fast the pressure that is needed may leave the plan."""
+        """Bound of the rate of the required pressure minus the planned one."""
         return (1 + self.swing) * max(abs(self.load() / mu - self.ramp) for mu in self.box["coefficient"])
 
     def normal(self, push: Fraction) -> Range:
-        """Range of the effective normal stress, the pressure up to `push` off."""
+        """Range of the effective normal stress for pressures within `push` of the planned one."""
         low, high = self.box["normal_stress"]
         return low - self.stiffness * self.distance / self.box["coefficient"][0] - push, high + push
 
 
 @dataclass
 class Path:
-    """How the pressure gets to the fault, and what is measured."""
+    """Path of the pressure to the fault, and noise of the measurement."""
 
     lag: Fraction
     diffusion: Fraction
@@ -76,25 +76,25 @@ class Path:
 def read_fault(document: dict[str, Any]) -> Fault:
     """Read fault, reference and stress."""
     raw = document["fault"]
-    told = [name for name in ("state_law", "regularised") if type(raw) is dict and name in raw]
-    given = keys(raw, "fault", "name", *ROCK, *CONSTANTS, *told)
-    need(given.get("state_law", "slip") == "slip", "state_law must be slip where it is told")
-    need(given.get("regularised", True) is True, "regularised must be true where it is told")
+    more = [name for name in ("state_law", "regularised") if type(raw) is dict and name in raw]
+    given = keys(raw, "fault", "name", *ROCK, *CONSTANTS, *more)
+    need(given.get("state_law", "slip") == "slip", "state_law must be slip if given")
+    need(given.get("regularised", True) is True, "regularised must be true if given")
     named = type(given["name"]) is str and FAULT.fullmatch(given["name"]) is not None
     need(named, "fault.name must be at most 60 letters, digits, spaces and _ . -")
     rho, modulus, size, eta = (number(given[name], name) for name in ROCK)
     box = {}
     for name in CONSTANTS:
         low, high = row(given[name], name, 2)
-        need(0 < low <= high, f"{name} must have two ends that are ordered and above 0")
+        need(0 < low <= high, f"{name} must be two ends in order, above 0")
         box[name] = low, high
     swings = ["swing"] if type(document["reference"]) is dict and "swing" in document["reference"] else []
     rate, distance, ramp, *swing = numbers(document["reference"], "reference", *REFERENCE, *swings).values()
-    need(all(0 < v < 1 for v in swing), "swing must be above 0 and below 1 where it is told")
+    need(all(0 < v < 1 for v in swing), "swing must be above 0 and below 1 if given")
     stress = number(document["stress"], "stress")
     need(min(rho, modulus, size, rate) > 0, "density, modulus, length and rate must be > 0")
     need(min(eta, distance, ramp, stress) >= 0, "damping, distance, ramp and stress must be >= 0")
-    kind = "state_law" in told, "regularised" in told
+    kind = "state_law" in more, "regularised" in more
     plan = rate, distance, ramp, sum(swing, Fraction(0)), stress
     return Fault(given["name"], rho * size, modulus / size, eta / size**2, *plan, box, *kind)
 
@@ -104,7 +104,7 @@ def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
     need(type(value) is list and len(value) < 2 * MAX_CELLS, f"there must be 1 to {MAX_CELLS} cells")
     open_boxes, cells = [box], []
     for entry in value:
-        need(bool(open_boxes), "cells must end where every part has been said")
+        need(bool(open_boxes), "cells must end when every part is listed")
         part = open_boxes.pop()
         if entry == []:
             cells.append(part)
@@ -115,7 +115,7 @@ def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
         low, high = part[name]
         need(low < at < high, "a cut must lie inside its box")
         open_boxes += [part | {name: (at, high)}, part | {name: (low, at)}]
-    need(not open_boxes, "cells must say every part")
+    need(not open_boxes, "cells must list every part")
     return cells
 
 
@@ -123,7 +123,7 @@ def read_path(value: Any) -> tuple[Loop, Path]:
     """The loop of a guarantee with the pressure's path alone."""
     given = keys(value, "loop", *PATH, *LAW)
     path = Path(*(number(given[name], name) for name in ("lag", "diffusion", "slip_noise")))
-    need(path.lag > 0 or path.diffusion > 0, "the pressure must reach the fault through a lag or rock")
+    need(path.lag > 0 or path.diffusion > 0, "the pressure must reach the fault through a lag or a diffusion path")
     measured = given["measured"]
     need(type(measured) is list, "measured must be a list")
     plain = {name: given[name] for name in ("step", "delay", "lag", "states", "update", "output")}
@@ -150,7 +150,7 @@ def partial(size: Fraction) -> Fraction:
 
 
 def power_of_e(size: Fraction) -> Fraction:
-    """e^x from above, 0 <= x <= 3: terms left out are below a geometric series."""
+    """e^x from above, 0 <= x <= 3: omitted terms are below a geometric series."""
     term = Fraction(1)
     for k in range(1, TERMS + 1):
         term = term * size / k
@@ -163,7 +163,7 @@ def sector(size: Fraction) -> Range:
 
 
 def middle(ends: Range) -> Fraction:
-    """Of a range."""
+    """Middle of a range."""
     return (ends[0] + ends[1]) / 2
 
 
@@ -177,7 +177,7 @@ def half(ends: Range) -> Fraction:
 
 @dataclass
 class Cell:
-    """A box of constants with what the claims make of it."""
+    """A box of constants with the ranges that follow from the claims."""
 
     fault: Fault
     path: Path
@@ -215,7 +215,7 @@ class Cell:
         return self.ageing[1] * max(self.grown - 1 / self.aged, self.aged - 1 / self.grown)
 
     def rounding(self) -> Fraction:
-        """By how much regularised friction may differ from its logarithm, as a stress."""
+        """Bound of regularised friction minus its logarithmic form, as a stress."""
         if not self.fault.regularised:
             return Fraction(0)
         least = self.mu[0] - self.a[1] * self.claims["log_rate"] - self.b[1] * self.claims["log_state"]
@@ -223,7 +223,7 @@ class Cell:
         return self.normal[1] * 4 * self.a[1] / partial(2 * least / self.a[1])
 
     def stress(self) -> Fraction:
-        """Stress with all that the mass may add."""
+        """Stress, including the bound of the inertial term."""
         fault, claims, push = self.fault, self.claims, self.fastest_push()
         bent = self.a[1] * claims["log_rate"] + self.b[1] * claims["log_state"]
         needed = fault.load() * (1 + fault.swing) / self.mu[0]
@@ -236,7 +236,7 @@ class Cell:
         )
 
     def soon(self, time: Fraction) -> Row:
-        """How far y, cy + c_z z and ay + bz may move within this time, the stress aside."""
+        """Bounds of the change of y, cy + c_z z and ay + bz within this time, without the stress."""
         state = self.fastest_state()
         change = self.fastest_pull() + self.weakening * state
         change += middle(self.mu) * self.fastest_push()
@@ -249,7 +249,7 @@ class Cell:
 
 
 def around(loop: Loop, cell: Cell) -> Loop:
-    """The loop about slow sliding: y, cy + c_z z, ay + bz, z, x, q, the valve's pressure and what is left out."""
+    """The loop about slow sliding: y, cy + c_z z, ay + bz, z, x, q, the valve's pressure and the truncation error."""
     size, fault = len(loop.flow), cell.fault
     unit_rows, push = unit(size), loop.outputs[2]
     y = [middle(cell.mu) * v / cell.strength for v in push]
@@ -288,7 +288,7 @@ def since_step(loop: Loop) -> Row:
 
 
 def found_gains(loop: Loop, cell: Cell, times: Row, late: Fraction) -> list[list[Row]]:
-    """Gains by input, output and piece, with what adds at once, and those before a step soon after it."""
+    """Gains by input, output and piece, with direct terms; soon after a step, those before it."""
     noisy = len(loop.inputs) - 1 - bool(loop.fade) if cell.path.noise else None
     fades = len(loop.inputs) - 1 if loop.fade else None
     last = times.index(max(times))
@@ -329,7 +329,7 @@ def shares_of(loop: Loop, cell: Cell) -> tuple[Row, list[Row]]:
 
 
 def bounds(plain: Loop, cell: Cell) -> tuple[dict[str, Fraction], Fraction]:
-    """What follows from the claims on one cell, and the small gain."""
+    """Bounds that follow from the claims on one cell, and the small gain."""
     loop = around(plain, cell)
     times = since_step(loop)
     late = min((t for t in times if loop.fade and loop.fade.weight(t) <= FADED), default=Fraction(0))
@@ -357,7 +357,7 @@ def verify(document: dict[str, Any]) -> list[str]:
     fault = read_fault(document)
     claims = numbers(document["claims"], "claims", *CLAIMS)
     need(min(claims.values()) > 0, "claims must be > 0")
-    need(max(claims["log_rate"], claims["log_state"]) <= MAX_LOGARITHM, "logarithms must be at most 3")
+    need(max(claims["log_rate"], claims["log_state"]) <= MAX_LOGARITHM, "log_rate and log_state must be at most 3")
     boxes = read_cells(document["cells"], fault.box)
     loop, path = read_path(document["loop"])
     small = Fraction(0)
@@ -375,10 +375,10 @@ def verify(document: dict[str, Any]) -> list[str]:
 def statement(
     document: dict[str, Any], fault: Fault, claims: dict[str, Fraction], cells: int, small: Fraction
 ) -> list[str]:
-    """What was verified, in ASCII; bounds on their outer side, what they hold for on its inner one."""
+    """What was verified, in ASCII; bounds are rounded outward, conditions inward."""
     loop, ranges = document["loop"], [f"{name} {inside(*fault.box[name])}" for name in CONSTANTS]
     when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
-    when += f", rock of distance^2/diffusivity = {loop['diffusion']} s"
+    when += f", diffusion path of distance^2/diffusivity = {loop['diffusion']} s"
     off = f", measured slip within {loop['slip_noise']} m of the true one" if loop["slip_noise"] != "0" else ""
     along = (
         f", along any reference whose rate stays within (1 +- {lower(fault.swing)}) times that" if fault.swing else ""
@@ -387,14 +387,14 @@ def statement(
     needed = fault.stiffness * fault.distance / fault.box["coefficient"][0]
     at = {"in the fault": claims["push"], "at the valve": claims["asked"]}
     stress = f"any shear stress of at most {lower(fault.stress)} Pa" if fault.stress else "none (stress 0)"
-    empty = [] if fault.distance else ["about nothing: the reference goes 0 m, which takes no time"]
+    empty = [] if fault.distance else ["vacuous: the reference covers 0 m in 0 s"]
     return [
         *empty,
-        f'fault "{ascii(fault.name)[1:-1]}" (a name; the data in the file are what counts), '
+        f'fault "{ascii(fault.name)[1:-1]}" (a label; the data of the file define it), '
         f"{'regularised ' * fault.regularised}rate-and-state friction with "
         f"the {'slip' if fault.slips else 'ageing'} law, "
         f"with inertia, every constant {', '.join(ranges)}; {cells} cells",
-        f"law with {len(loop['states'])} states of the slip alone, {when}{off}",
+        f"law with {len(loop['states'])} states, slip alone measured, {when}{off}",
         f"disturbance: {stress}; from steady sliding at "
         f"{exact(fault.rate)} m/s over {lower(fault.distance)} m{along}; small gain {upper(small)}",
         f"the slip rate of this fault never exceeds {upper(peak)} m/s: |ln(slip rate/first rate)| <= "

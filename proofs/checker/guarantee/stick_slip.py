@@ -1,7 +1,7 @@
 """Verify certificate files of the kind ``stick_slip`` (FORMAT.md) with the Python standard library alone.
 
-From a fault that sticks or slides, a sampled law and a polytope of its states to bounds of slip, slip rate and pressure
-for all t. Whether the fault slides through a period or ends it at rest, no facet may exceed 1 at its end.
+From a stick-slip fault, a sampled law and a polytope of its states to bounds on slip, slip rate and pressure for all t.
+Whether the fault slides through a period or ends it at rest, no facet may exceed 1 at its end.
 """
 
 from collections.abc import Iterator
@@ -44,7 +44,7 @@ class End:
 
 @dataclass
 class Law:
-    """Gains of the law, its period, what it takes for rest, noise of its measurements, and its implicit step.
+    """Gains of the law, its period, slip taken for rest, measurement noise, and implicit step.
 
     Intervals between samples are from `step` to `longest`, which is 0 where all are `step`.
     """
@@ -67,19 +67,19 @@ class Law:
 
     @property
     def intervals(self) -> list[Fraction]:
-        """Those that decide."""
+        """Intervals at which facets are checked."""
         parts = PARTS if self.longest else 0
         return [self.step + (self.longest_interval - self.step) * i / (parts or 1) for i in range(parts + 1)]
 
     @property
-    def told(self) -> Fraction:
-        """By how much the law's r' may be larger than the reference's."""
+    def excess(self) -> Fraction:
+        """Bound of the law's r' minus that of the reference."""
         return 2 * self.back * self.slip_noise
 
 
 @dataclass
 class Reach:
-    """The set and what is proposed to prove it."""
+    """The set and the multipliers and bases of its proof."""
 
     facets: list[Row]
     multipliers: list[Row]
@@ -97,14 +97,14 @@ def read_law(value: Any) -> Law:
     pull = read_sum(given["pull"]) if "pull" in more else []
     longest = number(given["longest"], "longest") if "longest" in more else Fraction(0)
     law = Law(*(number(given[name], name) for name in ("step", *LAW, "slip_noise")), longest, pull)
-    need("longest" not in more or law.longest > law.step, "longest must be above step where it is given")
-    need(not (law.longest and pull), "a sliding mode must have one step alone, so no longest")
+    need("longest" not in more or law.longest > law.step, "longest must be above step if given")
+    need(not (law.longest and pull), "a sliding mode must be sampled periodically, without longest")
     need(min(law.step, law.rate, law.target, law.back) > 0, "step, rate, target and return gains must be > 0")
     need(min(law.level, law.slip) >= 0, "level_gain and slip_gain must be >= 0")
     need(0 <= 2 * law.slip_noise <= law.rest_slip, "slip_noise must be from 0 to half of rest_slip")
     need(count_terms(pull) <= MAX_TERMS, f"an implicit step must have at most {MAX_TERMS} terms")
     deadbeat = law.rate == law.target and law.back * law.step == 1
-    need(deadbeat or not pull, "of a sliding mode target_gain must be rate_gain, and return_rate 1/step")
+    need(deadbeat or not pull, "a sliding mode must have target_gain = rate_gain and return_rate = 1/step")
     return law
 
 
@@ -120,7 +120,7 @@ def read_reach(value: Any) -> Reach:
         need(alone, "the first five facets must bound +e1, +y, +d, -e1 and -d alone")
     for row in multipliers:
         sound = row[0] >= 0 and row[1] in (0, 1) and row[3] in (0, 1) and 0 <= row[4] <= 1
-        need(sound, "multipliers must be >= 0, 0 or 1, any, 0 or 1, and from 0 to 1")
+        need(sound, "the five multipliers must be >= 0, 0 or 1, any number, 0 or 1, and in [0, 1]")
     sliding = read_bases(given["sliding"], "sliding", 3, (many + 2, many + 3, many + 2))
     tall = [many + more for more in (10, 10, 11, 11, 11, 10, 10)]
     resting = read_bases(given["resting"], "resting", 4, tuple(tall))
@@ -149,8 +149,8 @@ class Period:
     def __init__(self, rock: Rock, task: Task, target: Fraction, growths: Row, law: Law, reach: Reach) -> None:
         self.task, self.law, self.reach = task, law, reach
         self.bend, self.force = task.reference_acceleration, task.amplitude
-        self.rate = task.reference_rate + law.told  # as the law is told it
-        self.still = self.bend * law.longest_interval / 2 + law.told  # r' up to which the reference may stand still
+        self.rate = task.reference_rate + law.excess  # as the law measures it
+        self.still = self.bend * law.longest_interval / 2 + law.excess  # largest r' of a constant reference
         ahead, self.peak, up, behind, down = (1 / abs(sum(row)) for row in reach.facets[:5])
         self.ahead, self.behind, self.level = ahead, behind, max(up, down)
         zero, one = Fraction(0), Fraction(1)
@@ -186,7 +186,7 @@ class Period:
         return -Fraction(low, ONE) - noise, Fraction(high, ONE) + noise
 
     def find_ranges(self, rock: Rock, target: Fraction, growths: Row) -> None:
-        """Ranges of slopes and damping, and what must hold of them."""
+        """Ranges of slopes and damping, and the conditions on them."""
         task, law = self.task, self.law
         slip = target + self.ahead + task.reference_rate * law.longest_interval
         still = rock.stress(slip, growths[0])
@@ -209,11 +209,11 @@ class Period:
         need(large, "the disturbance must be large enough for the condition of rest")
 
     def find_curvature(self) -> None:
-        """Bounds of the impulse responses and their curvature over the longest interval, and what follows from them."""
+        """Bounds of the impulse responses and their curvature over the longest interval, and their consequences."""
         step, zero, one = self.law.longest_interval, Fraction(0), Fraction(1)
         (s, ds), (w, dw) = (((high + low) / 2, (high - low) / 2) for low, high in (self.slope, self.damping))
         self.growth = 1 / (1 - self.slope[1] * step**2 / 2)
-        self.per_slip, self.per_rate = ds * self.growth, dw  # what counts beside the force
+        self.per_slip, self.per_rate = ds * self.growth, dw  # in addition to the force
         within = exponential([[zero, one], [abs(s), max(-w, zero)]], step).size()
         square = [[abs(s), abs(w)], [abs(s * w), abs(s + w * w)]]
         once = [[zero, one], [abs(s), abs(w)]]
@@ -222,7 +222,7 @@ class Period:
         self.margin = self.margins(own, moved)
 
     def margins(self, own: list[Near], moved: list[Near]) -> list[Near]:
-        """What bounds at two intervals may lack between these, for factors of slip and slip rate.
+        """Margin between the bounds at two intervals, for factors of slip and slip rate.
 
         It is the squared distance of the two over 8, times a bound of the second derivative by the interval.
         """
@@ -249,7 +249,7 @@ class Period:
         self.nodes = [[Near(node.rows[i][1], node.error) for i in (0, 1)] for node in reversed(nodes)]
         alone = self.integrals(one, zero)
         of_rate, of_force = self.others(alone)
-        off = (self.task.beta[1] - 1) ** 2 / (4 * self.task.beta[1] * self.task.b)  # of a chord of 1/beta
+        off = (self.task.beta[1] - 1) ** 2 / (4 * self.task.beta[1] * self.task.b)  # distance of 1/beta from its chord
         self.gap = (self.of_rate[0] + of_rate).times(off), (self.of_force[0] + of_force).times(off)
         self.gap_margin = self.margin[0].times(off)
 
@@ -265,7 +265,7 @@ class Period:
         ]
 
     def others(self, area: list[Near]) -> tuple[Near, Near]:
-        """What the ranges of slope and damping add to factors of y and of the force H - b·beta·U."""
+        """Additions of the ranges of slope and damping to the factors of y and of the force H - b·beta·U."""
         steep = self.per_rate * self.slope[1] * self.growth
         of_rate = area[1].times(self.per_slip) + area[0].times(self.per_rate) + area[2].times(steep)
         of_force = (area[2].times(self.per_slip) + area[3].times(steep)).times(Fraction(1, 2))
@@ -277,7 +277,7 @@ class Period:
         return [law.target * (law.back - end.of_error), law.rate, Fraction(1)], -law.target * end.constant
 
     def carried(self, facet: Row, end: End, interval: Fraction) -> tuple[Fraction, Fraction, Fraction]:
-        """What law and reference make of a facet: of e1, a constant, and of r' where the end takes it as 0."""
+        """A facet after law and reference: factor of e1, constant, and factor of r' where the end takes r' as 0."""
         law, (n1, _, n3) = self.law, facet
         predicted = n3 * (law.level + law.slip * law.step / 2)
         sign = int(end.positive)
@@ -285,7 +285,7 @@ class Period:
         constant = -n1 * interval * end.constant - predicted * sign * end.constant
         if n1 > 0 and end.still:  # the reference never falls
             return of_error, constant, -predicted * sign
-        constant += abs(n1) * self.bend * interval**2 / 2 + max(n1, Fraction(0)) * law.told * interval
+        constant += abs(n1) * self.bend * interval**2 / 2 + max(n1, Fraction(0)) * law.excess * interval
         return of_error, constant, Fraction(0)
 
     def sliding(self, facet: Row, given: Row, cut: bool) -> Iterator[tuple[int, Function]]:
@@ -381,14 +381,14 @@ class Period:
         given = list(enumerate(zip(self.reach.facets, self.reach.multipliers, strict=True)))
         at_first = self.law.slip_noise, self.law.slip * self.law.slip_noise
         inside = all(n1 * at_first[0] + max(n3, 0) * at_first[1] <= 1 for n1, _, n3 in self.reach.facets)
-        need(inside, "the set must hold the loop at first, with noise of its first measurement")
+        need(inside, "the set must contain the initial state, with noise of the first measurement")
         for interval in self.law.intervals:
             self.respond(interval)
             for which, (facet, multipliers) in given:
                 for cut in (False, True) if facet[2] > 0 else (False,):
                     for place, function in self.sliding(facet, multipliers, cut):
                         within = self.flat[place].largest(function, which) <= ONE
-                        need(within, f"facet {which} must hold after a period that slides. It may not")
+                        need(within, f"facet {which} must hold after a sliding period. It may not")
         for polytope, ends in self.resting():
             for which, (facet, multipliers) in given:
                 for end in ends:
@@ -401,7 +401,7 @@ class Period:
         need(share * spread <= self.force, "the disturbance must outweigh the range of the input gain")
 
     def bounds(self) -> dict[str, Fraction]:
-        """What the set gives, by claims."""
+        """Bounds that follow from the set, by claims."""
         noise, moved = self.law.slip_noise, self.task.reference_rate * self.law.longest_interval
         pressure = self.rest[0] - self.push[1], self.rest[1] - self.push[0]
         return dict(
@@ -438,7 +438,7 @@ def verify(document: dict[str, Any]) -> list[str]:
     keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "set", "claims")
     claims = numbers(document["claims"], "claims", *CLAIMS)
     task, rock = read_task(document), read_rock(document["fault"])
-    need(task.change is None, "a bounded change of the disturbance must not be given")
+    need(task.change is None, "the disturbance must have no bound of its change")
     target = number(document["reference"]["target_slip"], "target_slip")
     growths = [number(document["disturbance"]["growths"][name], name) for name in ("slip", "rate")]
     law, reach = read_law(document["loop"]), read_reach(document["set"])
@@ -457,22 +457,22 @@ def verify(document: dict[str, Any]) -> list[str]:
 
 
 def statement(document: dict[str, Any], period: Period, claims: dict[str, Fraction]) -> list[str]:
-    """What was verified, in ASCII; bounds on their outer side, those of the disturbances on their inner one."""
+    """What was verified, in ASCII; bounds are rounded outward, those of the disturbance inward."""
     task, law = period.task, period.law
     measured = "slip and slip rate measured exactly"
     if law.slip_noise:
         measured = f"slip measured within {lower(law.slip_noise)} m, slip rate exactly"
     kind = f"any acceleration of at most {lower(task.amplitude)} m/s^2" if task.amplitude else "none (amplitude 0)"
     return [
-        f'fault "{ascii(task.name)[1:-1]}" (a name; the data in the file are what counts), friction any function of '
+        f'fault "{ascii(task.name)[1:-1]}" (a label; the data of the file define it), friction any function of '
         + ("the slip alone" if task.steady_beta else "slip and slip rate")
         + " within its bounds and slopes, whether the fault slides or sticks, parameters constant",
-        f"derived accelerations: of a slip within a period [{lower(period.slope[0])}, {upper(period.slope[1])}] 1/s^2, "
-        f"of a slip rate less [{lower(period.damping[0])}, {upper(period.damping[1])}] 1/s, of a pressure "
+        f"derived accelerations: per slip within a period [{lower(period.slope[0])}, {upper(period.slope[1])}] 1/s^2, "
+        f"per slip rate minus [{lower(period.damping[0])}, {upper(period.damping[1])}] 1/s, per pressure "
         f"{upper(task.b)} m^2/kg times [1, {upper(task.beta[1])}]",
-        f"{'sliding mode' if law.pull else 'law'} for friction that sticks, every {document['loop']['step']} s"
+        f"{'sliding mode' if law.pull else 'law'} for the stick-slip plant, every {document['loop']['step']} s"
         + (f" to {document['loop']['longest']} s in any order" if law.longest else "")
-        + f", its pressure held, {measured}; a set of {len(period.reach.facets)} facets"
+        + f", with zero-order hold, {measured}; a set of {len(period.reach.facets)} facets"
         + ("; its implicit step is deadbeat, w = -e1/step, on this set" if law.pull else ""),
         f"disturbance: {kind}; from rest, along the reference, for all t >= 0",
         f"the slip rate of this fault never exceeds {upper(claims['peak_slip_rate'])} m/s",

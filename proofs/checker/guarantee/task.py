@@ -43,7 +43,7 @@ def on_unit_interval(shape: Row) -> tuple[Fraction, Fraction]:
 
 @dataclass
 class Task:
-    """Ranges of s, w and β, and what reference and disturbance put in; symbols of FORMAT.md, SI units."""
+    """Ranges of s, w and β, and inputs by reference and disturbance; symbols of FORMAT.md, SI units."""
 
     name: str
     b: Fraction

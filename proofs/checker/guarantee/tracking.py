@@ -1,6 +1,6 @@
 """Verify certificate files of the kind ``guarantee`` (FORMAT.md) with the Python standard library alone.
 
-From a fault's data, a controller's matrices and the order of events in a period to bounds of slip, slip rate and
+From a fault's data, a controller's matrices and the order of events in a period to bounds on slip, slip rate and
 pressure for all t. Nothing is searched for: ranges follow from rational inequalities, and the bounds from upper sums of
 impulse responses in integers, multiples of 2^-BITS, each with a bound of its error. `check.py` calls `verify`.
 """
@@ -17,7 +17,7 @@ from .task import Task, read_task
 
 CLAIMS = ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure")
 ASKED = ("least_asked", "largest_asked")  # at the valve
-STEP = "largest_step"  # of what is asked for
+STEP = "largest_step"  # of the commanded pressure
 
 
 def verify(document: dict[str, Any]) -> list[str]:
@@ -38,25 +38,26 @@ def verify(document: dict[str, Any]) -> list[str]:
     loop = read_loop(document["loop"], task, start)
     moved = [loop.off * v for v in (task.reference_rate, task.reference_acceleration)]
     errors = [claims[name] + off + way for name, off, way in zip(CLAIMS[:2], loop.noise, moved, strict=True)]
+    need(loop.asked or not asked, "claims on the valve pressure need a lag or a diffusion path")
     need(
-        loop.asked or not asked, "without a lag and rock the claims must not tell the valve's pressure from the fault's"
+        not (loop.pump and loop.asked) or bool(asked),
+        "a pump before a lag or diffusion path needs claims on its pressure",
     )
-    need(not (loop.pump and loop.asked) or bool(asked), "a pump behind which there is a lag or rock needs claims of it")
     need(
         loop.stepped or STEP not in claims,
-        "a largest step is claimed of a loop with jitter or a pump of some rate alone",
+        "largest_step must be claimed with jitter or a pump rate only",
     )
-    need("rate" not in loop.pump or STEP in claims, "the rate of a pump needs a claim of the largest step")
+    need("rate" not in loop.pump or STEP in claims, "a pump rate needs the claim largest_step")
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
-    need(within, "the root of the implicit step must lie between its lines for all errors that are claimed")
+    need(within, "the root of the implicit step must lie between its lines for all claimed errors")
     slow = read_slow(document["slow_gain"], task, loop) if "slow_gain" in more else None
-    need(("reach" in more) == (loop.longest > 0), "samples that follow no clock need a reach, and no others have one")
-    need(not (slow and loop.longest), "samples that follow no clock must have no slow gain")
+    need(("reach" in more) == (loop.longest > 0), "reach must be given for aperiodic sampling, and for that alone")
+    need(not (slow and loop.longest), "aperiodic sampling must have no slow gain")
     if loop.longest:
         (slip, rate, *pushes), small = bounds_within(task, loop, read_reach(document["reach"], loop))
     else:
         (slip, rate, *pushes), small = bounds(task, loop, slow, claims["slip_error"])
-    need(not slow or slip < claims["slip_error"], "the slip error that moves the input gain must stay below its claim")
+    need(not slow or slip < claims["slip_error"], "with a slow gain the slip error must stay below its claim")
     steps = [pushes.pop() / task.b] if loop.stepped else []
     ends = [end for push in pushes for end in (task.rest[0] - push / task.b, task.rest[1] + push / task.b)]
     found = dict(zip([*CLAIMS, *ASKED], (slip, rate, rate + task.reference_rate, *ends), strict=False))
@@ -70,59 +71,59 @@ def verify(document: dict[str, Any]) -> list[str]:
     pump = loop.pump
     need(
         "least" not in pump or (pump["least"] <= claims[least] and claims[largest] <= pump["largest"]),
-        "the pressure that is claimed at the valve must stay within what the pump can do",
+        "the claimed valve pressure must stay within the limits of the pump",
     )
     need(
         "rate" not in pump or claims[STEP] <= pump["rate"] * pump["ramp"],
-        "the largest step that is claimed must be made within the ramp of the pump",
+        "the claimed largest step must fit into the ramp of the pump",
     )
     return [*statement(document, task, claims, small), *entries(document)]
 
 
 def read_start(value: Any) -> Row:
-    """Bounds of the slip and of the slip rate at the start."""
+    """Bounds on initial slip and slip rate."""
     found = [*numbers(value, "start", "slip", "rate").values()]
-    need(min(found) >= 0 and any(found), "bounds of the start must be >= 0, one of them above")
+    need(min(found) >= 0 and any(found), "bounds of the start must be >= 0, and not both 0")
     return found
 
 
 def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction], small: Fraction) -> list[str]:
-    """What was verified, in ASCII; bounds on their outer side, those of the disturbances on their inner one."""
+    """What was verified, in ASCII; bounds are rounded outward, those of the disturbance inward."""
     loop = document["loop"]
-    when = "for a pressure that acts at once (continuous time), which no sampled controller has"
+    when = "in continuous time (pressure without sampling or delay), which excludes sampled controllers"
     if "step" in loop:
         often = f"every {loop['step']} s"
-        often += f" to {loop['longest']} s, each time anew" if "longest" in loop else ""
+        often += f" to {loop['longest']} s in any order" if "longest" in loop else ""
         when = f"{often}, {loop['delay']} s late, lag {loop['lag']} s"
-        when += f", rock of distance^2/diffusivity = {loop['diffusion']} s" if "diffusion" in loop else ""
+        when += f", diffusion path of distance^2/diffusivity = {loop['diffusion']} s" if "diffusion" in loop else ""
     kind = f"any acceleration of at most {lower(task.amplitude)} m/s^2" if task.amplitude else "none (amplitude 0)"
     if task.change is not None and task.amplitude:
         kind += f" that starts at 0 and changes by at most {lower(task.change)} m/s^3"
     implicit = " and an implicit step" if "root" in loop else ""
     alone = "root" not in loop and not any(line[1] != "0" for line in (*loop["measured"], loop["feedback"]))
-    told = " of the slip alone" if alone else ""
+    told = ", slip alone measured" if alone else ""
     off = ""
     if "noise" in loop:
         rate = "" if alone else f", slip rate within {loop['noise']['rate']} m/s"
         off = f", measured slip within {loop['noise']['slip']} m of the true one{rate}"
     if "jitter" in loop:
         measured, late = (loop["jitter"][name] for name in ("measured", "delay"))
-        off += f", each a mean over {loop['jitter']['mean']} s around its time" if "mean" in loop["jitter"] else ""
-        off += f", measurements within {measured} s of their instants, pressures within that and {late} s more"
+        off += f", each averaged over {loop['jitter']['mean']} s around its instant" if "mean" in loop["jitter"] else ""
+        off += f", measurements within {measured} s of their instants, pressures within that plus {late} s"
     if "pump" in loop:
         parts = [f"from {loop['pump']['least']} Pa to {loop['pump']['largest']} Pa"] if "least" in loop["pump"] else []
         parts += [f"of {loop['pump']['rate']} Pa/s"] if "rate" in loop["pump"] else []
-        off += f", a pump {' and '.join(parts)} that is never at its limits"
+        off += f", a pump {' and '.join(parts)} whose limits are never reached"
     where = "from rest"
     if "start" in document:
         slip, rate = (lower(Fraction(document["start"][name])) for name in ("slip", "rate"))
-        where = f"from |slip| <= {slip} m, |slip rate| <= {rate} m/s at first"
+        where = f"from initial |slip| <= {slip} m, |slip rate| <= {rate} m/s"
     return [
-        f'fault "{ascii(task.name)[1:-1]}" (a name; the data in the file are what counts), friction any function of '
+        f'fault "{ascii(task.name)[1:-1]}" (a label; the data of the file define it), friction any function of '
         + ("the slip alone" if task.steady_beta else "slip and slip rate")
-        + " within its bounds and slopes, continued to negative slip rates, parameters constant",
-        f"derived accelerations: of a slip error [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, of a slip-rate error "
-        f"less [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, of a pressure {upper(task.b)} m^2/kg times "
+        + " within its bounds and slopes, linearly continued to negative slip rates, parameters constant",
+        f"derived accelerations: per slip error [{lower(task.s[0])}, {upper(task.s[1])}] 1/s^2, per slip-rate error "
+        f"minus [{lower(task.w[0])}, {upper(task.w[1])}] 1/s, per pressure {upper(task.b)} m^2/kg times "
         f"[1, {upper(task.beta[1])}]",
         f"law with {len(loop['states'])} states{implicit}{told}, {when}{off}",
         f"disturbance: {kind}; {where}, along the reference, for all t >= 0; small gain {upper(small)}",
@@ -135,5 +136,5 @@ def statement(document: dict[str, Any], task: Task, claims: dict[str, Fraction],
             if ASKED[0] in claims
             else ""
         )
-        + (f", from sample to sample by at most {upper(claims[STEP])} Pa" if STEP in claims else ""),
+        + (f", changes of at most {upper(claims[STEP])} Pa per sample" if STEP in claims else ""),
     ]

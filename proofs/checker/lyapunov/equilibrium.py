@@ -16,7 +16,7 @@ def read_values(value: Any, where: str, names: Iterable[str]) -> dict[str, Fract
 
 
 def refute(document: dict[str, Any]) -> list[str]:
-    """Verify that a point is an equilibrium of Filippov's inclusion, and say so."""
+    """Verify that a point is an equilibrium of Filippov's inclusion, and describe it."""
     read_object(document, "the file", (*LOOP_KEYS, "refutation"))
     loop = read_loop(document)
     need(loop.domain == "cells", "the domain of a refutation", "cells", loop.domain)

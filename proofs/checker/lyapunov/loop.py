@@ -122,7 +122,7 @@ def read_lifts(value: dict[str, Any], loop: Loop) -> dict[str, list[Term]]:
 
 
 def read_loop(document: dict[str, Any]) -> Loop:
-    """Read everything that closed loops share."""
+    """Read the common part of closed loops."""
     law, domain = document["law"], document["domain"]
     need(type(law) is str and LAW.fullmatch(law) is not None, "law", "1 to 40 of [A-Za-z0-9_-]", law)
     need(type(domain) is str and domain in ("cells", "reals"), "domain", "cells or reals", domain)
@@ -209,11 +209,11 @@ def sum_text(terms: Iterable[Term], loop: Loop) -> str:
 
 
 def describe(loop: Loop) -> list[str]:
-    """Describe the loop, which is what the verdict is about."""
+    """Describe the loop that the verdict is on."""
     ranges = {name: f"{name} in [{low}, {high}]" for name, (low, high) in loop.uncertain.items()}
     roots = {name: f"root: {ranges.pop(name)} is the positive square root of {of}" for name, of in loop.roots.items()}
     return [
-        f"law {loop.law}: no name is verified, the verdict is about the field below",
+        f"law {loop.law}: names are not verified, the verdict is on the field below",
         f"gains and constants: {named(loop.numbers)}",
         f"domain: {loop.domain}; states with weights: {named(loop.weights)}",
         f"uncertain, measurable in time: {', '.join(ranges.values()) or 'none'}",
@@ -233,7 +233,7 @@ def cells_of(choices: Iterable[Sequence[int]]) -> dict[str, Exponents]:
 
 @dataclass
 class Cell:
-    """Points where states and lifts have given signs, after what holds there; it grows with every lift.
+    """Points where states and lifts have given signs, and the relations there; it grows with every lift.
 
     `degrees` has an entry for every variable: its index among states and lifts, and the degree of that.
     """
@@ -246,13 +246,13 @@ class Cell:
     inequalities: list[Polynomial]
 
     def has_interior(self) -> bool:
-        """Tell whether signs alone leave points where all variables are positive."""
+        """Whether the signs alone admit points where all variables are positive."""
         one_sign = (len({number > 0 for number in h.values()}) == 1 for h in self.equalities)
         return not any(one_sign) and all(max(g.values()) > 0 for g in self.inequalities)
 
 
 def whole_space(size: int) -> Cell:
-    """Return what takes the place of the cells on reals."""
+    """Return the single cell of the domain reals."""
     return Cell("", size, (1,) * size, dict.fromkeys(range(size), 1), [], [])
 
 

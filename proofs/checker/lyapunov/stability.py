@@ -215,14 +215,14 @@ def check_witnesses(value: Any, pairs: Iterable[Obligation], on_cells: bool) -> 
 
 
 def check_affine(loop: Loop) -> None:
-    """Check that no uncertain parameter occurs twice in a term, else the ends would not decide."""
+    """Check that no uncertain parameter occurs twice in a term, so that the ends suffice."""
     for term in chain(*loop.field.values()):
         unique = len(set(term.uncertain)) == len(term.uncertain)
         need(unique, "field", "affine in every uncertain parameter", term.uncertain)
 
 
 def describe_claims(loop: Loop, claims: dict[str, Fraction], m: int, n: int) -> list[str]:
-    """Describe what a proof proves; V <= C sum u^m makes dV/dt <= -c V^(n/m)."""
+    """Describe the statement of a proof; V <= C sum u^m makes dV/dt <= -c V^(n/m)."""
     positive, decrease, kappa = (claims.get(key) for key in ("positive", "decrease", "decay"))
     if loop.domain == "reals":
         text = f"V >= {positive} * sum x_i^{m}; dV/dt <= -2*a*V with a = {claims['rate']}"
@@ -245,7 +245,7 @@ def describe_claims(loop: Loop, claims: dict[str, Fraction], m: int, n: int) -> 
 
 
 def prove(document: dict[str, Any]) -> list[str]:
-    """Verify a proof and say what it proves."""
+    """Verify a proof and describe its statement."""
     read_object(document, "the file", PROOF_KEYS)
     loop = read_loop(document)
     check_affine(loop)

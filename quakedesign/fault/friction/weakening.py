@@ -28,8 +28,8 @@ class Weakening(FrictionLaw):
     drop : float
         Static minus kinetic friction coefficient Δμ [-], not negative; the paper's Δμ has the opposite sign.
     healing : float
-        Largest excess of friction at rest over friction in slip, Δμ_h [-]; 0 by default. All of it acts after a rest of
-        any length, and vanishes at the release.
+        Largest excess of friction at rest over friction in slip, Δμ_h [-]; 0 by default. It acts in full after a rest
+        of any duration, and not in slip.
 
     Raises
     ------
@@ -143,7 +143,7 @@ class SlipRateWeakening(Weakening):
     Attributes
     ----------
     critical_rate : float
-        Rate v_c [m/s] at which half of the drop has happened, positive.
+        Rate v_c [m/s] at which friction has lost half of the drop, positive.
     """
 
     name: ClassVar[str] = "slip-rate-weakening"

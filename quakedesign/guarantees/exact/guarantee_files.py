@@ -103,11 +103,11 @@ class SampledLoopEntries(Entries, kw_only=True):
     def held(self, start: SlipAndRate | None) -> SampledLoop:
         """The loop with bounds of its initial errors."""
         law = made(LinearLaw, self, root=None if self.root is None else self.root.value())
-        need(not law.of_reference or any(map(any, law.of_reference)), "of_reference must not be zero where it is given")
+        need(not law.of_reference or any(map(any, law.of_reference)), "of_reference must not be zero if given")
         noise, initial = ((_ZERO, _ZERO) if pair is None else astuple(pair) for pair in (self.noise, start))
-        need(start is None or any(initial), "a bound of the start must be above 0 where it is given")
+        need(start is None or any(initial), "a bound of the start must be above 0 if given")
         times = JitterEntries(measured=_ZERO, delay=_ZERO) if self.jitter is None else self.jitter
-        need(self.jitter is None or any(astuple(times)), "jitter must be there where it is given")
+        need(self.jitter is None or any(astuple(times)), "jitter must be above 0 if given")
         pump = self.pump
         if pump is not None:
             need(astuple(pump) != astuple(PumpEntries()), "a pump must have limits or a rate")
@@ -132,7 +132,7 @@ class SampledLoopEntries(Entries, kw_only=True):
 
 
 class ContinuousLoopEntries(Entries, kw_only=True):
-    """A law whose pressure acts at once, at every time."""
+    """A law in continuous time."""
 
     states: Names
     rates: Matrix
@@ -205,16 +205,16 @@ def _read_tracking(raw: dict[str, Any]) -> TrackingProof | ContinuousProof:
     both = (claims.least_asked is None) == (claims.largest_asked is None)
     need(both, "claims must have both of least_asked and largest_asked, or neither")
     apart = "asked" in loop.outputs
-    need(apart or claims.least_asked is None, "without a lag and rock the valve's pressure is that in the fault")
+    need(apart or claims.least_asked is None, "claims on the valve pressure need a lag or a diffusion path")
     counted = "stepped" in loop.outputs
     need(
         counted or claims.largest_step is None,
-        "a largest step is claimed of a loop with jitter or a pump of some rate alone",
+        "largest_step must be claimed with jitter or a pump rate only",
     )
-    need(not paced or claims.largest_step is not None, "the rate of a pump needs a claim of the largest step")
+    need(not paced or claims.largest_step is not None, "a pump rate needs the claim largest_step")
     need(
         not (pumped and apart) or claims.least_asked is not None,
-        "a pump before a lag or rock needs claims of its range",
+        "a pump before a lag or diffusion path needs claims on its pressure",
     )
     _require_few(loop.states)
     return claim

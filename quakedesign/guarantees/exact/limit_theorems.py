@@ -386,7 +386,7 @@ def hopeless(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion:
     if task.change is None and late is not None and delay > late:
         way = f"with a delay above {late.quantity('s')}"
     elif task.change is None and far is not None and diffusion > far:
-        way = f"through rock of L^2/D above {far.quantity('s')}"
+        way = f"through a diffusion path of L^2/D above {far.quantity('s')}"
     else:
         return ""
     most = LowerBound(withdrawal).quantity("Pa")

@@ -580,9 +580,9 @@ class _Periods:
 
 
 def unstable() -> ParameterError:
-    """What is said of a loop that is not seen to be stable."""
+    """Error for a loop that is not shown stable."""
     return ParameterError(
-        f"the nominal loop must be stable. Received one that is not seen to be in {2**MOST_DOUBLINGS} periods. "
+        f"the nominal loop must be stable. Received one that is not shown stable in {2**MOST_DOUBLINGS} periods. "
         "Change the gains, or shorten T_s."
     )
 

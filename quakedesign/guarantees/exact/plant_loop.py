@@ -198,7 +198,7 @@ def solved(rows: Sequence[Sequence[Fraction]], unknowns: int) -> Row:
                 solution[pivot] = Fraction(int(reduced[i, unknowns].p), int(reduced[i, unknowns].q))
     if not consistent:
         raise ParameterError(
-            "a law must hold every load without an error at balance. Received a law without integral action for one. "
+            "a law must balance every load at zero error. Received a law without integral action for one load. "
             "Add an integral, or an estimate of the load."
         )
     return tuple(solution)
@@ -393,6 +393,6 @@ def _require_fading(leap: Any, work: int) -> None:
 
 def _unstable() -> ParameterError:
     return ParameterError(
-        "the nominal loop must be stable, and forget its past soon. Received a loop of which this is not proved. "
+        "the nominal loop must be stable and decay fast. Received a loop for which this is not proved. "
         "Change the law or the step."
     )

@@ -123,7 +123,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         task, held, claims = self.task, self.held, self.claims
         ratio = UpperBound(exponential(claims.log_rate))
         (low, high), (least, largest) = self.pressures, self.valve_pressures
-        empty = "" if task.distance else "about nothing, as the reference goes 0 m, which takes no time: "
+        empty = "" if task.distance else "vacuous, as the reference covers 0 m in 0 s: "
         under = f"for every shear stress disturbance of at most {LowerBound(task.stress).quantity('Pa')}"
         under = under if task.stress else "without disturbance"
         return (
@@ -141,7 +141,7 @@ def _path(held: SampledLoop) -> str:
     text = f"with zero-order hold over {float(held.step):.6g} s"
     text += f", with a delay of {float(held.delay):.6g} s" if held.delay else ""
     text += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
-    text += f", through rock of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
+    text += f", through a diffusion path of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
     noise = LowerBound(held.slip_noise)
     if held.slip_noise:
         return f"{text}, with any noise of at most {noise:.6g} m in the measured slip"

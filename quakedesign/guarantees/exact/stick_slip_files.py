@@ -51,7 +51,7 @@ def read_stick_slip(raw: dict[str, Any]) -> StickSlipProof:
     """
     file = read_as(StickSlipFile, raw)
     task, loop = file.plant(), file.loop
-    need(task.change is None, "a bounded change of the disturbance is not used where the fault sticks")
+    need(task.change is None, "a bounded change of the disturbance is not used on the stick-slip plant")
     pull = () if loop.pull is None else ImplicitRoot(pull=powers(loop.pull)).pull
     law = made(StickSlipLaw, loop, pull=pull)
     held = made(SampledStickSlip, loop, law=law, longest_step=loop.longest)

@@ -317,12 +317,12 @@ class TrackingProof(Proof[Bounds]):
             when = f"with zero-order hold over sampling intervals from {shortest:.6g} s to {longest:.6g} s in any order"
         when += f", with a delay of {_seconds(held.delay)}" if held.delay else ""
         when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
-        when += f", through rock of L^2/D = {_seconds(held.diffusion)} from well to fault" if held.diffusion else ""
+        when += f", through a diffusion path of L^2/D = {_seconds(held.diffusion)}" if held.diffusion else ""
         when += ", with the slip alone measured" if held.law.of_slip_alone else ""
         for name, bound in ((name, bound) for name, bound in held.noise.items() if bound):
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
         mean = LowerBound(held.averaging)
-        when += f", each measurement a mean over {mean:.6g} s around its time" if mean else ""
+        when += f", each measurement averaged over {mean:.6g} s around its instant" if mean else ""
         when += _off_schedule(held.jitter, held.jitter + held.delay_jitter)
         when += f", {held.pump.words()}" if held.pump else ""
         return sentence_of(self.task, self.claims, when, _start(*held.start))
@@ -395,7 +395,7 @@ def _of_claims(
     """Claims, or the reason why there are none."""
     if not _root_within(task, held, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
-        return NoProof(reason=f"the root of the implicit step leaves its range at {errors}")
+        return NoProof(reason=f"the implicit step leaves its sector at {errors}")
     if reason := claims.opens(task) or _beyond_the_pump(held, claims):
         slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
         return NoProof(reason=reason, needs=claims.largest_step if slow else None, pressed=not slow)
@@ -424,7 +424,7 @@ def _slow_claims(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Cl
         if claims.slip_error <= slip_error:
             return claims
         slip_error = above(max(claims.slip_error * MARGIN, _LEAP * slip_error * (turn >= _TURNS)))
-    reason = f"the slip error that moves the input gain, beyond {UpperBound(slip_error):.2g} m, moves it further"
+    reason = f"no slip error up to {UpperBound(slip_error):.2g} m bounds the input gain that it implies"
     return NoProof(reason=reason)
 
 
@@ -482,13 +482,13 @@ def _unstable(held: SampledLoop) -> NoProof:
 def _off_schedule(measured: Fraction, arrived: Fraction) -> str:
     """Part of the statement on jitter; empty without jitter."""
     each = f", each measurement within {LowerBound(measured):.6g} s of its instant" if measured else ""
-    return each + (f", each pressure within {LowerBound(arrived):.6g} s of when it is due" if arrived else "")
+    return each + (f", each pressure within {LowerBound(arrived):.6g} s of its due time" if arrived else "")
 
 
 def _start(slip: Fraction, rate: Fraction) -> str:
     if not (slip or rate):
         return "from rest"
-    return f"from every start within {LowerBound(slip):.6g} m and {LowerBound(rate):.6g} m/s of rest"
+    return f"from every initial state within {LowerBound(slip):.6g} m and {LowerBound(rate):.6g} m/s of rest"
 
 
 def _seconds(value: Fraction) -> str:
@@ -498,13 +498,13 @@ def _seconds(value: Fraction) -> str:
 # ----------------------------------------------------------------------
 # Peaks of the idealised loop with a pressure without delay: the same theorem in continuous time.
 
-WHEN = "for a pressure that acts at once (continuous time)"
+WHEN = "in continuous time (pressure without sampling or delay)"
 PREMISES = (
     "start at rest: x = 0, integrals 0; for the class rate a disturbance that starts at 0",
     "friction: any function of slip and slip rate within the bounds and chord slopes of the box",
     "k, eta, N anywhere in the box but constant",
-    "pressure acts at once; limits of the law, if any, lie outside the certified range of p",
-    "friction opposes forward motion: the printed plant is continued to negative slip rates (ERRATA 14)",
+    "pressure without sampling or delay; limits of the law, if any, lie outside the certified range of p",
+    "friction opposes forward motion: the plant is linearly continued to negative slip rates (ERRATA 14)",
 )
 
 

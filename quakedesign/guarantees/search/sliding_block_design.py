@@ -60,7 +60,7 @@ def sliding_block_guarantee(
     if claims is None or law is None:
         if small >= _LOST / 2:
             return NoProof(
-                reason="no law is found whose loop forgets soon enough: with fewer wells than blocks, modes that no "
+                reason="no law is found whose loop decays fast enough: with fewer wells than blocks, modes that no "
                 "well reaches must decay within some 60 T_s. Run limits, which says whether wells are missing; "
                 "else lengthen T_s",
             )

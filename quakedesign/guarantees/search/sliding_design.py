@@ -155,7 +155,7 @@ def designed_sliding(
     ageing = float(task.ranges["critical_slip"][0] / task.rate)
     path = "".join(f", {title} = {float(v):.4g} s" for title, v in _path(setup).items() if v)
     reason = (
-        f"no law with zero-order hold over {float(step):g} s was found whose loop is stable and forgets within some "
+        f"no law with zero-order hold over {float(step):g} s was found whose loop is stable and decays within some "
         f"hundred periods, D_c/V = {ageing:.3g} s{path}"
     )
     return NoProof(reason=reason)

@@ -225,14 +225,14 @@ def _column(entries: list[ca.SX]) -> ca.SX:
 
 
 # ----------------------------------------------------------------------
-# Samples that follow no clock.
+# Aperiodic sampling.
 
 GRAINS = range(8, 101)  # steps of a simulation in the shortest interval
 MOST_STEPS = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
-class NoClock:
+class AperiodicClock:
     """Aperiodic sampling: intervals of shortest to longest steps, uniformly distributed.
 
     Attributes
@@ -240,7 +240,7 @@ class NoClock:
     shortest, longest : int
         Steps from one sample to the next, 1 … 1000.
     seed : int
-        Of what is drawn, not negative.
+        Seed of the intervals, not negative.
     """
 
     shortest: int
@@ -265,7 +265,7 @@ class NoClock:
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Steps until the first sample, which are none, and the generator."""
+        """Steps until the first sample, 0, and the state of the generator."""
         return (0.0, *generator(self.seed))
 
     def after(self, memory: list[ca.SX]) -> tuple[ca.SX, list[ca.SX]]:
@@ -279,14 +279,14 @@ class NoClock:
 
 
 # ----------------------------------------------------------------------
-# What the sampled schemes share: the law once per T_s, its pressure held while the plant moves on.
+# Common part of the sampled schemes: the law once per T_s, with zero-order hold of its pressure.
 
 MOST_SUBSTEPS = 100
 
 
 @dataclass(frozen=True)
 class ControlSample:
-    """Everything known at one sample (SX): the pressures held before and from it, and the memory afterwards."""
+    """Values at one sample (SX): the pressures held before and from it, and the memory afterwards."""
 
     before: ca.SX
     applied: ca.SX
@@ -305,25 +305,25 @@ class Sampled(Scheme, Decided):
     """A controller that measures every T_s and holds its pressure in between (zero-order hold).
 
     The entries of the memory are: the law's numbers, those of actuator and measurement, the scheme's own memory, the
-    pressure that was held last, and the memories of the actuator, of the noise generator and of what no clock tells.
+    pressure that was held last, and the memories of the actuator, of the noise generator and of aperiodic sampling.
 
     Attributes
     ----------
     substeps : int
         Steps of the integrator per sample, 1 … 100.
     measurement : Measurement or Sensor
-        A sensor is told the true slip alone, once per sample of its own period.
+        A sensor measures the true slip alone, once per sample of its own period.
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
-    clock : NoClock or None
-        When samples are taken, in steps; None: at every step, by a clock.
+    clock : AperiodicClock or None
+        Sampling instants, in steps; None: periodic, at every step.
     """
 
     substeps: int = 1
     actuator: Actuator = DIRECT
     measurement: Sensor = EXACT
     authority: float | None = None
-    clock: NoClock | None = None
+    clock: AperiodicClock | None = None
 
     def __post_init__(self) -> None:
         if not is_whole(self.substeps, 1, MOST_SUBSTEPS):

@@ -42,7 +42,7 @@ class Continuous(Scheme):
     name: ClassVar[str] = "continuous"
 
     def pressure(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
-        """Pressure [Pa] that the law asks for now."""
+        """Pressure [Pa] commanded by the law now."""
         return loop.law(state[:2], state[2:], loop.reference(counter * step))[0]
 
     def advance(self, loop: Stepped, method: Any, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:

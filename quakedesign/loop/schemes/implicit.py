@@ -208,7 +208,7 @@ class Inclusion:
         return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
 
     def _used(self, expression: sp.Expr, inputs: InclusionValues) -> InclusionValues:
-        """What the value of an expression depends on: what is told to a call counts as if it did."""
+        """Symbols on which the value of an expression depends; all arguments of a call count."""
         names = expression.free_symbols | {self.slip_error, self.step}
         return {symbol: value for symbol, value in inputs.items() if symbol in names}
 

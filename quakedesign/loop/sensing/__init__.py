@@ -1,4 +1,4 @@
-"""What lies between the true slip and what a law is told: transducer, averaging, differentiator."""
+"""Measurement of the slip for a law: transducer, averaging, differentiator."""
 
 from quakedesign.arguments import attach
 

@@ -385,7 +385,7 @@ def names_before(order: int = ORDER) -> tuple[str, ...]:
 
 
 def rate_shares(order: int = ORDER) -> tuple[Fraction, ...]:
-    """Shares of the reading now, of the one before, and so on in T times the slip rate that is told."""
+    """Shares of the reading now, of the one before, and so on in T times the measured slip rate."""
     return tuple(
         sum((Fraction((-1) ** back * comb(j, back), j) for j in range(1, order + 1)), Fraction(0))
         for back in range(order + 1)
@@ -393,7 +393,7 @@ def rate_shares(order: int = ORDER) -> tuple[Fraction, ...]:
 
 
 def by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> LinearLaw:
-    """A law of slip and slip rate, the latter told by differences of slips every T_s [s]: one of the slip alone."""
+    """Law of the slip alone, equal to a law of slip and slip rate with differences of slips every T_s [s] as rate."""
     now, *before = (share / step for share in rate_shares(order))
     zero, names = Fraction(0), names_before(order)
 

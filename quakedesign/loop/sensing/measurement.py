@@ -36,7 +36,7 @@ class Sensor(ABC):
 
     @property
     def noisy(self) -> bool:
-        """Whether the law is told anything but slip and slip rate as they are."""
+        """Whether the measurement differs from true slip and slip rate."""
         return True
 
     @property
@@ -56,7 +56,7 @@ class Sensor(ABC):
 
     @abstractmethod
     def measure(self, numbers: Entries, memory: Entries, x: "ca.SX") -> tuple["ca.SX", Entries]:
-        """Slip [m] and slip rate [m/s] that the law is told, and the memory afterwards, at the true state x."""
+        """Measured slip [m] and slip rate [m/s], and the memory afterwards, at the true state x."""
 
     @property
     @abstractmethod

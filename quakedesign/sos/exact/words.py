@@ -47,7 +47,7 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     if multiplier != "1":
         lines.append(f"multiplied by {multiplier}")
     lines += [*_reason(answer), *filter(None, [answer.remark])]
-    lines += ["about nothing: the set is empty"] if answer.set_is_empty else []
+    lines += ["vacuous: the set is empty"] if answer.set_is_empty else []
     if verbose:
         lines += [
             f"Gram matrices {when} reduction: {' + '.join(map(str, sizes)) or 'none'}"

@@ -185,7 +185,7 @@ def test_a_larger_start_is_guaranteed_less_and_none_is_rest():
     assert near.recomputed().small_gain == pytest.approx(float(rest.recomputed().small_gain), rel=1e-3)
     assert rest.sentence().startswith("on the plant without stick, from rest, with zero-order hold over")
     assert near.sentence().startswith(
-        "on the plant without stick, from every start within 1e-05 m and 4e-05 m/s of rest, with zero"
+        "on the plant without stick, from every initial state within 1e-05 m and 4e-05 m/s of rest, with zero"
     )
 
 
@@ -195,7 +195,7 @@ def test_both_checkers_prove_the_file_and_say_from_where(name, slow):
     text = guarantee_text(claim)
     assert parse_guarantee(text) == claim
     assert claim.check() is Verdict.PROVED
-    assert "from |slip| <= 1e-05 m, |slip rate| <= 4e-05 m/s at first, along" in checker.verify(json.loads(text))[3]
+    assert "from initial |slip| <= 1e-05 m, |slip rate| <= 4e-05 m/s, along" in checker.verify(json.loads(text))[3]
 
 
 def document():

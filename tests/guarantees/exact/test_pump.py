@@ -69,7 +69,7 @@ def test_behind_a_lag_the_pressure_at_the_valve_counts():
     assert parse_guarantee(json.dumps(raw)) == pumped
     for name in ("least_asked", "largest_asked"):
         del raw["claims"][name]
-    with pytest.raises(CertificateError, match="a pump before a lag or rock needs claims of its range"):
+    with pytest.raises(CertificateError, match="a pump before a lag or diffusion path needs claims on its pressure"):
         parse_guarantee(json.dumps(raw))
 
 

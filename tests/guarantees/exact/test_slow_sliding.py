@@ -709,7 +709,7 @@ def test_a_key_that_is_not_known_is_refused_by_both(where):
 @pytest.mark.parametrize("name", ["log_rate", "log_state"])
 def test_logarithms_above_3_are_refused_by_both_for_that_reason(name):
     text = changed(("claims", name), "300001/100000")
-    with pytest.raises(checker.Refused, match="logarithms must be at most 3"):
+    with pytest.raises(checker.Refused, match="log_rate and log_state must be at most 3"):
         checker.check(text)
     with pytest.raises(CertificateError, match="log_rate and log_state at most 3"):
         parse_guarantee(text)

@@ -193,7 +193,7 @@ def test_a_root_beyond_its_lines_at_the_claims_is_undecided(monkeypatch):
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
     none = guarantee(TASK, ROOTED)
     assert isinstance(none, NoProof)
-    assert "leaves its range at errors up to 0 m and 0.501 m/s" in none.reason
+    assert "leaves its sector at errors up to 0 m and 0.501 m/s" in none.reason
 
 
 def test_a_root_that_is_told_another_slip_may_leave_its_line(monkeypatch):
@@ -256,11 +256,11 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
 def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     held = replace(HELD, jitter=F(1, 300), delay_jitter=F(1, 150))
     said = TrackingProof(task=TASK, held=held, claims=CLAIMS).sentence()
-    told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s of when"
+    told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s"
     assert told in said
     assert "5.67 Pa, commanded changes of at most 1.67 Pa a sample" in said
     late = TrackingProof(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
-    assert "with zero-order hold over 0.1 s, each pressure within 0.00666666 s of when it is due, for every" in late
+    assert "with zero-order hold over 0.1 s, each pressure within 0.00666666 s of its due time, for every" in late
     assert (held.noise, HELD.noise) == ({"slip_noise": 0, "rate_noise": 0}, {})
     assert tuple(held.loop(TASK).sampled) == ("slip_noise", "rate_noise")
     alone = replace(HELD.law, feedback=(F(1), F(0)), measured=tuple((row[0], F(0)) for row in HELD.law.measured))
@@ -276,7 +276,7 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     assert (mean.off, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
     assert tuple(mean.noise) == ("slip_noise", "rate_noise")
     said = TrackingProof(task=TASK, held=mean, claims=CLAIMS).sentence()
-    assert "hold over 0.1 s, each measurement a mean over 0.0333333 s around its time, each measurement within" in said
+    assert "hold over 0.1 s, each measurement averaged over 0.0333333 s around its instant, each measurement" in said
     for name in ("jitter", "delay_jitter", "averaging", "ramp"):
         with pytest.raises(ParameterError, match="jitter, delay jitter, averaging and ramp must be 0 or more"):
             replace(HELD, **{name: F(-1, 10**9)})

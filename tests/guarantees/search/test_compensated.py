@@ -189,7 +189,7 @@ def test_a_smaller_peak_is_an_objective_too():
 def test_a_scale_that_is_too_small_says_what_fails():
     found = compensated(TASK, law("cta", CTA, "1/1000000"), *SETTINGS, STEP)
     assert isinstance(found, NoProof)
-    assert found.reason.startswith("the root of the implicit step leaves its range at errors up to")
+    assert found.reason.startswith("the implicit step leaves its sector at errors up to")
 
 
 def test_a_run_of_the_design_stays_far_inside_its_guarantee():
@@ -246,7 +246,7 @@ def test_published_gains_are_too_weak_for_a_deadbeat_step():
     """λ = 500 on k3 = 4.51e-4: T_s²B0λ(k3 − k4)/(μ0N̂0) = 4e-8 m/s is far less than the error of a period."""
     found = compensated(TASK, published("real-fault")["cta"], *SETTINGS, STEP)
     assert isinstance(found, NoProof)
-    assert found.reason.startswith("the root of the implicit step leaves its range")
+    assert found.reason.startswith("the implicit step leaves its sector")
 
 
 def test_other_sliding_modes_have_no_guarantee_of_a_loop_that_runs():

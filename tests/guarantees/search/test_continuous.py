@@ -185,7 +185,7 @@ def test_a_law_may_have_one_integral_and_says_so_if_it_has_too_few(real):
 
 def test_an_unstable_loop_and_a_large_gain_say_why(real, designed):
     bad = certified_peaks(real, replace(designed, gains={n: -k for n, k in designed.gains.items()}))
-    assert "for a pressure that acts at once (continuous time) even the nominal loop is not stable" in bad.reason
+    assert "in continuous time (pressure without sampling or delay) even the nominal loop is not stable" in bad.reason
     weak = certified_peaks(real, replace(designed, gains={n: k / 16 for n, k in designed.gains.items()}))
     assert "small gain" in weak.reason
     assert weak.small_gain >= 1

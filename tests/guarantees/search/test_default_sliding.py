@@ -201,7 +201,7 @@ def test_a_guarantee_needs_no_certificate_in_continuous_time(unproved, unreached
     assert (again.verdict, again.guarantee) == (Verdict.PROVED, design.guarantee)
     weak = assess(REAL, design.controller.scaled("1/1000000"))
     assert weak.verdict is Verdict.UNDECIDED
-    assert weak.guarantee.reason.startswith("the root of the implicit step leaves its range")
+    assert weak.guarantee.reason.startswith("the implicit step leaves its sector")
     assert qd.design(REAL, "cta", continuous=True).verdict is Verdict.UNDECIDED
 
 

@@ -14,7 +14,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.loop import Actuator
 from quakedesign.loop.actuators.sampled_stages import Delay
-from quakedesign.loop.schemes.base import MOST_STEPS, NoClock
+from quakedesign.loop.schemes.base import MOST_STEPS, AperiodicClock
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.simulation.export import controller_step
@@ -31,7 +31,7 @@ def claim():
 
 @cache
 def seen(seed=None):
-    own = {} if seed is None else {"scheme": Explicit(clock=NoClock(shortest=8, longest=16, seed=seed))}
+    own = {} if seed is None else {"scheme": Explicit(clock=AperiodicClock(shortest=8, longest=16, seed=seed))}
     return simulate(FAULT, claim().controller, plant="printed", **own, **SHORT)
 
 
@@ -69,7 +69,7 @@ def test_the_law_of_the_file_asks_for_every_pressure_of_the_run():
 
 @pytest.mark.slow
 def test_equal_intervals_are_those_of_a_clock_in_every_digit():
-    fixed = simulate(FAULT, claim().controller, scheme=Explicit(clock=NoClock(shortest=8, longest=8)), **SHORT)
+    fixed = simulate(FAULT, claim().controller, scheme=Explicit(clock=AperiodicClock(shortest=8, longest=8)), **SHORT)
     law = replace(claim().controller, longest=F(0))
     clock = simulate(FAULT, law, substeps=8, **SHORT | {"samples": STEPS // 8})
     assert fixed.pressure[::8].tolist() == clock.pressure.tolist()
@@ -80,7 +80,7 @@ def test_a_run_stays_in_its_guarantee():
     metrics = seen().metrics
     assert metrics.max_slip_error < claim().claims.slip_error
     assert metrics.max_slip_rate_error < claim().claims.slip_rate_error
-    assert "NoClock(shortest=8, longest=16, seed=0)" in seen().provenance["clock"]
+    assert "AperiodicClock(shortest=8, longest=16, seed=0)" in seen().provenance["clock"]
 
 
 @pytest.mark.slow
@@ -94,21 +94,21 @@ def test_noise_is_told_at_the_samples_alone():
 def test_other_intervals_are_refused(wrong):
     shortest, longest = wrong
     with pytest.raises(ParameterError, match="interval of aperiodic sampling"):
-        NoClock(shortest=shortest, longest=longest)
+        AperiodicClock(shortest=shortest, longest=longest)
 
 
 def test_a_delay_within_a_step_is_refused():
     late = Actuator(stages=(Delay(samples=0, part=0.5),))
     with pytest.raises(ParameterError, match="whole number of steps with aperiodic sampling"):
-        Explicit(clock=NoClock(shortest=8, longest=16), actuator=late)
+        Explicit(clock=AperiodicClock(shortest=8, longest=16), actuator=late)
 
 
 def test_grains_never_reach_beyond_the_longest_interval():
     known = {F(2): (8, 16), F("1.3"): (10, 13), F(25, 23): (23, 25), F(50, 49): (49, 50), F(10**6): (8, MOST_STEPS)}
     for ratio, steps in known.items():
-        found = NoClock.of(F(3), 3 * ratio)
+        found = AperiodicClock.of(F(3), 3 * ratio)
         assert (found.shortest, found.longest) == steps
-    drawn = NoClock.of(F(1, 3), F("0.4321"))
+    drawn = AperiodicClock.of(F(1, 3), F("0.4321"))
     assert F("1.2963") - F(1, 100) < F(drawn.longest, drawn.shortest) <= F("1.2963")
 
 

@@ -10,7 +10,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.laws import control_law, published
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag, RateLimit, Saturation, discrete_law, simulation_scheme
-from quakedesign.loop.schemes.base import NoClock, Sampled
+from quakedesign.loop.schemes.base import AperiodicClock, Sampled
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.sensing import Differentiator, OutputFeedback
 from quakedesign.simulation import simulate
@@ -74,7 +74,7 @@ def linear(**gains):
 
 
 @pytest.mark.parametrize("sense", [1, -1])
-@pytest.mark.parametrize(("clock", "steps"), [(None, 1), (NoClock(shortest=8, longest=16), 8)])
+@pytest.mark.parametrize(("clock", "steps"), [(None, 1), (AperiodicClock(shortest=8, longest=16), 8)])
 def test_a_pump_changes_as_far_as_it_can_until_the_next_sample_is_expected(clock, steps, sense):
     """A law that asks for 10 MPa behind a pump of 20 Pa/s: 20 Pa/s times 0.25 s, as often as steps are sure to pass."""
     scheme = Explicit(clock=clock, actuator=Actuator(stages=(RateLimit(rate=20.0),)))
@@ -170,7 +170,7 @@ def test_between_samples_by_no_clock_nothing_of_the_law_moves(law):
     """A sample at every second step, while slip grows: pressure and sum change there alone."""
     loop = ClosedLoop(LAB, linear(**{SLIP: 8.0, SLIP_INTEGRAL: 1.0}) if law else None, 5.0)
     vars(loop)["printed"] = lambda *_: ca.DM([1, 0])
-    scheme = Explicit(clock=NoClock(shortest=2, longest=2))
+    scheme = Explicit(clock=AperiodicClock(shortest=2, longest=2))
     memory, count = scheme.memory(loop, 0.25), len(loop.integrals)
     given, number = ca.SX.sym("given", 2 + count + len(memory)), ca.SX.sym("number")
     parts = [scheme.pressure(loop, number, given, 0.25), scheme.advance(loop, ClassicRungeKutta, number, given, 0.25)]
@@ -205,8 +205,10 @@ def test_outputs_and_settings_are_those_of_what_lies_around_the_law():
     assert lagged.settings == {"substeps": 1, "actuator": "Lag(time_constant=1.0)", "authority": 2.0}
     rock = Actuator(stages=(Diffusion(length=2.0, diffusivity=3.0, storage=0.1),))
     assert len(Explicit(actuator=rock).described) == 3
-    told = Explicit(clock=NoClock(shortest=1, longest=2), measurement=SENSOR).settings
-    assert told == {"substeps": 1, "clock": "NoClock(shortest=1, longest=2, seed=0)", "measurement": repr(SENSOR)}
+    clock = AperiodicClock(shortest=1, longest=2)
+    told = Explicit(clock=clock, measurement=SENSOR).settings
+    assert told == {"substeps": 1, "clock": repr(clock), "measurement": repr(SENSOR)}
+    assert repr(clock) == "AperiodicClock(shortest=1, longest=2, seed=0)"
 
 
 def test_the_well_has_what_the_pump_holds_and_the_fault_what_the_rock_lets_through():
