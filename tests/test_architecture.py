@@ -458,7 +458,7 @@ BUDGETS = {
     "guarantees": 13243,
     "lyapunov": 6956,
     "linear": 2396,
-    "synthesis": 1946,
+    "synthesis": 1947,
     "rocq": 842,
     "simulation": 9744,
     "identification": 4049,
