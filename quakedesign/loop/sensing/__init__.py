@@ -1,4 +1,4 @@
-"""What lies between the true slip and what a law is told: transducer, averaging, differentiator."""
+"""Measurement chain from the true slip to the input of a law: transducer, averaging, differentiator."""
 
 from quakedesign.arguments import attach
 
