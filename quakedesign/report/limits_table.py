@@ -20,7 +20,7 @@ _FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
 
 
 def limits_lines(limits: Limits) -> list[str]:
-    """For people, within 80 columns."""
+    """The result as lines of at most 80 characters."""
     task = limits.fault
     head = [
         f"{task.name}: performance limits, and proved bounds of designs",
