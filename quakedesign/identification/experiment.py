@@ -143,7 +143,7 @@ class Widened(_Around):
     """
 
     coordinates: tuple[Coordinate, ...]
-    columns: ndarray  # of shape (samples, further coordinates)
+    columns: ndarray  # shape (samples, further coordinates)
     delays: bool = False
 
     def inside(self, fitted: ndarray) -> ndarray:

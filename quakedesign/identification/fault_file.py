@@ -77,7 +77,7 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     Parameters
     ----------
     identification : Identification
-        Of a record that determines every parameter.
+        Identification of a record that determines every parameter.
     fault : Fault
         Source of everything except friction. If only the identified friction has a state, there is no disturbance, and
         T_s is chosen for slow sliding; T_s also if that of the fault was assumed.

@@ -129,7 +129,7 @@ def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:
     Raises
     ------
     UnknownNameError
-        For a number without a row; nothing runs then.
+        For a number without a row; no check runs then.
     """
     return [_run(row) for row in find_rows(numbers)]
 

@@ -222,7 +222,7 @@ class Limits:
         return natural_peak(self.fault)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        """Plain values, SI; proved bounds are decimal texts, rounded outwards."""
         return {
             "fault": self.fault.name,
             "box": self.fault.box.name,
@@ -290,7 +290,7 @@ class SlidingLimits(Limits):
         return None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        """Plain values, SI; proved bounds are decimal texts, rounded outwards."""
         return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
 
     def smallest_peaks(self, *, measured: bool = True) -> list[tuple[Fraction, LowerBound]]:

@@ -14,7 +14,7 @@ from quakedesign.loop.sensing.measurement import Entries
 if TYPE_CHECKING:
     from quakedesign.laws import Sampling
 
-LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 3.3 of the Runge–Kutta methods
+LONGEST = 2.5  # limit of substep times fastest rate, below the limits 2.78 and 3.3 of the Runge–Kutta methods
 
 
 @checked_dataclass(frozen=True, kw_only=True)

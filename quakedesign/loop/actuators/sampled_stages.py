@@ -13,7 +13,7 @@ from quakedesign.loop.sensing.measurement import Entries, Measurement, generator
 # Computation time as a delay.
 
 MOST_SAMPLES = 100
-_SAME = 1e-9  # of a sampling period
+_SAME = 1e-9  # tolerance, relative to a sampling period
 
 
 @checked_dataclass(frozen=True, kw_only=True)

@@ -172,7 +172,7 @@ class JointCondition:
     rate_error: float
 
     def to_dict(self) -> Json:
-        """JSON-able facts; null stands for infinite."""
+        """JSON-able facts; null means infinite."""
         return {k: None if v == math.inf else v for k, v in asdict(self).items()}
 
 

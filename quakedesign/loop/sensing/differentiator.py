@@ -98,7 +98,7 @@ def _solve(target: ca.SX, table: Sequence[float]) -> tuple[ca.SX, ca.SX]:
     """q of the polynomial, and the selection of |⌈s⁺⌋⁰| from [0, 1]."""
     size, (jump, *rest) = len(table), table
     excess = ca.fmax(target - jump, 0)
-    rising = [*rest, 1.0]  # of q, q² … q^N
+    rising = [*rest, 1.0]  # coefficients of q, q² … q^N
     root = _root(excess, size)
     for power, weight in enumerate(rest, start=1):
         root = ca.fmin(root, _root(excess / weight, power))
