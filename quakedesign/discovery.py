@@ -62,7 +62,7 @@ def user_code() -> Iterator[None]:
 
 
 def _raised_by(error: BaseException) -> str | None:
-    """User module in the traceback of an error; any user module if the error is no `Exception`, as no error of ours."""
+    """User module in the traceback of an error; an unnamed one for a non-`Exception`, which only user code raises."""
     through = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
     by_others = isinstance(error, Exception) or not _imported or through[-1].startswith("rich.")  # closed pipe
     others = None if by_others else "a module of the user's"

@@ -54,7 +54,7 @@ class Experiment(ABC):
         """Derivatives of `friction`, shape (samples, coordinates)."""
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """Remarks on assumptions that a noise of friction [-] allows to check; empty by default."""
+        """Remarks on assumptions, checked with a noise of friction [-]; empty by default."""
         return ()
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:

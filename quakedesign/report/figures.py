@@ -117,7 +117,7 @@ def _power_of_ten(value: float) -> float:
 
 
 def _decades(axis: Any) -> Any:
-    """Ticks at zero and at powers of ten beyond the linear part, with gaps of at least two decades."""
+    """Ticks at zero and at powers of ten beyond the linear part, at least two decades apart: at most five."""
     from matplotlib.ticker import FixedLocator
 
     last = int(np.floor(np.log10(max(np.abs(axis.get_ylim())))))
