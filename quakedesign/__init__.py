@@ -1,6 +1,6 @@
 """Design controllers that let a fault slip slowly instead of in an earthquake, and prove that they do.
 
-The public names are those of ``__init__.pyi``. They load on first use, and the stub is read then, so that
+The public names are those of ``__init__.pyi``. They and the stub itself load on first use, so that
 ``import quakedesign`` costs nothing.
 """
 

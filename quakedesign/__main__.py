@@ -11,9 +11,9 @@ _OBJECTS = 100_000
 
 
 def main() -> None:
-    """Run the command line; an interruption is one line from the first import on."""
+    """Run the command line; an interruption prints one line, even during the first imports."""
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # matrices are small: threads of linear algebra only wait for another
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # for small matrices, threads of linear algebra only wait for another
     open_all()
     widen()
     try:

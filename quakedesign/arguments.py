@@ -40,7 +40,7 @@ _REMEDIES = {
     "float": "Give it in SI units.",
 }
 _Value = TypeVar("_Value")
-_MOST_ENTRIES = 16  # of a collection that are looked at, so that a large one costs nothing
+_MOST_ENTRIES = 16  # entries of a collection that are checked, so that a large one costs nothing
 
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
@@ -49,7 +49,7 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
     Parameters
     ----------
     package, file : str
-        Its ``__name__`` and ``__file__``; its stub names them.
+        ``__name__`` and ``__file__`` of the package; its stub lists the names.
     """
     load, listed, names = lazy_loader.attach_stub(package, file)
 
@@ -61,9 +61,9 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
 
 
 def checked(value: _Value) -> _Value:
-    """Public name that checks its arguments from now on; a function also where it is defined, so that it is pickled.
+    """Public name that checks its arguments; a function is also replaced in its module, so that it can be pickled.
 
-    Of a class its construction and its public methods do, but those of SymPy's own calls.
+    For a class, construction and public methods check theirs; classes of SymPy are not changed.
     """
     if isfunction(value):
         replaced: Any = _checked(value)
@@ -81,7 +81,7 @@ if TYPE_CHECKING:
 else:
 
     def checked_dataclass(**options: Any) -> Callable[[type], type]:
-        """Dataclass that checks the arguments of its construction and methods, loaded by a public name or not."""
+        """Dataclass that checks the arguments of its construction and methods, even if not loaded by a public name."""
         return lambda kind: checked(dataclasses.dataclass(**options)(kind))
 
 
@@ -94,7 +94,7 @@ def _check_methods(owner: type) -> None:
 
 
 def _takes_any(function: Any, member: Any) -> bool:
-    """Whether a method takes arguments besides its instance or class, and is not there to be overridden."""
+    """Whether a method takes arguments besides its instance or class, and is not abstract."""
     code = getattr(function, "__wrapped__", function).__code__
     several = bool(code.co_flags & (CO_VARARGS | CO_VARKEYWORDS))
     count = code.co_argcount + code.co_kwonlyargcount + several
@@ -126,7 +126,7 @@ def _signature(function: Callable[..., Any]) -> Signature:
 
 @cache
 def _accept(function: Callable[..., Any], name: str) -> Callable[[Any], Any]:
-    """Function that gives back what a parameter may be, with numbers as Python has them, and refuses all else."""
+    """Function that returns a valid value of a parameter, with Python's number types, and rejects all others."""
     parameter, hint = _signature(function).parameters[name], _hint(function, name)
     if parameter.kind is Parameter.VAR_POSITIONAL:
         return lambda values: tuple(_accepted(function, name, hint, value) for value in values)
@@ -157,7 +157,7 @@ def _accepted(function: Callable[..., Any], name: str, hint: Any, value: Any) ->
 
 
 class _Late(dict[str, Any]):
-    """Names that a module imports for type checkers alone, and usual ones of libraries, once they are asked for."""
+    """Names that a module imports only for type checkers, and usual abbreviations of libraries, imported on demand."""
 
     def __init__(self, module: str) -> None:
         tree = ast.parse(getsource(sys.modules[module]))
@@ -175,11 +175,11 @@ _late = cache(_Late)
 
 @cache
 def _hint(function: Callable[..., Any], name: str) -> Any:
-    """Type of a parameter; Any if only a type checker could resolve it."""
+    """Type of a parameter; `Any` if only a type checker can resolve it."""
     hint = _signature(function).parameters[name].annotation
     if not isinstance(hint, str):
         return Any if hint is Parameter.empty else hint
-    home = function.__module__  # the `__init__` of a dataclass has names of its own besides
+    home = function.__module__  # the `__init__` of a dataclass has further names of its own
     known = getattr(function, "__globals__", {}) | vars(sys.modules[home])
     for late in (dict, partial(_late, home)):
         with suppress(NameError, TypeError, OSError):
@@ -188,13 +188,13 @@ def _hint(function: Callable[..., Any], name: str) -> Any:
 
 
 def matches(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type; what the type says of the entries of a collection is required of each."""
+    """Whether a value is of a type; each entry of a collection must have its declared type."""
     return _test(hint)(value)
 
 
 @cache
 def _test(hint: Any) -> Callable[[Any], bool]:
-    """Whether a value is of a type, as a function that has taken the type apart already."""
+    """Test whether a value is of a type, as a function for which the type is already analysed."""
     origin, inner = get_origin(hint), get_args(hint)
     if hint in (Any, Parameter.empty):
         return lambda _: True
@@ -215,11 +215,11 @@ def _test(hint: Any) -> Callable[[Any], bool]:
 
 def _test_of_class(hint: type) -> Callable[[Any], bool]:
     numbers = _NUMBERS.get(hint.__name__)
-    if hint.__name__ == "SX":  # and all other kinds of expressions and matrices of CasADi
+    if hint.__name__ == "SX":  # also all other CasADi expressions and matrices
         hint = next(base for base in hint.__mro__ if base.__name__ == "GenericExpressionCommon")
 
     def test(value: Any) -> bool:
-        if hint.__name__ == "ndarray":  # masked arrays are some as well
+        if hint.__name__ == "ndarray":  # masked arrays are instances as well
             return isinstance(value, hint) and not _lacks_entries(value)
         if type(value) is hint:
             return True
@@ -239,7 +239,7 @@ def _is_float_alone(hint: Any) -> bool:
 
 
 def _native(value: Any) -> Any:
-    """Numbers of NumPy as those of Python, also in tuples, lists and dictionaries; long floats as floats."""
+    """NumPy numbers converted to those of Python, also in tuples, lists and dictionaries; long floats to floats."""
     if hasattr(value, "dtype") and hasattr(value, "item"):
         if getattr(value, "ndim", 0):
             return value if value.dtype.kind != "f" or value.dtype.itemsize <= 8 else value.astype(float)
@@ -281,7 +281,7 @@ def _test_of_collection(origin: type, inner: tuple[Any, ...]) -> Callable[[Any],
 
 
 def _is_one(value: Any, origin: type) -> bool:
-    """Whether a collection is of a kind; lists and arrays are tuples and sequences, every mapping is a dictionary."""
+    """Whether a collection is of a kind; lists and arrays count as tuples and sequences, mappings as dictionaries."""
     if type(value) is origin:
         return True
     if issubclass(origin, Mapping):
@@ -293,13 +293,13 @@ def _is_one(value: Any, origin: type) -> bool:
 
 
 def _lacks_entries(value: Any) -> bool:
-    """Whether an array of NumPy is one number, or has some that are masked."""
+    """Whether a NumPy array has no dimension, or masked entries."""
     mask = getattr(value, "mask", None)
     return getattr(value, "ndim", 1) == 0 or (mask is not None and hasattr(mask, "any") and bool(mask.any()))
 
 
 def _parts(hint: Any) -> list[str]:
-    """Names of the types that a type consists of."""
+    """Names of the component types of a type."""
     if not isinstance(hint, type) or get_origin(hint):
         return [part for inner in get_args(hint) for part in _parts(inner)]
     return [hint.__name__]

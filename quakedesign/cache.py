@@ -1,13 +1,13 @@
 """Disk cache of one user: compiled code, runs, figures and results of searches; no verdicts.
 
-What is kept is found by its content alone: the question, the sources of this package, the versions of Python and of the
-libraries, and the machine. So nothing is ever out of date. A search only proposes, here as elsewhere: what it proposed
-is decided in exact arithmetic each time.
+The key of an entry is a digest of the input data, the sources of this package, the versions of Python and of the
+libraries, and the machine. So no entry is ever out of date. A search only proposes candidates: exact arithmetic decides
+on them each time.
 
-The folder is that of ``QUAKEDESIGN_CACHE`` (``off`` for none), else ``quakedesign`` in the user's folder for caches
-(``XDG_CACHE_HOME``, ``~/.cache``; ``~/Library/Caches``). It is used if it belongs to this user and nobody else may
-write it, and so is each file; a changed file is ignored. Files are written atomically, and the oldest are deleted when
-their total size is too large. After any failure, as where nothing can be written, the work is done again.
+The folder is that of ``QUAKEDESIGN_CACHE`` (``off`` for none), else ``quakedesign`` in the user's cache folder
+(``XDG_CACHE_HOME``, ``~/.cache``; ``~/Library/Caches``). Folder and files are used only if they belong to this user and
+nobody else may write them; a corrupt file is ignored. Files are written whole, and the oldest are deleted if the total
+size is too large. After any failure, such as a folder without write permission, the result is computed anew.
 """
 
 import io
@@ -32,32 +32,32 @@ PLACE = "QUAKEDESIGN_CACHE"
 MOST_BYTES = 200_000_000
 _LIBRARIES = (
     *("casadi", "clarabel", "control", "cvxpy", "numpy", "python-flint", "scipy", "sympy"),
-    *("contourpy", "kiwisolver", "matplotlib", "pillow", "pyparsing"),  # of figures
+    *("contourpy", "kiwisolver", "matplotlib", "pillow", "pyparsing"),  # for figures
 )
-_KERNEL = "OPENBLAS_CORETYPE"  # of linear algebra; its last digits depend on that
+_KERNEL = "OPENBLAS_CORETYPE"  # kernel of linear algebra, on which rounding depends
 _DIGEST = sha256().digest_size
 _PROCESSOR = Path("/proc/cpuinfo")
 _OTHERS = stat.S_IWGRP | stat.S_IWOTH
 
 
 def switch_off() -> None:
-    """Keep and take nothing from here on, in processes that this one starts as well."""
+    """Switch the cache off, also for processes that this one starts."""
     os.environ[PLACE] = "off"
 
 
 def in_use() -> bool:
-    """Whether anything is kept."""
+    """Whether the cache is in use."""
     return _folder() is not None
 
 
 @cache
 def shipped(path: Path) -> Any:
-    """What a JSON file beside the code holds: found before, the same for every user, and compared anew by a test."""
+    """Content of a JSON file of the package: precomputed results, equal for every user, and re-checked by a test."""
     return json.loads(path.read_text(encoding="utf-8"))
 
 
 def recall(kind: str, *question: bytes) -> bytes | None:
-    """What was kept for a question, or None."""
+    """Cached result for a key, or None."""
     name = _name(kind, question)
     try:
         with open(os.open(_own_folder() / name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
@@ -65,7 +65,7 @@ def recall(kind: str, *question: bytes) -> bytes | None:
             if not stat.S_ISREG(told.st_mode) or not _own(told):
                 return None
             content = file.read()
-            with suppress(OSError):  # what is asked for again is not the oldest
+            with suppress(OSError):  # an entry that is read again is not the oldest
                 os.utime(file.fileno())
     except OSError:
         return None
@@ -74,7 +74,7 @@ def recall(kind: str, *question: bytes) -> bytes | None:
 
 
 def keep(kind: str, content: bytes, *question: bytes) -> None:
-    """Keep the answer to a question for `recall`, if there is a place for it."""
+    """Cache the result for a key, for `recall`, if the cache is in use."""
     name = _name(kind, question)
     with suppress(OSError):
         folder = _own_folder(make=True)
@@ -91,7 +91,7 @@ def keep(kind: str, content: bytes, *question: bytes) -> None:
 
 
 def once(kind: str, work: Callable[[], bytes], *question: bytes) -> bytes:
-    """Answer to a question: what was kept, else what work gives, which is kept."""
+    """Cached result for a key, else the result of `work`, which is then cached."""
     if (known := recall(kind, *question)) is None:
         known = work()
         keep(kind, known, *question)
@@ -99,28 +99,28 @@ def once(kind: str, work: Callable[[], bytes], *question: bytes) -> bytes:
 
 
 def search_once(search: Callable[[], Any], *question: Any) -> Any:
-    """What a search found for a question before, or finds now: numbers, texts, lists, as JSON has them.
+    """Cached or new result of a search: JSON-able numbers, texts and lists.
 
     Parameters
     ----------
     search : callable
-        It depends on the question alone, and what it finds is not trusted.
+        Depends only on the question, and its result is not trusted.
     *question
-        Values that say everything; what cannot be pickled is searched each time.
+        All input values of the search; if they cannot be pickled, the search runs each time.
     """
     asked = stated(question) if in_use() else None
     return search() if asked is None else json.loads(once("search", lambda: json.dumps(search()).encode(), asked))
 
 
 class CachedStatement(pickle.Pickler):
-    """A value by its fields alone: what was computed of it on the way and is kept beside them says nothing more."""
+    """Pickler of a value by its fields alone; cached properties of the value are ignored."""
 
     def field(self, value: Any, name: str) -> Any:
-        """What is written of a field."""
+        """Value that is pickled for a field."""
         return getattr(value, name)
 
     def reducer_override(self, value: Any) -> Any:
-        """Text of a value given by its fields or its items."""
+        """Reduction of a value that its fields or its items define."""
         if isinstance(value, MappingProxyType):
             return dict, (tuple(value.items()),)
         if not is_dataclass(value) or isinstance(value, type):
@@ -129,7 +129,7 @@ class CachedStatement(pickle.Pickler):
 
 
 def stated(value: Any, writer: type[CachedStatement] = CachedStatement) -> bytes | None:
-    """The arguments of a computation in bytes; None if they have no such form."""
+    """A value in bytes, as a key; None if it cannot be pickled."""
     content = io.BytesIO()
     try:
         writer(content).dump(value)
@@ -140,7 +140,7 @@ def stated(value: Any, writer: type[CachedStatement] = CachedStatement) -> bytes
 
 def _folder() -> Path | None:
     told = os.environ.get(PLACE)
-    if told == "off" or sys.platform == "win32":  # folders have no owners there that could be asked for
+    if told == "off" or sys.platform == "win32":  # Windows folders have no owner to check
         return None
     if told:
         return Path(told).absolute()
@@ -158,7 +158,7 @@ def _own_folder(*, make: bool = False) -> Path:
     Raises
     ------
     OSError
-        When there is none, or it is somebody else's, or others may write it.
+        When it does not exist, belongs to another user, or others may write it.
     """
     place = _folder()
     if place is None:
@@ -173,12 +173,12 @@ def _own_folder(*, make: bool = False) -> Path:
 
 
 def _own(told: os.stat_result) -> bool:
-    """Whether something is of this user, and nobody else may write it."""
+    """Whether a file or folder belongs to this user, and nobody else may write it."""
     return told.st_uid == os.getuid() and not told.st_mode & _OTHERS
 
 
 def _make_room(folder: Path) -> None:
-    """Remove the oldest files until three quarters of the room are left, if there is too much."""
+    """Remove the oldest files, if the total size is too large, until it is three quarters of the limit."""
     with os.scandir(folder) as entries:
         files = [(entry.stat(follow_symlinks=False), entry.path) for entry in entries]
     size = sum(told.st_size for told, _ in files)
@@ -187,7 +187,7 @@ def _make_room(folder: Path) -> None:
     for told, path in sorted(files, key=lambda file: file[0].st_mtime):
         if size <= MOST_BYTES * 3 // 4:
             break
-        with suppress(OSError):  # another process was here first
+        with suppress(OSError):  # another process has removed it
             os.unlink(path)
         size -= told.st_size
 
@@ -203,7 +203,7 @@ def _digest(name: str, content: bytes) -> bytes:
 
 @cache
 def _here() -> bytes:
-    """Digest of everything that an answer depends on beside its question."""
+    """Digest of everything other than its key on which a result depends."""
     lines = [sys.version, platform.platform(), platform.node(), _features(), os.environ.get(_KERNEL, "")]
     lines += [f"{name} {_version(name)}" for name in _LIBRARIES]
     here, package = sha256(repr(lines).encode()), Path(__file__).parent
@@ -213,7 +213,7 @@ def _here() -> bytes:
 
 
 def _features() -> str:
-    """What the processor can do: the C library computes with it, and its last digits depend on that."""
+    """Instruction sets of the processor: the C library uses them, and its rounding depends on them."""
     with suppress(OSError):
         lines = _PROCESSOR.read_text(errors="replace").splitlines()
         return next((line for line in lines if line.startswith(("flags", "Features"))), "")

@@ -46,7 +46,7 @@ def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tu
     ----------
     paths : sequence of Path
     fault : str, optional
-        Name of a preset or path of a fault file: the statement must be about this fault.
+        Name of a preset or path of a fault file; the statement must be about this fault.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
 
 
 def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
-    """Verdict on a file about a loop that runs, and whether its data are those of a fault."""
+    """Verdict on a file about a sampled loop, and whether its data are those of a fault."""
     claim: Any = guarantees.read_guarantee(raw)
     if claim.check() is not Verdict.PROVED:
         raise CertificateError("the claims do not follow from the loop and the fault's data")
@@ -133,7 +133,7 @@ def _plant(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
 
 
 def _other_step(claim: Any, fault: "Fault") -> str:
-    """The box, and that a loop is not sampled as the fault is, where it is so."""
+    """The box, and a remark if the loop has another sampling time than the fault."""
     if claim.slides:
         return ""
     text = f", box {fault.box.name}"
@@ -163,7 +163,7 @@ def _attraction(raw: Any) -> tuple[str, list[str]]:
 
 
 def statement(certificate: Certificate) -> list[str]:
-    """What a certificate says, in lines."""
+    """Statement of a certificate as lines of text."""
     loop = certificate.loop
     lines = ["in continuous time, for the equations below: sampling with zero-order hold is not covered"]
     lines.append(f"law {loop.law}, vector field equal to that of the law")

@@ -1,4 +1,4 @@
-"""Discovery of extensions: one file each in a folder of the package, or a module of a user."""
+"""Discovery of extensions: one file each in a folder of the package, or a user-defined module."""
 
 import sys
 from collections.abc import Collection, Iterator, Mapping
@@ -21,17 +21,17 @@ _OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
 
 
 def discovered(package: str, kind: type, shared: Collection[str] | None = None) -> dict[str, Any]:
-    """Every class of a kind in the modules of a package that can be built and has a name, by name.
+    """Every concrete class of a kind with a name in the modules of a package, by name.
 
     Parameters
     ----------
     shared : collection of str, optional
-        Modules that need none; unless given, none of them does.
+        Modules that need no such class; by default none of the modules needs one.
 
     Raises
     ------
     ImportError
-        For another module that defines none, so that a file does not go unheard.
+        For another module that defines none, so that no file is ignored silently.
     """
     kinds: dict[str, Any] = {}
     for info in iter_modules(import_module(package).__path__):
@@ -44,7 +44,7 @@ def discovered(package: str, kind: type, shared: Collection[str] | None = None) 
 
 
 def allow_code(allowed: bool) -> None:
-    """Let files name code as ``module:Class`` from here on, or no longer; not unless the user asks for it."""
+    """Allow or forbid files to name code as ``module:Class``; allowed only at the user's request."""
     _allowed.set(allowed)
 
 
@@ -62,9 +62,9 @@ def user_code() -> Iterator[None]:
 
 
 def _raised_by(error: BaseException) -> str | None:
-    """Module of the user's through which an error came; some module where it is no `Exception`, as none of ours is."""
+    """User module in the traceback of an error; an unnamed one for a non-`Exception`, which only user code raises."""
     through = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
-    by_others = isinstance(error, Exception) or not _imported or through[-1].startswith("rich.")  # of a closed pipe
+    by_others = isinstance(error, Exception) or not _imported or through[-1].startswith("rich.")  # closed pipe
     others = None if by_others else "a module of the user's"
     return next((module for module in reversed(through) if module in _imported), others)
 
@@ -72,25 +72,25 @@ def _raised_by(error: BaseException) -> str | None:
 def named(
     name: str, known: Mapping[str, type[Kind]], kind: type, what: str, *, in_file: bool = False, code: bool = False
 ) -> type[Kind]:
-    """Class of a name, or of the user's own: ``module:Class`` of a module that can be imported from here.
+    """Class of a name, or a user-defined one: ``module:Class`` of a module that can be imported.
 
     Parameters
     ----------
     known : mapping of str to type
-        What the package has.
+        Classes of the package.
     kind : type
-        What a class of the user's own derives from.
+        Base class of a user-defined class.
     what : str
-        For the message.
+        Description for the message.
     in_file : bool
-        The name stands in a file, which may come from anybody: it imports nothing unless code is allowed.
+        Whether the name is in a file, which may be untrusted: it imports nothing unless code is allowed.
     code : bool
-        The caller allows it, as `allow_code` does for a whole command.
+        Whether the caller allows code, as `allow_code` does for a whole command.
 
     Raises
     ------
     UnknownNameError
-        For an unknown name, or a module or class that cannot be had.
+        For an unknown name, or a module or class that cannot be imported.
     """
     if name in known:
         return known[name]
@@ -104,13 +104,13 @@ def named(
         )
     if "__main__" in module.split("."):
         raise UnknownNameError(f"{what} must not be of a program. Received {shown(name)}. Name a module without main.")
-    if "" not in sys.path:  # a script that is installed does not look where it is started
+    if "" not in sys.path:  # an installed script does not search the current folder
         sys.path.append("")
     try:
         found: Any = getattr(import_module(module), attribute)
     except (KeyboardInterrupt, MemoryError):
         raise
-    except BaseException as error:  # of code of the user's: SystemExit would decide the exit code
+    except BaseException as error:  # from user code: SystemExit would set the exit code
         raise UnknownNameError(
             f"{what} must be module:Class of a module that can be imported. Received {shown(name)}, which fails with "
             f"{type(error).__name__}: {error}. Start where the module lies, or put it on PYTHONPATH."

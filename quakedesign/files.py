@@ -22,7 +22,7 @@ from typing import Any
 from quakedesign.errors import OutputError, QuakedesignError
 
 # ----------------------------------------------------------------------
-# Files of users are read whole, from a regular file of bounded size: nothing waits, nothing is endless.
+# User files are read whole, from regular files of bounded size, so that no read blocks or is endless.
 
 Json = dict[str, Any]
 """Object of a JSON file: values by key."""
@@ -37,7 +37,7 @@ def parse_toml(text: str) -> Json:
     Raises
     ------
     ValueError
-        When it is no TOML, nested too deeply, or has a key of more than 400 parts.
+        When it is not TOML, is nested too deeply, or has a key of more than 400 parts.
     """
     for number, line in enumerate(text.split("\n"), start=1):
         if line.count(".") > _MOST_DOTS:
@@ -51,7 +51,7 @@ def parse_toml(text: str) -> Json:
 def read_text(
     path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError], marked: bool = True
 ) -> str:
-    """Text of a file in UTF-8, without the byte-order mark that it may be `marked` with; others as in `read_bytes`."""
+    """Text of a file in UTF-8; `marked` accepts and removes a byte-order mark; other parameters as in `read_bytes`."""
     try:
         return read_bytes(path, what, largest=largest, refusal=refusal).decode("utf-8-sig" if marked else "utf-8")
     except UnicodeDecodeError:
@@ -65,11 +65,11 @@ def read_bytes(path: str | Path, what: str, *, largest: int, refusal: type[Quake
     ----------
     path : str or Path
     what : str
-        What the file is, for the message.
+        Description of the file for the message.
     largest : int
-        Most bytes that it may have.
+        Largest size [byte].
     refusal : type of QuakedesignError
-        What is raised when it cannot be read, is larger, or is a pipe, a device or a folder.
+        Error that is raised when it cannot be read, is larger, or is a pipe, a device or a folder.
     """
     try:
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as handle:
@@ -88,7 +88,7 @@ def read_bytes(path: str | Path, what: str, *, largest: int, refusal: type[Quake
 
 
 # ----------------------------------------------------------------------
-# Temporary folders, each locked by the process that made it; what a killed process left goes at the next start.
+# Temporary folders, each locked by its process; those of a killed process are removed at the next start.
 
 if sys.platform != "win32":
     import fcntl
@@ -100,18 +100,18 @@ PREFIX = f"{FAMILY}{sha256(platform.node().encode()).hexdigest()[:8]}-"
 ASIDE = "aside"
 """What lies in this folder of a temporary folder has been moved there, and goes back where its place is empty."""
 
-_TRIALS, _PAUSE = 10, 0.02  # s: a sweep holds a lock for less
+_TRIALS, _PAUSE = 10, 0.02  # s; a sweep holds a lock for a shorter time
 _mine: set[Path] = set()
 
 
 @contextmanager
 def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
-    """Folder that nobody else may read, which goes when the block ends, or at the next start if the process is killed.
+    """Private folder, removed when the block ends, or at the next start if the process is killed.
 
     Parameters
     ----------
     parent : Path, optional
-        Where it lies; the folder of the system for temporary files unless given.
+        Parent folder; by default that of the system for temporary files.
     """
     folder = (parent or Path(tempfile.gettempdir())).absolute() / f"{PREFIX}{secrets.token_hex(8)}"
     _mine.add(folder)
@@ -124,14 +124,14 @@ def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
 
 
 def lock_of(target: Path) -> tuple[Path, int | None]:
-    """Lock of a place until it is given back to `unlock`: a temporary folder beside it, and its descriptor.
+    """Lock of a path until `unlock`: a temporary folder in the same parent folder, and its descriptor.
 
-    Another command on another machine does not see it, and None stands for a file system without locks.
+    A command on another machine does not see the lock; the descriptor is None on a file system without locks.
 
     Raises
     ------
     BlockingIOError
-        When another process holds it, or this one.
+        When another process, or this one, holds the lock.
     """
     place = Path(os.path.realpath(target))
     folder = place.parent / f"{PREFIX}{sha256(os.fsencode(place.name)).hexdigest()[:16]}"
@@ -141,14 +141,14 @@ def lock_of(target: Path) -> tuple[Path, int | None]:
         lock = _taken(folder)
     except BlockingIOError:
         raise
-    except OSError:  # no new folder may be made there, but files may be in that which is there
+    except OSError:  # no folder can be made there, but an existing folder may be writable
         return folder, None
     _mine.add(folder)
     return folder, lock
 
 
 def unlock(folder: Path, lock: int | None) -> None:
-    """Give back what `lock_of` gave."""
+    """Release a lock from `lock_of`."""
     _discard(folder)
     if lock is not None:
         os.close(lock)
@@ -160,7 +160,7 @@ def is_temporary(path: Path) -> bool:
 
 
 def sweep(parent: Path) -> None:
-    """Remove what killed processes left in a folder: what nobody holds the lock of."""
+    """Remove the temporary folders of killed processes from a folder: those that are not locked."""
     for folder in parent.glob(f"{PREFIX}*"):
         try:
             lock = _locked(folder)
@@ -174,21 +174,21 @@ def sweep(parent: Path) -> None:
 
 
 def sweep_system() -> None:
-    """Remove what killed processes left in the folder of the system for temporary files."""
+    """Remove the temporary folders of killed processes from the temporary folder of the system."""
     try:
         sweep(Path(tempfile.gettempdir()))
-    except OSError:  # there is no such folder: nothing is in it
+    except OSError:  # there is no such folder, so nothing to remove
         return
 
 
 def discard_all() -> None:
-    """Remove all temporary folders of this process, wherever its blocks stand."""
+    """Remove all temporary folders of this process, even within their blocks."""
     for folder in list(_mine):
         _discard(folder)
 
 
 def _taken(folder: Path) -> int | None:
-    """Make a folder, and lock it until the descriptor is closed; None where the file system has no locks.
+    """Make a folder, and lock it until the descriptor is closed; None if the file system has no locks.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def _taken(folder: Path) -> int | None:
 
 
 def _stands(folder: Path, lock: int) -> bool:
-    """Whether a folder is still the one that was locked, and not swept or made anew since."""
+    """Whether a folder is still the locked one, not swept or created anew since."""
     try:
         return os.path.samestat(os.fstat(lock), os.stat(folder))
     except FileNotFoundError:
@@ -230,7 +230,7 @@ def _locked(folder: Path) -> int:
     Raises
     ------
     OSError
-        When somebody else holds it, or the file system has no locks.
+        When another process holds it, or the file system has no locks.
     """
     if sys.platform == "win32":
         raise OSError("folders have no locks here")
@@ -244,10 +244,10 @@ def _locked(folder: Path) -> int:
 
 
 def _discard(folder: Path) -> None:
-    """Remove a folder once what was moved aside is back in its place, or replaced."""
+    """Remove a temporary folder after moving the contents of `ASIDE` back, unless they are replaced."""
     try:
         aside = list((folder / ASIDE).glob("*"))
-    except OSError:  # no such folder can be
+    except OSError:  # the path cannot exist
         aside = []
     for held in aside:
         if not (place := folder.parent / held.name).exists():
@@ -260,11 +260,11 @@ def _discard(folder: Path) -> None:
 # Files and folders are written whole or not at all.
 
 _placed = [0]
-_LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for what goes beside
+_LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for added prefixes
 
 
 def require_room(path: Path) -> None:
-    """Refuse a place that cannot be written, before the work begins; put in order what a killed process left there."""
+    """Reject a path that cannot be written, before the work begins, and clean up after killed processes there."""
     parent, length = path.absolute().parent, len(path.name.encode(errors="surrogatepass"))
     if length > _LONGEST_NAME:
         raise OutputError(
@@ -286,12 +286,12 @@ _held: dict[Path, tuple[Path, int | None]] = {}
 
 
 def hold(folder: Path, *, make: bool = False) -> bool:
-    """Refuse a folder that another command writes, and keep it from others until `release`; False if it is held.
+    """Reject a folder that another command writes, and lock it until `release`; False if this process holds it already.
 
     Parameters
     ----------
     make : bool
-        Make the folders above it where there are none.
+        Make missing parent folders.
     """
     place = Path(os.path.realpath(folder))
     if place in _held:
@@ -311,14 +311,14 @@ def hold(folder: Path, *, make: bool = False) -> bool:
 
 
 def release(folder: Path | None = None) -> None:
-    """Let others write a folder; every one, by default."""
+    """Release the lock of a folder; by default of all folders."""
     for place in list(_held) if folder is None else {Path(os.path.realpath(folder))} & _held.keys():
         unlock(*_held.pop(place))
 
 
 @contextmanager
 def sole_writer(folder: Path, *, make: bool = False) -> Iterator[None]:
-    """Hold a folder in a block, see `hold`."""
+    """Lock a folder for a block, see `hold`."""
     new = hold(folder, make=make)
     try:
         yield
@@ -328,12 +328,12 @@ def sole_writer(folder: Path, *, make: bool = False) -> Iterator[None]:
 
 
 def number_placed() -> int:
-    """How many files and folders this process has put in their places, that which it is about to put among them."""
+    """Number of files and folders that this process has written, including the one that it is writing."""
     return _placed[0]
 
 
 def write_whole(path: Path, content: str | bytes) -> None:
-    """Write a file through a temporary neighbour, so that no reader ever sees half of it.
+    """Write a file through a temporary one in the same folder, so that no reader sees a partial file.
 
     Raises
     ------
@@ -354,7 +354,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def made_folder(folder: Path) -> Iterator[None]:
-    """Folder for files of a block, made with those above it; what was made goes again where the block fails.
+    """Folder for files of a block, made with missing parents; these are removed again if the block fails.
 
     Raises
     ------
@@ -367,7 +367,7 @@ def made_folder(folder: Path) -> Iterator[None]:
         yield
     except BaseException as error:
         for place in missing:
-            with suppress(OSError):  # it holds something, or was never made
+            with suppress(OSError):  # it is not empty, or was not made
                 place.rmdir()
         if isinstance(error, OSError) and not isinstance(error, OutputError):
             raise OutputError(f"{folder} cannot be written: {error.strerror}. Choose another folder.") from None
@@ -376,7 +376,7 @@ def made_folder(folder: Path) -> Iterator[None]:
 
 @contextmanager
 def whole_folder(target: Path) -> Iterator[Path]:
-    """Folder to fill that takes its place, and that of an earlier one, when the block ends without an error.
+    """New folder that moves to `target`, replacing an earlier folder, when the block ends without an error.
 
     Raises
     ------
@@ -401,7 +401,7 @@ def whole_folder(target: Path) -> Iterator[Path]:
 
 
 def _require_name(path: Path) -> None:
-    """Refuse what no system can name."""
+    """Reject a path that the system cannot represent."""
     try:
         os.access(path, os.F_OK)
     except ValueError as error:

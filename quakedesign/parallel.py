@@ -1,8 +1,8 @@
 """Executors for independent tasks, worker processes, and handling of interrupts.
 
-Chapters: signals that end a command (exit code of the shell, temporary folders removed); worker processes
-that end with their parent; the choice between this process, local workers and any executor of
-`concurrent.futures`.
+Chapters: background thread; signals that end a command (exit code of the shell, temporary folders removed);
+worker processes that end with their parent; the choice between this process, local workers and any executor
+of `concurrent.futures`.
 """
 
 import atexit
@@ -38,12 +38,12 @@ from quakedesign.files import discard_all, number_placed, sweep_system
 from quakedesign.text import one_line
 
 _Result = TypeVar("_Result")
-_SWITCH = 2e-4  # seconds after which threads take turns while one runs in the background
-_PATIENT = 0.2  # seconds between two reports of progress
+_SWITCH = 2e-4  # switch interval of threads [s] while one runs in the background
+_PATIENT = 0.2  # time between two reports of progress [s]
 
 
 class Background:
-    """One thread beside the caller's, for runs: compiled steps and the C compiler need no interpreter lock."""
+    """A second thread for runs: compiled steps and the C compiler need no interpreter lock."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
@@ -51,21 +51,21 @@ class Background:
         self._done = 0.0
 
     def _report(self, done: float) -> None:
-        """Progress of the thread, which ends here when the caller does not wait any longer."""
+        """Report the progress of the thread; ends the thread here if the caller no longer waits."""
         if self._stopped:
             raise SimulationError("the run was stopped.")
         self._done = done
 
     def stop(self) -> None:
-        """End the present run early."""
+        """End the current run early."""
         self._stopped = True
 
     def submit(self, run: Callable[..., _Result], *given: Any, **named: Any) -> "Future[_Result]":
-        """Begin a run, after those before it; it takes ``progress``."""
+        """Queue a run; it takes ``progress``."""
         return self._executor.submit(run, *given, **named, progress=self._report)
 
     def result(self, run: "Future[_Result]", tell: Callable[[float], None]) -> _Result:
-        """Wait for a run, with its progress."""
+        """Wait for a run, reporting its progress."""
         while not run.done():
             tell(self._done)
             wait([run], timeout=_PATIENT)
@@ -74,7 +74,7 @@ class Background:
 
 @contextmanager
 def in_background() -> Iterator[Background]:
-    """Runs beside the caller's work, in the order in which they are submitted; all are ended when the block ends."""
+    """Runs in parallel to the caller's work, in the order of submission; all end with the block."""
     interval = sys.getswitchinterval()
     executor = ThreadPoolExecutor(1)
     background = Background(executor)
@@ -88,24 +88,24 @@ def in_background() -> Iterator[Background]:
 
 
 # ----------------------------------------------------------------------
-# Signals that end a command: one line, the exit code of the shell, no process and no temporary folder left.
+# Signals that end a command: one line of output, exit code of the shell, no process or temporary folder left.
 
 _NAMES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 SIGNALS = {getattr(signal, name): said for name, said in _NAMES.items() if hasattr(signal, name)}
 """What is said of each; SIGHUP is not everywhere."""
-PATIENCE = 3.0  # seconds: what a library has swallowed, or does not return from, is not waited for any longer
+PATIENCE = 3.0  # longest wait [s] for a library that swallows the signal or does not return
 
 
 class Interruption(KeyboardInterrupt):
-    """A signal asks for the end.
+    """Exception raised by a signal that ends the command.
 
-    After a plain `KeyboardInterrupt` that has gone through ``exec`` of a text, as in generated classes, Python dies of
-    SIGINT when it ends, whatever the exit code.
+    After a plain `KeyboardInterrupt` inside ``exec`` of a text, as in generated classes, Python ends itself with
+    SIGINT, whatever the exit code.
     """
 
 
 class _Ending:
-    """What is known of the end of a command."""
+    """State of the ending of a command."""
 
     def __init__(self, last: bool) -> None:
         self._last = last
@@ -117,7 +117,7 @@ class _Ending:
         self.reported = sys.unraisablehook
 
     def receive(self, number: int, _frame: FrameType | None) -> None:
-        """Handle the first signal; further ones do not disturb the end."""
+        """Handle the first signal; ignore further ones."""
         if self._number is None:
             self._number, self._waits = number, self._held
             if not self._held:
@@ -125,7 +125,7 @@ class _Ending:
 
     @contextmanager
     def held_back(self) -> Iterator[None]:
-        """Raise what arrives in the block at its end; Python handles signals that any of its threads has received."""
+        """Delay the interruption by a signal to the end of the block; Python handles signals received by any thread."""
         self._held = True
         try:
             yield
@@ -135,7 +135,7 @@ class _Ending:
                 raise Interruption
 
     def watch(self, reader: int) -> None:
-        """End the process where it has not ended by itself some time after a signal."""
+        """End the process if it has not ended by itself within `PATIENCE` after a signal."""
         number, end = None, None
         while select.select([reader], [], [], None if end is None else max(0.0, end - monotonic()))[0]:
             if not (received := os.read(reader, 1)):
@@ -147,14 +147,14 @@ class _Ending:
         os._exit(self._conclude())
 
     def not_raised(self, what: Any) -> None:
-        """End the process where Python can only report the interruption, as in a finaliser, and would go on."""
+        """End the process where Python would only report the interruption and continue, as in a finaliser."""
         if isinstance(what.exc_value, Interruption):
             os._exit(self._conclude())
         self.reported(what)
 
     @contextmanager
     def concluded(self) -> Iterator[None]:
-        """Whatever arrives here after a signal is its doing: libraries make other exceptions of it."""
+        """Treat every exception after a signal as its consequence: libraries convert it to other exceptions."""
         try:
             yield
         except BaseException as error:
@@ -166,7 +166,7 @@ class _Ending:
             raise SystemExit(code) from None
 
     def _conclude(self) -> int:
-        """Leave no process and no temporary folder behind, say so once, and return the exit code."""
+        """End all processes, remove temporary folders, report the interruption once, and return the exit code."""
         processes: Any = sys.modules.get("multiprocessing")
         for child in processes.active_children() if processes else ():
             child.kill()
@@ -183,14 +183,14 @@ _ending: _Ending | None = None
 
 
 def remedy(text: str) -> None:
-    """Say this, instead of whether anything was written, if the command is interrupted from now on."""
+    """Set the text printed at an interruption, in place of the statement whether anything was written."""
     if _ending is not None:
         _ending.remedy = text
 
 
 @contextmanager
 def undisturbed() -> Iterator[None]:
-    """Signals wait until the block has ended; the processes that it starts inherit that."""
+    """Delay signals until the block has ended; processes started in it inherit the signal mask."""
     blocks = hasattr(signal, "pthread_sigmask")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS) if blocks else ()
     try:
@@ -205,14 +205,14 @@ def undisturbed() -> Iterator[None]:
 def ending(*, process: bool = False) -> Iterator[None]:
     """Turn the signals of `SIGNALS`, unless they are ignored, into one line and `SystemExit` with 128 + signal.
 
-    They raise `Interruption` in the block, so that it can put things in order. Whatever becomes of that, the
-    command ends as was asked; what has not ended within `PATIENCE` is ended. A block in another one leaves them to it.
+    They raise `Interruption` in the block, so that it can clean up. The command then ends in any case, at the latest
+    after `PATIENCE`. An inner block leaves the signals to the outer one.
 
     Parameters
     ----------
     process : bool
-        The process ends with the block: what comes later is too late to interrupt it, and is ignored. After a signal
-        it ends at once, without taking apart all that it has loaded, which takes seconds on a busy machine.
+        The process ends with the block: later signals are ignored. After a signal it ends at once, without the
+        interpreter's shutdown, which takes seconds on a busy machine.
     """
     global _ending
     if _ending is not None:
@@ -230,7 +230,7 @@ def ending(*, process: bool = False) -> Iterator[None]:
 
 @contextmanager
 def _received(by: _Ending, last: bool) -> Iterator[None]:
-    """Signals are received, and a thread sees them too while the main one is busy with foreign code."""
+    """Install the handlers; a second thread also sees signals while the main one runs foreign code."""
     if current_thread() is not main_thread():
         yield
         return
@@ -254,14 +254,14 @@ def _received(by: _Ending, last: bool) -> Iterator[None]:
 
 
 def leave(code: str | int | None, *, whatever: bool = False) -> None:
-    """End the process once what is registered for its end is done, without taking apart all that it has loaded.
+    """End the process after the registered exit functions, without the interpreter's shutdown.
 
     Parameters
     ----------
     code : str or int or None
-        As `SystemExit` has it; with a text the process does not end here.
+        As in `SystemExit`; with a text the process does not end here.
     whatever : bool
-        Also where nobody reads what has been said; unless given, the process does not end here then.
+        End here even if the output can no longer be written; otherwise return in this case.
     """
     if isinstance(code, str):
         return
@@ -278,12 +278,12 @@ def leave(code: str | int | None, *, whatever: bool = False) -> None:
 def _say(line: str) -> None:
     try:
         print(line, file=sys.stderr, flush=True)
-    except (OSError, ValueError):  # the terminal is gone
+    except (OSError, ValueError):  # the terminal is closed
         return
 
 
 # ----------------------------------------------------------------------
-# Processes that compute beside this one, and end when it does: at once, and however it ends.
+# Worker processes, which end at once when this process ends, however it ends.
 
 _LIVES = 3
 _PR_SET_PDEATHSIG = 1
@@ -295,7 +295,7 @@ class Crew(ABC):
     @property
     @abstractmethod
     def width(self) -> int:
-        """Number of tasks that are worth having under way at once."""
+        """Useful number of simultaneous tasks."""
 
     @abstractmethod
     def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
@@ -303,25 +303,25 @@ class Crew(ABC):
 
     @abstractmethod
     def renew(self) -> None:
-        """Replace workers that are dead.
+        """Replace dead workers.
 
         Raises
         ------
         SimulationError
-            When that is not possible.
+            When this is not possible.
         """
 
     def shared(self, value: Any) -> Any:
-        """Argument that stands for a value which many tasks take, so that it travels once where it has to travel."""
+        """Argument in place of a value that many tasks use, so that it is sent to the workers only once."""
         return value
 
     def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
-        """Answers to many arguments, each with their place in the sequence, in any order.
+        """Results of a task for many arguments, each with the index of its arguments, in any order.
 
         Raises
         ------
         SimulationError
-            When workers die again and again; those that were killed from outside are replaced.
+            When workers die repeatedly; workers killed from outside are replaced.
         """
         waiting = dict(enumerate(arguments))
         for _ in range(_LIVES):
@@ -347,15 +347,15 @@ class Crew(ABC):
 
 
 class Processes(Crew):
-    """A pool of processes on this machine, each started afresh; it is filled again after a death.
+    """A pool of newly started processes on this machine, which is restored after a process has died.
 
-    An error in the block, an interruption among them, ends the processes at once. So does the death of this process:
-    a thread of theirs waits for it, and on Linux the kernel sees to it while they are in foreign code.
+    An error in the block, including an interruption, ends the processes at once. So does the death of this process:
+    a thread in each of them waits for it, and on Linux the kernel ends them even in foreign code.
 
     Parameters
     ----------
     count : int or None
-        One process per core that this process may use, unless given.
+        Number of processes; by default one per core that this process may use.
     begin : callable, optional
         Called in every process before its first task, with `arguments`.
     """
@@ -364,7 +364,7 @@ class Processes(Crew):
         self, count: int | None = None, begin: Callable[..., object] | None = None, arguments: tuple[Any, ...] = ()
     ) -> None:
         self._count = cores() if count is None else require_workers(count)
-        self._begin = pickle.dumps((begin, arguments))  # whose modules take seconds to import
+        self._begin = pickle.dumps((begin, arguments))  # importing its modules takes seconds
         self._pool = self._filled()
 
     def _filled(self) -> ProcessPoolExecutor:
@@ -377,10 +377,10 @@ class Processes(Crew):
 
     def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """See `Crew.submit`."""
-        with undisturbed():  # no process starts that is not known
+        with undisturbed():  # so that every started process is registered
             try:
                 return self._pool.submit(task, *arguments)
-            except (OSError, ValueError) as error:  # a death closed the pipes of the process that was to start
+            except (OSError, ValueError) as error:  # the death of a process closed the pipes of the starting one
                 raise BrokenProcessPool("a process of the pool died while another was started") from error
 
     def renew(self) -> None:
@@ -407,13 +407,13 @@ def cores() -> int:
 
 
 def require_workers(count: int) -> int:
-    """Refuse a number of workers that is none."""
+    """Return a number of workers, or raise `ParameterError` if it is no positive whole number."""
     require_whole(1, workers=count)
     return count
 
 
 def _enlist(packed: bytes) -> None:
-    """Prepare a process of a pool: the parent handles Ctrl-C, and nobody survives it, even while modules load."""
+    """Prepare a process of a pool: the parent handles Ctrl-C, and the process ends with it, even during imports."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
     if sys.platform == "linux":
@@ -434,16 +434,16 @@ def _follow_parent() -> None:
 
 
 # ----------------------------------------------------------------------
-# Who computes many tasks: this process, others of this machine, a cluster, any executor of `concurrent.futures`.
+# Executors of many tasks: this process, other processes of this machine, a cluster, any `concurrent.futures` executor.
 
 _PATIENCE = "10s"
 
 
 class SerialExecutor(Executor):
-    """Runs everything at once in the calling process."""
+    """Runs every task immediately in the calling process."""
 
     def submit(self, task: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
-        """Future that is done already."""
+        """Completed future."""
         future: Future[Any] = Future()
         try:
             future.set_result(task(*arguments, **named))
@@ -453,7 +453,7 @@ class SerialExecutor(Executor):
 
 
 class Here(Crew):
-    """The process that asks: one task after the other, each when its answer is wanted."""
+    """The calling process: one task after the other, each when its result is requested."""
 
     @property
     def width(self) -> int:
@@ -465,7 +465,7 @@ class Here(Crew):
         return SerialExecutor().submit(task, *arguments)
 
     def renew(self) -> None:
-        """See `Crew.renew`: nobody dies."""
+        """See `Crew.renew`: no worker dies."""
 
     def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
         """See `Crew.answers`."""
@@ -473,12 +473,12 @@ class Here(Crew):
 
 
 class Given(Crew):
-    """An executor of the user's, who opens and closes it.
+    """A user-defined executor, which the user opens and closes.
 
     Parameters
     ----------
     width : int or None
-        One batch per core, unless given.
+        Number of simultaneous tasks; by default one per core.
     """
 
     def __init__(self, executor: Executor, width: int | None = None) -> None:
@@ -504,7 +504,7 @@ class Given(Crew):
 
 @dataclass
 class _Sent:
-    """A value, and the future of dask.distributed that stands for it on the workers."""
+    """A value, and the dask.distributed future that represents it on the workers."""
 
     value: Any
     place: Any
@@ -516,7 +516,7 @@ class Cluster(Given):
     Parameters
     ----------
     address : str
-        Of the scheduler, such as ``tcp://host:8786``. Its workers need quakedesign, in the same version.
+        Address of the scheduler, such as ``tcp://host:8786``. Its workers need the same version of quakedesign.
 
     Raises
     ------
@@ -550,7 +550,7 @@ class Cluster(Given):
         super().__init__(self._client.get_executor(pure=False))
 
     def shared(self, value: Any) -> Any:
-        """See `Crew.shared`: the workers hand it on among themselves."""
+        """See `Crew.shared`: the workers distribute the value among themselves."""
         return _Sent(value, self._client.scatter(value, broadcast=True, hash=False))
 
     def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
@@ -558,14 +558,14 @@ class Cluster(Given):
         return super().submit(task, *(self._there(given) if isinstance(given, _Sent) else given for given in arguments))
 
     def _there(self, sent: "_Sent") -> Any:
-        """What stands for a value, sent again if all workers that had it are gone."""
+        """Future of a value, sent again if no worker has it any more."""
         if sent.place.status not in ("finished", "pending"):
             sent.place = self._client.scatter(sent.value, broadcast=True, hash=False)
         return sent.place
 
     @property
     def width(self) -> int:
-        """Twice the number of threads that the cluster has now, so that none waits for the next batch."""
+        """Twice the current number of threads of the cluster, so that none waits for the next batch."""
         return 2 * max(1, int(sum(self._client.nthreads().values())))
 
     def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
@@ -592,14 +592,14 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
     Parameters
     ----------
     workers : int or None
-        Number of processes, or of tasks that an executor is given at once; one per core where it is None.
+        Number of processes, or of simultaneous tasks of an executor; one per core if None.
     scheduler : str, optional
-        Address of one of dask.distributed.
+        Address of a dask.distributed scheduler.
 
     Raises
     ------
     ParameterError
-        For a scheduler and an executor, or no number of workers.
+        For both a scheduler and an executor, or an invalid number of workers.
     SimulationError
         When the scheduler cannot be reached.
     """
@@ -611,5 +611,5 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
 
 
 def crew_or_here(workers: int, scheduler: str | None = None, executor: Executor | None = None) -> Crew:
-    """As `crew_of`, but for one worker this process."""
+    """As `crew_of`, but this process for one worker."""
     return Here() if workers == 1 and not (scheduler or executor) else crew_of(workers, scheduler, executor)

@@ -11,15 +11,15 @@ if sys.platform != "win32":
 
 LACKS_MEMORY = 4
 """Exit code of a command that ran out of memory: nothing is said about its question."""
-_NARROWEST, _WIDEST = 20, 1000  # columns; tables of help never end below 3, and fill the memory with blanks
+_NARROWEST, _WIDEST = 20, 1000  # columns; help tables never end below 3, and huge ones fill the memory with blanks
 _LEAST = 600 * 2**20  # bytes of address space
 _SAID = ("cannot allocate memory", "failed to map", "out of memory", "can't start new thread", "std::bad_alloc")
 
 
 def open_all() -> None:
-    """Streams that were closed: nothing is read or told there, and what is written on stdout is an error.
+    """Replace closed standard streams by null streams; writing to a closed stdout is an error.
 
-    Without it the next file that is opened takes their place.
+    Otherwise the next opened file would get their descriptors.
     """
     for number, name, mode in ((0, "stdin", os.O_RDONLY), (1, "stdout", os.O_RDONLY), (2, "stderr", os.O_WRONLY)):
         if getattr(sys, name) is None:
@@ -32,14 +32,14 @@ def open_all() -> None:
 
 
 class _Closed(io.TextIOBase):
-    """What was closed when the process began."""
+    """Stream that was closed at the start of the process."""
 
     def write(self, _text: str) -> int:
         raise OSError(errno.EBADF, "it is closed", "stdout")
 
 
 def widen() -> None:
-    """Take a terminal or ``COLUMNS`` of a width in which help can be laid out."""
+    """Limit the width of the terminal or ``COLUMNS`` to values for which help can be laid out."""
     given = os.environ.get("COLUMNS", "")
     if given.isascii() and given.isdecimal():
         columns = int(given[:9])
@@ -54,7 +54,7 @@ def widen() -> None:
 
 
 def has_room() -> bool:
-    """Whether the process may have what the libraries take when they load: OpenBLAS ends it with 1 otherwise."""
+    """Whether the memory limit suffices to load the libraries: OpenBLAS otherwise ends the process with exit code 1."""
     if sys.platform == "win32":
         return True
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
@@ -62,13 +62,13 @@ def has_room() -> bool:
 
 
 def lack_memory() -> NoReturn:
-    """End a command for which there is too little memory."""
+    """End a command that has too little memory."""
     print("quakedesign: out of memory. Raise the limit, or make the problem smaller.", file=sys.stderr)
     sys.exit(LACKS_MEMORY)
 
 
 def lacks_memory(error: BaseException | None) -> bool:
-    """Whether an error came of too little memory: libraries say so in words of their own, and while they load."""
+    """Whether an error was caused by too little memory; libraries report this in different ways, even during import."""
     while error is not None:
         number = getattr(error, "errno", None)
         if (

@@ -9,11 +9,11 @@ from math import floor, log10
 from unicodedata import category
 
 _OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible formats, half characters, line separators
-_LONG = 8  # letters of a name that others go on from
+_LONG = 8  # least length of a name that may be the beginning of a longer one
 _LONGEST_WORD = 200
 _LONGEST_MESSAGE = 2000
 _LONGEST_LINE = 200
-_STRENGTH = ",:;."  # of what divides a sentence, the last most
+_STRENGTH = ",:;."  # punctuation marks, in increasing strength
 _TIMES = (31_557_600.0, "years"), (86_400.0, "days"), (3600.0, "hours")
 _MARKS = re.compile(r"[(\[)\]]|[,:;.] ")
 
@@ -26,16 +26,16 @@ def visible(text: str) -> str:
 
 
 def one_line(message: str) -> str:
-    """Message in one visible line; long words, such as paths, and long messages lose their middle."""
+    """Message in one visible line; the middle of long words, such as paths, and of long messages is cut out."""
     short = re.sub(rf"\S{{{_LONGEST_WORD + 1},}}", lambda word: _shortened(word[0], _LONGEST_WORD), message)
     return _shortened(visible(" ".join(short.split())), _LONGEST_MESSAGE)
 
 
 def in_lines(text: str) -> list[str]:
-    """Text in lines of at most 200 characters, each ended behind what divides it most in its last two thirds.
+    """Text in lines of at most 200 characters, each broken after the strongest mark in its last two thirds.
 
-    That is a full stop, semicolon, colon or comma outside of brackets. Nothing is cut: where there is none, a line is
-    as long as it takes.
+    Marks are a full stop, semicolon, colon or comma outside brackets. No text is cut: without a mark a line is
+    longer.
     """
     lines, begin = [], 0
     ends = _divisions(text) if len(text) > _LONGEST_LINE else []
@@ -50,7 +50,7 @@ def in_lines(text: str) -> list[str]:
 
 
 def _divisions(text: str) -> list[tuple[int, int]]:
-    """Places behind the marks of a text that stand outside of brackets, and how much each divides."""
+    """Positions after the punctuation marks of a text outside brackets, and the strength of each mark."""
     divisions, depth = [], 0
     for mark in _MARKS.finditer(text):
         depth += (mark[0] in "([") - (mark[0] in ")]")
@@ -64,10 +64,10 @@ def _place(division: tuple[int, int]) -> int:
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:
-    """Question whether the nearest known name is meant, to be put at the end of a message; nothing if none is near.
+    """Question at the end of a message whether the nearest known name is meant; empty if none is near.
 
-    Capitals do not matter; of names that are equally near, the one that begins alike is asked for, and the first by
-    the alphabet of those that go on where a long one ends.
+    Case is ignored. Of equally near names the one with the longest common beginning is chosen; for a long name that is
+    the beginning of others, the first of these in alphabetical order.
     """
     written = name[:_LONGEST_WORD].lower()
     spelt = {each.lower(): each for each in known}
@@ -82,7 +82,7 @@ def nearest_name(name: str, known: Iterable[str]) -> str:
 
 
 def shown(value: object) -> str:
-    """Python's text for a received value, short, even of one that has none or too many digits."""
+    """Short `repr` of a received value, even if its `repr` fails or has too many digits."""
     try:
         return _shortened(repr(value), _LONGEST_WORD)
     except Exception:
@@ -90,25 +90,25 @@ def shown(value: object) -> str:
 
 
 def _shortened(text: str, length: int) -> str:
-    """Beginning and end of a text."""
+    """Beginning and end of a long text, with its length."""
     half = length // 2 - 12
     return text if len(text) <= length else f"{text[:half]}…({len(text)} characters)…{text[-half:]}"
 
 
 def lasting(seconds: float, digits: int = 4) -> str:
-    """A time in seconds, and in years, days or hours where it lasts two of them or more."""
+    """A time in seconds, and also in years, days or hours from two of them on."""
     short = duration(seconds)
     return f"{seconds:.{digits}g} s" + ("" if short.endswith(" s") else f" ({short})")
 
 
 def duration(seconds: float) -> str:
-    """A time in years, days or hours where it lasts two of them or more, else in seconds."""
+    """A time in years, days or hours from two of them on, else in seconds."""
     size, name = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), (1.0, "s"))
     return f"{plain(seconds / size)} {name}"
 
 
 # ----------------------------------------------------------------------
-# Measured numbers for people; those of bounds are rounded outward by `quakedesign.exact.Bound`.
+# Measured numbers as text; `quakedesign.exact.Bound` rounds bounds outward.
 
 PREFIXES = {3 * i - 18: prefix for i, prefix in enumerate("a f p n µ m  k M G T P E".split(" "))}
 
@@ -132,5 +132,5 @@ def plain(value: float, digits: int = 3) -> str:
 
 
 def counted(number: int, thing: str) -> str:
-    """A number of things, as ``1 well`` or ``2 wells``."""
+    """A number of things, such as ``1 well`` or ``2 wells``."""
     return f"{number} {thing}{'s' * (number != 1)}"

@@ -41,12 +41,12 @@ _PLACES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, e
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit with its code; every refusal is one line on stderr and exit code 2."""
+    """Run the command line and exit with its code; every input error is one line on stderr and exit code 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     if arguments is None and not sys.warnoptions:
-        # Keep warnings of libraries from users, in workers too; ``python -W default -m quakedesign`` shows them.
+        # Hide warnings of libraries, also in workers; ``python -W default -m quakedesign`` shows them.
         warnings.simplefilter("ignore")
         os.environ.setdefault("PYTHONWARNINGS", "ignore")
     try:
@@ -77,7 +77,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _with_help(error: CycloptsError) -> str:
-    """What is wrong with a command line; where to look, unless a value is wrong, whose message says what would do."""
+    """Error message of a command line, with a pointer to the help unless it is about a value and states a remedy."""
     if isinstance(error, CoercionError):
         return str(error)
     hyphen = " A value that begins with - is joined by =." if isinstance(error, MissingArgumentError) else ""

@@ -1,4 +1,4 @@
-"""Application, output and progress that all commands share."""
+"""Application, output and progress bar of all commands."""
 
 import json
 import logging
@@ -28,14 +28,14 @@ _typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
 
 
 def typed(arguments: Sequence[str]) -> None:
-    """Keep what was typed, for `command_line`; speak until `hush` is called, and run no code that files name."""
+    """Store the typed command for `command_line`; enable output until `hush`, and forbid code named by files."""
     _typed.set(tuple(arguments))
     allow_code(False)
     hush(quiet=False, level="warning")
 
 
 def hush(*, quiet: bool, level: str) -> None:
-    """Say nothing for people from here on, or say what is being done on stderr, from a level of logging on."""
+    """Switch off text output if `quiet`, and log on stderr from a logging level on."""
     _quiet.set(quiet)
     for handler in _log.handlers[:]:
         _log.removeHandler(handler)
@@ -47,7 +47,7 @@ def hush(*, quiet: bool, level: str) -> None:
 
 
 def command_line() -> str:
-    """Command that runs, as it was typed; empty outside one."""
+    """Running command as typed; empty outside a command."""
     return shlex.join(("quakedesign", *_typed.get())) if _typed.get() else ""
 
 
@@ -69,33 +69,33 @@ app.version = _version
 
 
 def specified(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options that were given."""
+    """Given options, those that are not None."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def refuse(options: Mapping[str, Any], what: str) -> None:
-    """Refuse options that belong to something else, if any is given."""
+    """Reject given options that cannot be combined with `what`."""
     if names := list(specified(options)):
         raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Omit {', '.join(names)}.")
 
 
 def print_json(value: dict[str, Any]) -> None:
-    """Print an answer as JSON on stdout."""
+    """Print a result as JSON on stdout."""
     print(json.dumps(value, indent=1, allow_nan=False))
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Print an answer in words on stdout."""
+    """Print a result as text on stdout."""
     screen = console()
     for line in lines:
         screen.print(line)
 
 
 class _Screen(Console):
-    """Console on which a string is text: no markup, no emoji, nothing that a terminal would obey, no endless line."""
+    """Console that prints strings as plain text: no markup, no emoji, no control characters, no endless line."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Lines that are wider than a terminal go on below their beginning; files and pipes get them whole."""
+        """Print lines, wrapped with a hanging indent on a terminal and whole to files and pipes."""
         if self.is_terminal:
             objects = tuple(self._wrapped(text) if isinstance(text, str) else text for text in objects)
         super().print(*objects, **options)
@@ -110,22 +110,22 @@ class _Screen(Console):
 
 
 def _hanging(text: str) -> str:
-    """Margin of what goes on below a line."""
+    """Hanging indent of a wrapped line."""
     return " " * (len(text) - len(text.lstrip(" ")) + 2)
 
 
 def console(**options: Any) -> Console:
-    """Console for people, on stdout by default; every string is one line of text, a long one several."""
+    """Console for text, on stdout by default; every string is one line, a long one several."""
     return _Screen(quiet=_quiet.get(), markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
 
 
 def new_file(path: Path | None, what: str, *, force: bool) -> None:
-    """Refuse an existing file before the work begins.
+    """Reject an existing file before the work begins.
 
     Raises
     ------
     OutputError
-        When it exists and force is not given, or cannot be written.
+        When the file exists without `force`, or cannot be written.
     """
     if path is None:
         return
@@ -137,7 +137,7 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
 
 
 def require_different(places: Mapping[str, Path | None]) -> None:
-    """Refuse two names for one place, so that what is read is not replaced."""
+    """Reject two names of one file, so that no input file is overwritten."""
     named = {name: os.path.realpath(path) for name, path in places.items() if path is not None}
     for one, other in combinations(named, 2):
         if named[one] == named[other]:
@@ -148,7 +148,7 @@ def require_different(places: Mapping[str, Path | None]) -> None:
 
 @contextmanager
 def progress() -> Iterator[Callable[[str, float], None]]:
-    """Progress bar on stderr, which leaves stdout to the answer."""
+    """Progress bar on stderr; stdout is for the result only."""
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = TextColumn("{task.description:44}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()

@@ -1,4 +1,4 @@
-"""Commands about one fault, for files of several blocks."""
+"""Commands about one fault, for fault files with several blocks."""
 
 import os
 from collections.abc import Collection
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 def several_blocks(
     fault: str, command: Any, options: dict[str, Any], accepted: Collection[str] = (), box: str | None = None
 ) -> "BlockChain | None":
-    """The blocks of a fault file; None for one without, and for names that are no file.
+    """The blocks of a fault file; None for a file without blocks, and for names that are no file.
 
     Raises
     ------
     ParameterError
-        For options that a fault of several blocks does not have.
+        For options that do not apply to a fault of several blocks.
     """
     from quakedesign.fault import load_chain, with_accepted_fit
 
@@ -58,12 +58,12 @@ def several_blocks(
 
 
 def chain_at_step(chain: "BlockChain", setup: LoopSetup) -> "BlockChain":
-    """The blocks with T_s of a loop setup, if it has one."""
+    """The blocks, with T_s of a loop setup if given."""
     return replace(chain, fault=setup.at_step(chain.fault)[0])
 
 
 def _scope(proof: Any, chain: "BlockChain") -> list[str]:
-    """What a statement about blocks depends on, and what its words mean."""
+    """Conditions of a statement about blocks, and its terms."""
     from quakedesign.studies.several_blocks import farthest_balance
 
     meant = "the load of a pressure is the pressure that balances the blocks on the reference"
@@ -92,7 +92,7 @@ def _values(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | 
 
 
 def _lines(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> list[str]:
-    """What is proved and what it depends on, with a run if there is one; else why nothing is proved."""
+    """Guarantee and its conditions, with a run if there is one; else the reason why nothing is proved."""
     if proof.proved:
         conditions = [*proof.statement(), *_scope(proof, chain)]
         return conditions if one is None else one.screen(conditions)
@@ -123,7 +123,7 @@ def block_law(named: str, usual: str, certificate: Path | None = None) -> str:
     Raises
     ------
     ParameterError
-        For a kind beside a certificate, which has its own.
+        For a kind together with a certificate, which has its own.
     UnknownNameError
     """
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
@@ -174,7 +174,7 @@ _HEADS = ("law", "proved", "", "in the run", "", "pressure", "")
 
 
 def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any], output: Output) -> int:
-    """The command `compare`: laws whose wells know all measurements, or their own alone."""
+    """The command `compare`: laws whose wells use all measurements, or only their own."""
     from quakedesign.studies.several_blocks import run_of_chain, run_sliding_chain
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
@@ -226,7 +226,7 @@ def _run_values(one: "ChainRun | SlidingChainRun") -> dict[str, Any]:
 def export_chain(
     chain: "BlockChain", law: "LawOptions", fmu: bool, out: Path | None, force: bool, output: Output
 ) -> int:
-    """The command `export`: the law that is designed, or that of a certificate, where something is proved of it."""
+    """The command `export`: the designed law, or that of a certificate, if it has a guarantee."""
     from quakedesign.report.plain_text import export_lines
     from quakedesign.simulation.export import FILES, block_step, require_free, write_step
     from quakedesign.studies.several_blocks import chain_law

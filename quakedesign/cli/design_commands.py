@@ -95,7 +95,7 @@ class DesignOptions(WellOptions):
     accept_poor_fit: Annotated[bool, Parameter(negative="")] = False
 
     def problem(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
-        """Fault of a name, and the arguments of `designed_comparison`; checked before anything heavy is loaded."""
+        """Fault of a name, and the arguments of `designed_comparison`; checked before heavy libraries load."""
         from quakedesign.fault import load_fault, with_accepted_fit
 
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
@@ -103,7 +103,7 @@ class DesignOptions(WellOptions):
         entered = vars(self)["diffusion"]
         if entered is not None and not rational(entered, "diffusion"):
             loaded.friction.require(no_diffusion=entered)
-        behind = bool(self.setup().path)  # a delay, a lag or rock, for which the e-LQR alone is designed
+        behind = bool(self.setup().path)  # a delay, a lag or a diffusion path, for which only the e-LQR is designed
         laws = "elqr" if behind and self.controller == "all" else self._laws
         names = controllers(laws, loaded)
         loaded.friction.require(plant=self.plant)
@@ -118,7 +118,7 @@ class DesignOptions(WellOptions):
         Raises
         ------
         ParameterError
-            For a scheme of designs that have their own.
+            For a scheme if the designs have their own.
         """
         if self.scheme is not None and not self.continuous:
             raise ParameterError(
@@ -130,12 +130,12 @@ class DesignOptions(WellOptions):
 
     @property
     def sliding(self) -> dict[str, Any]:
-        """Lag and stress of several blocks in slow sliding."""
+        """Lag and stress for several blocks in slow sliding."""
         return {"lag": self.setup().lag, "stress": None if self.stress is None else rational(self.stress)}
 
     @property
     def _laws(self) -> str:
-        """Requested laws; with the slip alone measured the only one available."""
+        """Requested laws; with the slip alone, the only law that exists."""
         if self.measured != "slip" or self.controller == "elqr":
             return self.controller
         if self.controller != "all":
@@ -222,9 +222,9 @@ def controllers(name: str, fault: "Fault | None" = None) -> list[str]:
 
 
 def positive(comparison: Any) -> bool:
-    """Whether every design is proved and its premises hold but for those on run and start, and its run is harmless.
+    """Whether every design is proved, its premises except those on run and start hold, and its run is harmless.
 
-    A design that was to run with a guarantee and found none is not.
+    False for a design without the guarantee of its sampled loop.
     """
     needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
     return all(
@@ -237,7 +237,7 @@ def positive(comparison: Any) -> bool:
 
 
 # ----------------------------------------------------------------------
-# Commands that show all controllers of a fault side by side: in a table, and in the figures of the paper.
+# Commands that compare all controllers of a fault: in a table, and in the figures of the paper.
 
 _FIGURES_AS_USUAL = DesignOptions()
 

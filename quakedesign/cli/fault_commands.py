@@ -16,7 +16,7 @@ from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Gains, Output,
 from quakedesign.errors import UnknownNameError, require_known
 
 # ----------------------------------------------------------------------
-# Commands about the fault itself: what it is, its equations, its scaling, the paper's errata.
+# Commands about the fault itself: its data, its equations, its scaling, the paper's errata.
 
 
 @app.command

@@ -111,7 +111,7 @@ def _sampled(
     law: str, fault: str | None, lipschitz: str | None, gain_range: tuple[str, str] | None, degree: tuple[int, ...],
     options: Mapping[str, Any],
 ) -> tuple["Synthesis | None", dict[str, Any]]:  # fmt: skip
-    """Gains whose sampled run errs least, and how they were tried."""
+    """Gains with the smallest error in a sampled run, and the settings of these runs."""
     from quakedesign.fault import load_fault
     from quakedesign.synthesis.simulated_error import sampling, synthesise_sampled
 

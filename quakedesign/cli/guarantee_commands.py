@@ -37,7 +37,7 @@ from quakedesign.exact import rational
 from quakedesign.files import hold, made_folder, require_room
 
 # ----------------------------------------------------------------------
-# The command about the loop that runs.
+# The command about the sampled loop.
 
 
 _IDEAL = SetupOptions()
@@ -158,7 +158,7 @@ def _proved(result: Any) -> bool:
 
 
 def _first(fault: Any, result: Any) -> Iterator[str]:
-    """The guarantee beside the natural earthquake, and a blank line; nothing without a proof."""
+    """The guarantee relative to the natural earthquake, and a blank line; empty without a proof."""
     if not _proved(result):
         return
     from textwrap import wrap
@@ -168,7 +168,7 @@ def _first(fault: Any, result: Any) -> Iterator[str]:
 
     try:
         peak = natural_peak(fault)
-    except (ParameterError, SimulationError):  # of friction with a state, or whose earthquake cannot be computed
+    except (ParameterError, SimulationError):  # friction with a state, or an earthquake that cannot be computed
         peak = None
     yield from wrap(f"{guaranteed_sentence(f'{fault.name}: guaranteed', result.proof, peak, fault.magnitude)}.", 80)
     yield ""
@@ -179,7 +179,7 @@ def _lines(result: Any) -> list[str]:
 
 
 def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | None]:
-    """Files of certificates, one a fault, refused early where they cannot be written."""
+    """Certificate files, one a fault, rejected early if they cannot be written."""
     again = next((name for name in names if names.count(name) > 1), None)
     if again is not None:
         raise ParameterError(f"faults must have different names. Received {again} twice. Rename one of them.")
@@ -197,7 +197,7 @@ def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | No
 
 
 def _values(result: Any, path: Path | None) -> dict[str, Any]:
-    """Answer as JSON, and its file written if there is a proof."""
+    """Result as JSON; its file is written if there is a proof."""
     from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 
     if isinstance(result, QuakedesignError):

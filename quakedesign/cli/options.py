@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# Values of options as they are typed: numbers with units, exact numbers, whole ones, gains.
+# Values of options: numbers with units, exact numbers, whole numbers, gains.
 
-# Negative decimals are values anyhow; with leading hyphens allowed, options after the values would be values too.
+# Negative decimals are values in any case; allowing leading hyphens would make values of the following options.
 Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
 
 def _gains(_type: Any, tokens: Sequence[Any]) -> tuple[str, ...]:
-    """One word, or numbers as they are written."""
+    """One word, or numbers as typed."""
     texts = tuple(token.value for token in tokens)
     for place, text in enumerate(texts if len(texts) > 1 else (), start=1):
         rational(text, f"gain k{place}")
@@ -59,7 +59,7 @@ def quantity(unit: str) -> Callable[[Any, Sequence[Any]], float]:
 
 
 def in_unit(text: str, unit: str, name: str) -> float:
-    """Number of a text with a unit, or a bare one in that SI unit."""
+    """Number of a text with a unit, or a bare number in this SI unit."""
     try:
         return float(text)
     except ValueError:
@@ -76,7 +76,7 @@ def whole(_type: Any, tokens: Sequence[Any]) -> int:
 
 
 def _exact_reader(unit: str) -> Callable[[Any, Sequence[Any]], str]:
-    """Converter to a number as it is written, p/q among them, or that of a text with a unit."""
+    """Converter to an exact number as typed, also p/q, or to that of a text with a unit."""
 
     def read(_type: Any, tokens: Sequence[Any]) -> str:
         text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
@@ -90,12 +90,12 @@ def _exact_reader(unit: str) -> Callable[[Any, Sequence[Any]], str]:
 
 
 def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> str | None:
-    """L²/D [s] as it is told, or of the distance of a well [m] and the diffusivity of the rock [m²/s].
+    """L²/D [s] as given, or from the distance of a well [m] and the diffusivity of the rock [m²/s].
 
     Raises
     ------
     ParameterError
-        For both, for one of the two alone, or for one that is not positive.
+        For both forms, for only distance or diffusivity, or for a value that is not positive.
     """
     if well is None and diffusivity is None:
         return diffusion
@@ -139,11 +139,11 @@ Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 
 # ----------------------------------------------------------------------
-# Options that several commands share, each told once.
+# Options that several commands share, each defined once.
 
 
 def _fault_name(_type: Any, tokens: Sequence[Any]) -> str:
-    """Name of a fault, refused before anything else is loaded if there is none."""
+    """Name of a fault; an unknown one is rejected before anything else loads."""
     from quakedesign.fault.fault_toml import require_source
 
     return require_source(tokens[0].value)
@@ -214,7 +214,7 @@ class Output:
             hush(quiet=self.quiet, level=self.log_level)
 
     def show(self, values: dict[str, Any], text: Iterable[str] | Callable[[], object]) -> None:
-        """Print facts as JSON, or else what is said for people: lines, or a call that prints them."""
+        """Print facts as JSON, or else as text: lines, or a function that prints them."""
         if self.json:
             print_json(values)
         elif callable(text):
@@ -260,9 +260,9 @@ class LawOptions:
     def choose(
         self, fault: "Fault", step: float | None = None, path: dict[str, float] | None = None
     ) -> "Choice | None":
-        """Controller for a fault and what is certified of it; None where none is asked for.
+        """Controller for a fault, with its certified bounds; None if none is requested.
 
-        A designed one is for a T_s [s], the fault's unless given, and a path, see
+        A designed controller is for a T_s [s], by default the fault's, and a path, see
         `quakedesign.studies.single_runs.choice`.
         """
         from quakedesign.laws import SampledLaw
@@ -346,7 +346,7 @@ class RunOptions:
         return own_way(law, self.scheme, self.step, usual)
 
     def load(self) -> "Load":
-        """What acts on the fault beside its own disturbance."""
+        """Load on the fault in addition to its own disturbance."""
         from quakedesign.simulation import Load, perturbation
 
         return Load(drift=self.drift or 0.0, perturbation=self.perturbation and perturbation(self.perturbation))
@@ -372,12 +372,12 @@ class StartOptions:
     target_slip: Metres | None = None
 
     def state(self) -> dict[str, float]:
-        """Slip and slip rate at the start, where they are given."""
+        """Initial slip and slip rate, if given."""
         entries = {"initial_slip": self.initial_slip, "initial_slip_rate": self.initial_slip_rate}
         return {name: value for name, value in entries.items() if value}
 
     def task(self, fault: "Fault") -> "Fault":
-        """The fault with the target that is given."""
+        """The fault with the given target."""
         if self.target_slip is None:
             return fault
         return replace(fault, reference=replace(fault.reference, target_slip=self.target_slip))
@@ -395,7 +395,7 @@ def of_the_setup(*names: str) -> Callable[[type[Options]], type[Options]]:
     Parameters
     ----------
     *names : str
-        Of fields of `LoopSetup`.
+        Names of fields of `LoopSetup`.
     """
 
     def added(options: type[Options]) -> type[Options]:
@@ -446,7 +446,7 @@ class SetupOptions(WellOptions):
 
 
 # ----------------------------------------------------------------------
-# Options about what lies around a controller: actuator and sensors, the same for every command that runs one.
+# Options of the loop setup of a controller: actuator and sensors, the same for every command that runs one.
 
 _ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
 _SENSORS = Group("Sensors (schemes that sample)")
@@ -476,7 +476,7 @@ class ActuatorOptions:
         return dict(vars(self))
 
     def path(self) -> dict[str, float]:
-        """Delay, lag and diffusion [s] that are given: what a law can be designed for."""
+        """Given delay, lag and diffusion [s], for which a law can be designed."""
         values = self.values()
         return {name: values[name] for name in ("delay", "lag", "diffusion") if values[name]}
 
@@ -486,7 +486,7 @@ class ActuatorOptions:
         Raises
         ------
         ParameterError
-            For values that a stage refuses, or for a part of a stage that is not there.
+            For values that a stage rejects, or for options of a stage without its first option.
         """
         chosen = (_stage(stage, self.values(), step) for stage in stages().values() if stage.options)
         chain = Actuator(stages=tuple(stage for stage in chosen if stage is not None))
@@ -498,7 +498,7 @@ class ActuatorOptions:
 
 
 def _stage(stage: type[Stage], values: Mapping[str, Any], step: float) -> Stage | None:
-    """One stage; None if not requested."""
+    """One stage; None if it is not requested."""
     first, *others = stage.options
     if values[first.name] != first.default:
         return stage.asked(step, **{option.name: values[option.name] for option in stage.options})
@@ -599,8 +599,8 @@ def surroundings(
 ) -> "tuple[int, Actuator, Sensor]":
     """Substeps, actuator and sensor of a run with a sampling period [s].
 
-    Stages for which a law of samples is designed, with the substeps that they need, and the noise of its certificate
-    stand where none is given.
+    If none are given, they are the stages for which a sampled law is designed, with the substeps that these need, and
+    the noise of its certificate.
     """
     from quakedesign.simulation.run_settings import own_path
 
@@ -618,7 +618,7 @@ _GROUP = Group("Friction with a state (rate-and-state)")
 _BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
 _FREE = {"drift": "loading_rate", **_BOTH}
 _HELD = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
-_OF_LAW = ("step", "delay", "lag", "diffusion")  # what a certificate says itself
+_OF_LAW = ("step", "delay", "lag", "diffusion")  # given by a certificate
 _PUMP = ("delay", "jitter", "quantum", "saturation", "withdrawal", "rate_limit")
 _READING = {"slip_noise": "deviation", "bandwidth": "bandwidth", "slip_quantum": "quantum", "seed": "seed"}
 _AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
@@ -655,7 +655,7 @@ class StateOptions:
     stress_period: Seconds | None = None
 
     def of_control(self) -> dict[str, Any]:
-        """Those of a controlled run that are given."""
+        """Given options of a controlled run."""
         if any(value is not None for value in (self.pressure, self.start, self.hold, self.share)):
             raise ParameterError(
                 "--pressure, --start, --hold and --share are for runs without a controller. Received one of them with "
@@ -664,7 +664,7 @@ class StateOptions:
         return specified({"stress": self.stress, "stress_period": self.stress_period})
 
     def of_free(self) -> dict[str, Any]:
-        """Those of a run without control that are given."""
+        """Given options of a run without control."""
         from quakedesign.simulation import pressure_course
 
         if self.stress is not None or self.stress_period is not None:
@@ -677,7 +677,7 @@ NO_STATE = StateOptions()
 
 
 def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
-    """Refuse options that friction without a state has no use for."""
+    """Reject options that do not apply to friction without a state."""
     if state != NO_STATE:
         raise ParameterError(
             "pressure, start, hold, share and stress need friction with a state. "
@@ -686,7 +686,7 @@ def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
 
 
 def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int:
-    """Run a fault whose friction has a state as `simulate` was asked to, and print what it comes to."""
+    """Run a fault whose friction has a state, with the options of `simulate`, and print the result."""
     from quakedesign.report.sentences import sliding_run_lines, state_run_lines
     from quakedesign.studies.single_runs import run_sliding, run_state
 
@@ -713,7 +713,7 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
 
 
 def changed_options(command: Any, options: dict[str, Any]) -> dict[str, Any]:
-    """What was given to a command other than its defaults, by the names of single options; those of the state apart."""
+    """Options of a command that differ from their defaults, by the names of single options, except `state`."""
     usual = _single({name: option.default for name, option in signature(command).parameters.items()})
     return {name: value for name, value in _single(options).items() if value != usual[name]}
 
@@ -741,10 +741,10 @@ class SpreadOptions:
     def choose(
         self, fault: "Fault", law: "LawOptions", step: float | None, path: dict[str, float]
     ) -> tuple["Choice | None", dict[str, Any]]:
-        """Law of a campaign, and what it is told of spread and stress, which friction without a state does not have.
+        """Law of a campaign, with its spread and stress, which friction without a state does not have.
 
-        With a state it is the law that `design` finds for the nominal normal stress, stiffness and damping, whatever
-        the box of the campaign.
+        With a state it is the law that `design` gives for the nominal normal stress, stiffness and damping, for every
+        box of the campaign.
         """
 
         def tracking(fault: "Fault") -> tuple["Choice | None", dict[str, Any]]:
@@ -784,7 +784,7 @@ class SpreadOptions:
 
 
 def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
-    """Spread and stress of a campaign with the law of a certificate: all that it is proved for by default.
+    """Spread and stress of a campaign with the law of a certificate; by default the largest proved ones.
 
     Raises
     ------
@@ -805,9 +805,9 @@ def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
 
 
 def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """The law of a certificate around its fault, under a sine of all the stress that it is proved for by default.
+    """Entries of a run of a certified law on its fault, by default under a sine of the largest proved stress.
 
-    The reading is off by at most the noise of the certificate: the nearest multiple of twice that.
+    The measurement error is at most the noise of the certificate: readings are rounded to multiples of twice this.
     """
     from quakedesign.loop.sensing import Transducer
 
@@ -821,7 +821,7 @@ def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], optio
 
 
 def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """Requested options of a controlled run, with pump and transducer built from theirs."""
+    """Entries of a controlled run, with actuator stages and transducer built from their options."""
     from quakedesign.loop.sensing import Transducer
 
     others = {name: value for name, value in changed.items() if name not in (*_PUMP, *_READING)}
@@ -833,7 +833,7 @@ def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any
 
 
 def _named(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()) -> dict[str, Any]:
-    """Requested options by their names in a run; rejects options that do not apply."""
+    """Given options under the argument names of a run; rejects options that do not apply."""
     if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
         kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
         raise ParameterError(
@@ -853,7 +853,7 @@ def _require_designed(options: dict[str, Any]) -> None:
 
 
 def _single(options: dict[str, Any]) -> dict[str, Any]:
-    """Options of all groups but that of the state, by their own names."""
+    """Options of all groups except `state`, by their own names."""
     groups = [name for name, value in options.items() if is_dataclass(value) and name != "state"]
     alone = {name: value for name, value in options.items() if name not in groups}
     return alone | {name: value for group in groups for name, value in asdict(options[group]).items()}

@@ -82,7 +82,7 @@ def _certify_for_rate(
     law: str, gains: tuple[str, ...], lipschitz: str | None, maximize: str | None, gain_range: tuple[str, str],
     out: Path | None, output: Output,
 ) -> int:  # fmt: skip
-    """Verdict on a sliding mode, or how far its gains reach."""
+    """Verdict on a sliding mode, or the largest certified value of a quantity."""
     from quakedesign.studies.certified import certified
 
     result = certified(law, gains, lipschitz=lipschitz, maximize=maximize, gain_range=gain_range)
@@ -166,7 +166,7 @@ def check(
 
 
 def _write_rocq(files: list[Path], folder: Path, force: bool) -> dict[str, tuple[str | None, str]]:
-    """Path of the file for coqc, or None, and what is said of it, by certificate."""
+    """Path of the file for coqc, or None, and a message about it, by certificate."""
     from quakedesign.rocq.rocq_export import write_rocq
 
     return {

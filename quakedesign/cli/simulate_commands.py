@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# Commands about one closed loop: simulate it, see what sampling does to it, export its controller.
+# Commands about one closed loop: simulate it, study the effect of sampling, export its controller.
 
 _DIRECT, _EXACT, _MEASURED = ActuatorOptions(), SensorOptions(), EstimateOptions()
 _BESIDE = ("scheme", "plant", "drift", "perturbation", "initial_slip", "initial_slip_rate", "weight", "authority")
@@ -172,7 +172,7 @@ def simulate(
 
 
 def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
-    """Options of a run of a law that what is proved of it does not know, its plant among them."""
+    """Options of a run, including its plant, that the proof of its law does not cover."""
     sampled, changed = claim.held, changed | {"plant": plant}
     times = {name: float(time) for name, time in sampled.path.items()}
     starts = zip(("initial_slip", "initial_slip_rate"), map(float, sampled.start), strict=True)

@@ -1,4 +1,4 @@
-"""What is controlled: parameters in SI, uncertainty, reference and disturbance."""
+"""Model of the controlled fault: parameters in SI, uncertainty, reference and disturbance."""
 
 from quakedesign.arguments import attach
 

@@ -1,9 +1,9 @@
 """Faults of several blocks in a row, coupled by springs, with wells along them; their files.
 
-A fault file with ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between two
-wells, constant beyond the last ones, taken at the middle of each block. With a diffusivity D the pressure diffuses
-between the middles x_i of blocks of lengths L_i and the wells, which are the neighbouring points: q_i' =
-D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends), and is that of the well where x_i is one.
+A fault file has ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between two
+wells, constant beyond the outermost ones, taken at the middle of each block. With a diffusivity D the pressure diffuses
+between neighbouring points, which are the middles x_i of blocks of lengths L_i and the wells: q_i' =
+D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends). If x_i is a well, its pressure is q_i.
 """
 
 from collections.abc import Iterable, Mapping
@@ -57,7 +57,7 @@ class BlockChain:
     Attributes
     ----------
     fault : Fault
-        What all blocks share: rock, width, damping per area, task, disturbance, box; also its name.
+        Common data of all blocks: rock, width, damping per area, task, disturbance, box, name.
     blocks : tuple of FaultBlock
         2 to 20 blocks, whose lengths add up to that of the fault.
     wells : tuple of float
@@ -119,7 +119,7 @@ class BlockChain:
 
     @cached_property
     def shares(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Share of each well's pressure (columns) in that of each block (rows) [-]; every row adds up to 1."""
+        """Share of each well pressure (columns) in each block pressure (rows) [-]; every row adds up to 1."""
         places, rows = [rational(v) for v in self.wells], []
         for x in self.middles:
             row = [Fraction(0)] * len(places)
@@ -134,7 +134,7 @@ class BlockChain:
 
     @cached_property
     def flow(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Rows of q' [1/s] over the pressures q of blocks without a well in their middle, then those of the wells.
+        """Rows of q' [1/s] over the pressures q of blocks without a well in the middle, then over the well pressures.
 
         Empty without a diffusivity.
         """
@@ -155,7 +155,7 @@ class BlockChain:
 
     @cached_property
     def pressures(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Pressure of each block (rows) by the pressures of `flow` (columns) [-]; `shares` without a diffusivity."""
+        """Share of the pressures of `flow` (columns) in each block (rows) [-]; `shares` without a diffusivity."""
         if self.diffusivity is None:
             return self.shares
         wells, slow = [rational(v) for v in self.wells], self._slow
@@ -171,7 +171,7 @@ class BlockChain:
 
     @cached_property
     def springs(self) -> tuple[tuple[int, int, Fraction], ...]:
-        """(i, j, K): block j pulls block i by K [1/s²] per metre of slip between them, G/(ρ·distance·length of i)."""
+        """(i, j, K): block j pulls block i with K [1/s²] per metre of relative slip, G/(ρ·distance·length of i)."""
         wave, springs = rational(self.fault.shear_modulus) / rational(self.fault.density), []
         for i, j in pairwise(range(len(self.blocks))):
             distance = self.middles[j] - self.middles[i]
@@ -180,7 +180,7 @@ class BlockChain:
 
     @cached_property
     def faults(self) -> tuple[Fault, ...]:
-        """The fault with the friction and the stress of each block: what holds of it for its area."""
+        """The fault with the friction and stress of each block; its values per area are those of the block."""
         return tuple(
             replace(self.fault, friction=b.friction, effective_normal_stress=b.effective_normal_stress)
             for b in self.blocks
@@ -188,12 +188,12 @@ class BlockChain:
 
     @property
     def friction(self) -> FrictionLaw:
-        """That of the first block, whose equilibrium is that of all."""
+        """Friction law of the first block, whose equilibrium is that of all blocks."""
         return self.blocks[0].friction
 
     @property
     def ages(self) -> bool:
-        """Whether friction has a state, as rate-and-state friction."""
+        """Whether friction has a state, such as rate-and-state friction."""
         return bool(self.friction.state_names)
 
     @property
@@ -203,7 +203,7 @@ class BlockChain:
 
 
 def add_springs(rows: Any, springs: Iterable[tuple[int, int, Fraction]], scale: Any = 1) -> None:
-    """Add, to rows of a matrix, what springs (i, j, K) pull block i by per slip of every block, times a scale."""
+    """Add to the rows of a matrix the force of springs (i, j, K) on block i per slip of every block, times a scale."""
     for i, j, K in springs:
         rows[i][j] += K * scale
         rows[i][i] -= K * scale
@@ -224,13 +224,13 @@ def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool =
     box : str, optional
         Name of an uncertainty box in place of that of the file.
     allow_code : bool
-        As of `load_fault`.
+        As in `load_fault`.
     """
     text = source_text(source)
     try:
         raw = parse_toml(text)
     except ValueError:
-        return None  # load_fault says what is wrong
+        return None  # load_fault reports the error
     if not {"block", "well"} & set(raw):
         return None
     problems = Problems()

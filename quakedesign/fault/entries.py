@@ -34,13 +34,13 @@ class FileEntry:
     unit : str, optional
         SI unit of a quantity, empty for a dimensionless one; None for a text.
     required : bool
-        Whether a file must give it.
+        Whether a file must contain it.
     example : str or float
         Value in the template and the JSON Schema.
     default_text : str
-        What applies if a file omits the entry; empty if the description says it.
+        Default if a file omits the entry; empty if the description states it.
     symbol : str
-        Symbol (LaTeX) by which a file may spell the entry; empty for none.
+        Symbol (LaTeX), an alternative name of the entry in a file; empty for none.
     text : str
         Description in place of that in the docstring of `owner`.
     owner : type
@@ -68,7 +68,7 @@ class FileEntry:
 
 
 def entries_of(kind: type) -> dict[str, FileEntry]:
-    """Entries of the fields of a dataclass that are quantities or texts; of a friction law, of all its fields."""
+    """Entries of those fields of a dataclass that are quantities or texts; of a friction law, all fields."""
     law = issubclass(kind, FrictionLaw)
     return {
         each.name: FileEntry(
@@ -108,7 +108,7 @@ class Table:
     problems : Problems
         The collected errors.
     where : str
-        Dotted name of the table, empty for the whole file, and for a table that is not given.
+        Dotted name of the table; empty for the whole file, and for a missing table.
     """
 
     def __init__(self, entries: Json, problems: Problems, where: str = "") -> None:
@@ -117,9 +117,9 @@ class Table:
         self._missing: list[str] = []
 
     def read(self, entries: Mapping[str, FileEntry], quantity: Reader = si_value) -> Json:
-        """Texts, and quantities in SI units, by name: None for one that is wrong or missing.
+        """Texts, and quantities in SI units, by name; None for an invalid or missing required entry.
 
-        An optional entry that is not given has no value.
+        An omitted optional entry has no value.
         """
         values: Json = {}
         for entry in entries.values():
@@ -136,7 +136,7 @@ class Table:
         return values
 
     def table(self, key: str, *, optional: bool = False) -> "Table":
-        """Table inside this one; one that is wrong or not given is empty, and its errors are not collected."""
+        """Table inside this one; an invalid or missing one is empty, and its errors are not collected."""
         if self._given(key, optional):
             with self.problems.collected():
                 name = self._name(key)
@@ -144,7 +144,7 @@ class Table:
         return Table({}, Problems())
 
     def name_or_table(self, key: str, default: str) -> "str | Table | None":
-        """Text or table of an entry, the default where it is not given; None for a wrong one."""
+        """Text or table of an entry, the default if it is omitted; None if it is invalid."""
         value = self.entries.get(key, default)
         if isinstance(value, dict):
             return self.table(key, optional=True)
@@ -154,13 +154,13 @@ class Table:
         return None
 
     def built(self, kind: Callable[..., _Value], values: Json) -> _Value | None:
-        """Object of these values; None if one of them is wrong."""
+        """Object of these values; None if one of them is invalid."""
         with self.problems.collected():
             return None if None in values.values() else kind(**values)
         return None
 
     def close(self) -> None:
-        """Report the missing entries, and the unknown ones with the nearest name of each."""
+        """Report the missing entries, and the unknown ones with the nearest known name of each."""
         near = {key: nearest_name(key, self._missing or self._keys) for key in self.entries if key not in self._keys}
         meant = {key for key in self._missing if f" Did you mean {key}?" in near.values()}
         self.report_missing(meant)
@@ -170,14 +170,14 @@ class Table:
                 raise ScenarioError(f"{named} Known here are {', '.join(self._keys)}.")
 
     def report_missing(self, but: Collection[str] = ()) -> None:
-        """Report the missing entries."""
+        """Report the missing entries, except those in `but`."""
         missing = [self._name(key) for key in self._missing if key not in but]
         with self.problems.collected():
             if missing:
                 raise ScenarioError(f"{', '.join(missing)} must be given. Received nothing. Compare with a preset.")
 
     def _key(self, entry: FileEntry) -> str:
-        """Key of an entry in the file: its name, or a spelling of its symbol, as ``Dc`` or ``d_c`` for :math:`d_c`."""
+        """Key of an entry in the file: its name, or a spelling of its symbol, ``Dc`` or ``d_c`` for :math:`d_c`."""
         letters, others = _letters(entry.symbol), self.entries.keys() - {*self._keys} if entry.symbol else ()
         spelt = [key for key in self.entries if key == entry.name or (key in others and _letters(key) == letters)]
         with self.problems.collected():
@@ -198,7 +198,7 @@ class Table:
 
 
 def _of(kind: type[_Value], value: object, name: str, what: str) -> _Value:
-    """Return a value of a type, given with its name and a description of the type for the message."""
+    """Return a value of a type; its name and the description of the type are for the message."""
     if not isinstance(value, kind):
         raise ScenarioError(f"{name} must be {what}. Received {shown(value)}. Compare with a preset.")
     return value

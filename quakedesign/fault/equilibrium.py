@@ -14,9 +14,9 @@ class FaultEquilibrium:
     """Equilibrium about which a fault is studied and controlled."""
 
     name: str
-    coordinates: str  # Of the plant, for a sentence that goes on with its equations
-    poles: str  # About which equilibrium poles are, for a slip rate [m/s]
-    refused: Mapping[str, str]  # What does not apply, by name, with the message to a value
+    coordinates: str  # Coordinates of the plant: beginning of a sentence that its equations complete
+    poles: str  # Equilibrium of the poles in words, a format of the slip rate [m/s]
+    refused: Mapping[str, str]  # Message for each quantity that does not apply, by name
 
 
 AT_REST = FaultEquilibrium(
@@ -53,7 +53,7 @@ STEADY_SLIDING = FaultEquilibrium(
 def by_equilibrium(
     *, rest: Callable[Concatenate[S, P], R], sliding: Callable[Concatenate[S, P], R]
 ) -> Callable[Concatenate[S, P], R]:
-    """Function with one implementation for each equilibrium, that of its first argument: a fault or a friction law."""
+    """Function with one implementation per equilibrium; its first argument, a fault or a friction law, selects it."""
 
     def chosen(subject: S, /, *positional: P.args, **named: P.kwargs) -> R:
         given: Any = subject

@@ -18,16 +18,16 @@ _COME_TO_REST = ("exponential-slip-weakening", "linear-slip-weakening")
 
 
 def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault", schema: bool = False) -> str:
-    """Text of a commented TOML file to start from.
+    """Text of a commented TOML file as a template.
 
     Parameters
     ----------
     law : str
         Friction law.
     name : str
-        Of the fault.
+        Name of the fault.
     schema : bool
-        Whether its first line names the schema beside it, for editors.
+        Whether its first line names the schema file in the same folder, for editors.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
 
 
 def _lines(entries: Mapping[str, FileEntry]) -> Iterator[str]:
-    """Line of each quantity with its example and description, as a comment if a file may omit it."""
+    """Line of each quantity with its example and description, as a comment for an optional one."""
     for key, entry in entries.items():
         if entry.unit is not None:
             comment = entry.description.split("; ")[0].rstrip(".")
@@ -121,7 +121,7 @@ def _property(entry: FileEntry) -> Json:
 
 
 def _law_schema(law: type[FrictionLaw]) -> Json:
-    """Schema of a table of friction, whose parameters are given by their names or symbols."""
+    """Schema of a friction table, with the parameters under their names or symbols."""
     entries = entries_of(law)
     properties = {"law": {"const": law.name, "description": _first_paragraph(law)}} | _table(entries)["properties"]
     spelt = {entry.symbol_pattern: entry for entry in entries.values() if entry.symbol}

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Dimensions. The equation of motion never compares a slip with the length of the fault, nor a tangential with a normal
 # direction: a stiffness k = GL is a force per slip, a friction coefficient a tangential force per normal force. The
-# metres of the three are therefore three units, with mass and time five in all; this is why slip, fault length and
-# friction scale by different factors in Table I of the paper.
+# three metres are therefore three units, with mass and time five in all; this is why slip, fault length and friction
+# scale by different factors in Table I of the paper.
 
 BASES = ("mass", "fault_length", "slip", "normal_length", "time")
 """Independent dimensions, in the order of the rows of the dimensional matrix."""
@@ -85,7 +85,7 @@ def dimension(unit: str) -> tuple[Fraction, ...]:
     Raises
     ------
     UnitError
-        For a unit that cannot be read.
+        For a unit that cannot be parsed.
     """
     try:
         exponents = dict(_registry().parse_units(unit).dimensionality)
@@ -105,9 +105,9 @@ def dimensional_matrix(units: Sequence[str]) -> "sp.Matrix":
 
 
 def quantities(fault: Fault) -> dict[str, Quantity]:
-    """Every parameter of a fault by dotted name, those of its friction law included.
+    """Every parameter of a fault by dotted name, including those of its friction law.
 
-    Where a friction law cannot be stretched as a whole by its dimensionless parameters, friction has no scale of its
+    If the dimensionless parameters of a friction law cannot scale it as a whole, friction has no scale of its
     own; the constant friction coefficient 1 is then one more parameter, the same for every fault.
     """
     law = fault.friction
@@ -121,12 +121,12 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
 
 
 def _friction_unit(metadata: Mapping[str, str]) -> str:
-    """Unit with directed lengths: a law may state it as ``directed_unit``; a number is a friction coefficient."""
+    """Unit with directed lengths: ``directed_unit`` of the law if given; a pure number is a friction coefficient."""
     return str(metadata.get("directed_unit", metadata["unit"] or _FRICTION))
 
 
 def stretches(law: FrictionLaw) -> bool:
-    """True where μ grows by any factor as all friction coefficients among the parameters do (degree 1 of Euler)."""
+    """Whether μ is homogeneous of degree 1 (Euler) in those parameters that are friction coefficients."""
     import sympy as sp
 
     factor, symbols = sp.Symbol("c", positive=True), law.symbols()
@@ -137,14 +137,14 @@ def stretches(law: FrictionLaw) -> bool:
 
 
 def _arguments(law: FrictionLaw) -> "tuple[sp.Symbol, ...]":
-    """Symbols of slip, slip rate and state, which a coefficient takes."""
+    """Symbols of slip, slip rate and state, the arguments of a coefficient."""
     import sympy as sp
 
     return tuple(sp.Symbol(n, positive=True) for n in ("x", "v", *(f"theta{i}" for i in range(len(law.state_names)))))
 
 
 # ----------------------------------------------------------------------
-# Signed roots of rationals: the exact numbers that appear when a rational is raised to a rational power.
+# Signed roots of rationals: exact rational powers of rationals.
 
 _WORKING_DIGITS = 60
 
@@ -153,7 +153,7 @@ _WORKING_DIGITS = 60
 class Radical:
     """sign · radicand^(1/degree) with sign −1, 0 or 1, radicand > 0 (1 for zero), and the smallest possible degree.
 
-    Equal numbers so compare equal. Products, quotients and rational powers of such numbers are such numbers, hence
+    So equal numbers compare equal. Products, quotients and rational powers of such numbers are of this form, hence
     every scale factor and every scaled gain is exact. Build them with `radical`.
     """
 
@@ -163,7 +163,7 @@ class Radical:
 
     @property
     def fraction(self) -> Fraction:
-        """The number itself, where it is rational.
+        """The number as a fraction.
 
         Raises
         ------
@@ -197,18 +197,18 @@ class Radical:
         return _canonical(sign, self.radicand**power.numerator, self.degree * power.denominator)
 
     def decimal(self, digits: int = 12) -> Decimal:
-        """Nearest decimal number with so many significant digits."""
+        """Nearest decimal number with the given significant digits."""
         with localcontext(Context(prec=max(_WORKING_DIGITS, 2 * digits))):
             ratio = Decimal(self.radicand.numerator) / Decimal(self.radicand.denominator)
             root = self.sign * ratio ** (Decimal(1) / self.degree)
         return Context(prec=digits).plus(root)
 
     def nearest(self, digits: int = 12) -> Fraction:
-        """The number itself where it is rational, else the nearest decimal with so many significant digits."""
+        """The number itself if it is rational, else the nearest decimal with the given significant digits."""
         return self.fraction if self.degree == 1 else rational(str(self.decimal(digits)))
 
     def text(self, digits: int = 12) -> str:
-        """Exact decimal or p/q where the number is rational, else a decimal with so many significant digits."""
+        """Exact decimal or p/q if the number is rational, else a decimal with the given significant digits."""
         if self.degree > 1:
             return f"{self.decimal(digits):.{digits}g}"
         rounded = self.decimal(17).normalize()
@@ -223,7 +223,7 @@ class Radical:
 
 
 def radical(value: "Radical | Fraction | int") -> Radical:
-    """Exact number from a rational; a `Radical` is returned as it is."""
+    """Exact number from a rational; a `Radical` is returned unchanged."""
     if isinstance(value, Radical):
         return value
     exact = Fraction(value)
@@ -243,7 +243,7 @@ def _canonical(sign: int, radicand: Fraction, degree: int) -> Radical:
 
 
 # ----------------------------------------------------------------------
-# Scale factors between faults, and how any quantity grows with them.
+# Scale factors between faults, and of any quantity.
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -303,7 +303,7 @@ class Scales:
         return power_product(self.factors, dict(zip(BASES, dimension(unit), strict=True)))
 
     def inverse(self) -> Self:
-        """The way back."""
+        """Scale factors in the opposite direction."""
         return replace(self, factors={base: factor**-1 for base, factor in self.factors.items()})
 
 
@@ -330,7 +330,7 @@ _SUPERSCRIPTS = str.maketrans("-/0123456789", "⁻ᐟ⁰¹²³⁴⁵⁶⁷⁸⁹
 class PiGroup:
     """One dimensionless product Π parameter^exponent, without zero exponents.
 
-    `name` is the parameter that it makes dimensionless; its exponent is 1.
+    `name` is the parameter that the product makes dimensionless; its exponent is 1.
     """
 
     name: str
@@ -361,13 +361,13 @@ class GroupComparison:
 
     @property
     def ratio(self) -> Radical | None:
-        """target/source [-]; None where it is zero in the source only."""
+        """target/source [-]; None if only the source has the value zero."""
         if self.source == self.target:
             return radical(1)
         return self.target / self.source if self.source.sign else None
 
     def within(self, tolerance: Fraction) -> bool:
-        """True where the ratio is in [1 − tolerance, 1 + tolerance], decided in exact arithmetic."""
+        """Whether the ratio is in [1 − tolerance, 1 + tolerance], decided in exact arithmetic."""
         if (ratio := self.ratio) is None:
             return False
         return (1 - tolerance) ** ratio.degree <= ratio.sign * ratio.radicand <= (1 + tolerance) ** ratio.degree
@@ -378,10 +378,10 @@ class Similarity:
     """Scale factors from one fault to another, and the differences that remain."""
 
     scales: Scales
-    # Parameters from whose ratios the scales follow; they fix slip, time, pressure, length and mass
+    # Parameters whose ratios give the scales of slip, time, pressure, length and mass
     repeating: tuple[str, ...]
-    comparisons: tuple[GroupComparison, ...]  # Every π-group of the parameters that both faults have
-    # ``friction.law`` where the laws are different functions, and parameters that only one of them has
+    comparisons: tuple[GroupComparison, ...]  # π-groups of the parameters that both faults have
+    # ``friction.law`` if the laws are different functions, and parameters of only one fault
     unmatched: tuple[str, ...] = ()
 
     @cached_property
@@ -394,14 +394,14 @@ class Similarity:
         return tuple(c for c in self.comparisons if not c.within(tolerance))
 
     def similar(self, tolerance: Fraction = TOLERANCE) -> bool:
-        """True where no group differs by more than the tolerance and both faults have the same parameters."""
+        """Whether no group differs by more than the tolerance and both faults have the same parameters."""
         return not self.unmatched and not self.violations(tolerance)
 
 
 def pi_groups(parameters: Sequence[Quantity]) -> tuple[PiGroup, ...]:
-    """Basis of the rational null space of the dimensional matrix, one group for every parameter that is not repeated.
+    """Basis of the rational null space of the dimensional matrix, one group for every non-repeating parameter.
 
-    The first parameters with independent dimensions are the repeated ones, so the order decides on the basis.
+    The first parameters with independent dimensions are the repeating ones, so the order determines the basis.
     """
     groups = []
     for vector in dimensional_matrix([q.unit for q in parameters]).nullspace():
@@ -412,7 +412,7 @@ def pi_groups(parameters: Sequence[Quantity]) -> tuple[PiGroup, ...]:
 
 
 def ordered(fault: Fault, clock: str = CLOCKS[0]) -> tuple[Quantity, ...]:
-    """Parameters of a fault, those that fix the scales first; `clock` is one of `CLOCKS`.
+    """Parameters of a fault, beginning with those that fix the scales; `clock` is one of `CLOCKS`.
 
     Raises
     ------
@@ -436,8 +436,8 @@ def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Sim
     Parameters
     ----------
     clock : str, optional
-        What fixes the scale of time, one of `CLOCKS`. Unless given the task, as in Table I of the paper; but the
-        natural period where the operation times are not in the ratio of the natural periods (within `TOLERANCE`).
+        Source of the time scale, one of `CLOCKS`. By default the task, as in Table I of the paper; but the natural
+        period if the ratio of the operation times is not that of the natural periods (within `TOLERANCE`).
     """
     if clock is None:
         by_task = similarity(source, target, clock=CLOCKS[0])
@@ -459,7 +459,7 @@ def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Sim
 
 
 def _law(fault: Fault) -> "tuple[sp.Expr, ...]":
-    """Friction as a function, in symbols: equal for equal laws, whatever their parameters' values."""
+    """Friction as a symbolic function, which does not depend on the values of the parameters."""
     law, arguments = fault.friction.symbolic(), _arguments(fault.friction)
     return law.coefficient(*arguments), *law.state_rates(*arguments)
 
@@ -470,19 +470,19 @@ def scaled_parameters(parameters: Mapping[str, Quantity], scales: Scales) -> dic
 
 
 def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Fault:
-    """Fault that is similar to another one; only the last step, to the floats of a `Fault`, rounds.
+    """Fault that is similar to another one; only the final conversion to floats rounds.
 
     Parameters
     ----------
     source : Fault
     scales : Scales
     name : str, optional
-        Name of the new fault; that of the source with ``-scaled`` unless given.
+        Name of the new fault; by default that of the source with ``-scaled``.
 
     Raises
     ------
     ParameterError
-        When a scaled value is out of range, or friction shall be scaled though its law admits no factor.
+        When a scaled value is out of range, or the scales change friction although its law admits no factor.
     """
     exact = scaled_parameters(quantities(source), scales)
     if exact.pop(_UNIT_FRICTION, radical(1)) != radical(1):

@@ -37,7 +37,7 @@ _WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d{1,3})?)(?: ([A-Za-z1][
 
 
 def _plain(quantity: object, unit: str) -> Decimal | None:
-    """Value of a number with a common unit; None for any other text."""
+    """Value in SI units of a number with a common unit; None for any other text."""
     match = _WRITTEN.fullmatch(quantity) if isinstance(quantity, str) and len(quantity) <= 100 else None
     size = _PLAIN.get(unit, {}).get(match[2] or "") if match else None
     return Decimal(match[1]) * Decimal(size) if match and size else None
@@ -49,7 +49,7 @@ _WITHIN_A_UNIT = re.compile(r"^1\s*(?=/)|(\^|\*\*)\s*[+-]?\d+|(?<=[A-Za-z])\d+",
 
 @cache
 def _words_of_units() -> frozenset[str]:
-    """Every word of the definition file of pint, including names of units and prefixes; empty without the file."""
+    """Words of pint's definition file, including names of units and prefixes; empty without the file."""
     spec = find_spec("pint")
     files = Path(spec.origin).parent.glob("*_en.txt") if spec and spec.origin else ()
     texts = (re.sub("#.*", "", file.read_text(encoding="utf-8")) for file in files)
@@ -57,7 +57,7 @@ def _words_of_units() -> frozenset[str]:
 
 
 def _is_no_unit(written: str) -> bool:
-    """Whether a word is no unit of pint (name, name with a prefix, or plural), decided without loading pint."""
+    """Whether a word is not a unit of pint (name, name with a prefix, or plural), decided without loading pint."""
     words, singular = _words_of_units(), written.removesuffix("s")
     ends = {end[i:] for end in (written, singular) for i in range(len(end)) if not i or end[:i] in words}
     return bool(words) and written.isascii() and written.isalpha() and words.isdisjoint(ends)
@@ -85,7 +85,7 @@ def si_value(quantity: object, unit: str, name: str) -> float:
     Raises
     ------
     UnitError
-        For an unknown unit, a wrong dimension, a missing unit or no number; and for hertz where an angular
+        For an unknown unit, a wrong dimension, a missing unit or number; and for hertz where an angular
         frequency is required, because pint converts 1 Hz to 1 rad/s.
     """
     if (plain := _plain(quantity, unit)) is not None:
@@ -133,7 +133,7 @@ def si_value(quantity: object, unit: str, name: str) -> float:
 
 
 def quantity(unit: str, example: str | float, default: str = "", **more: str) -> dict[str, str | float]:
-    """Metadata of a field for a fault file: SI unit, example, what applies by default; see `entries.FileEntry`."""
+    """Metadata of a field for a fault file: SI unit, example, default in words; see `entries.FileEntry`."""
     return {"unit": unit, "example": example, "default": default} | more
 
 
@@ -143,7 +143,7 @@ def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fract
     Raises
     ------
     ParameterError
-        Also `UnitError`, as of `si_value`.
+        For a text that is no number or quantity; `UnitError` as in `si_value`.
     """
     try:
         return rational(quantity, name)
@@ -163,7 +163,7 @@ def _plain_number(number: float, unit: str, received: str) -> float:
 
 
 def _is_plural_of_a_symbol(word: str) -> bool:
-    """Whether pint reads a word as the plural of a symbol, as MPas of MPa; hours is the plural of a name."""
+    """Whether pint reads a word as the plural of a symbol, such as MPas of MPa; hours is the plural of a name."""
     if not word.endswith("s"):
         return False
     for _, unit, _ in _registry().parse_unit_name(word)[:1]:

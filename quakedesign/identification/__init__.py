@@ -1,4 +1,4 @@
-"""From a laboratory record to friction parameters: fits of the simulated experiment, with confidence regions."""
+"""Friction parameters from laboratory records: fits of simulated experiments, with confidence regions."""
 
 from quakedesign.arguments import attach
 

@@ -1,6 +1,6 @@
-"""Whether a fit explains a record: tests of its assumptions, and a verdict.
+"""Assessment of a fit: tests of its assumptions, and the verdict whether it explains the record.
 
-The noise to compare with is measured where no friction law is needed: from sample to sample, and about a line in the
+The reference noise is estimated without a friction law: from sample to sample, and about a straight line in the
 steady beginning.
 """
 
@@ -18,12 +18,12 @@ from quakedesign.identification.loading import Loading
 from quakedesign.identification.record import Record, scatter
 from quakedesign.identification.sliding_experiment import START_STATE
 
-SEVERAL = 2.0  # times the noise: residuals as large are no noise
-_PEAK = 10.0  # critical slips after a change of rate
-_FADED = 5.0  # critical slips
+SEVERAL = 2.0  # ratio to the noise above which residuals are no noise
+_PEAK = 10.0  # critical slips after a change of rate that count as its peak
+_FADED = 5.0  # critical slips after which an unsteady beginning has decayed
 _TREND_UNITS = {TREND: "1/m", TREND_IN_TIME: "1/s"}
-_DRIFT = 4.0  # deviations by which a trend may change at the last change of rate
-DECISIVE = 10.0  # of AIC, by which a trend is beyond doubt
+_DRIFT = 4.0  # standard deviations by which a trend may change at the last change of rate
+DECISIVE = 10.0  # difference of AIC above which a trend is certain
 EXPLAINS, EXPLAINS_NOT, CANNOT_TELL = "explains the record", "does not explain the record", "cannot tell"
 
 
@@ -33,8 +33,8 @@ class Check:
 
     name: str
     passed: bool
-    value: float  # what is compared [-]
-    limit: float  # with what
+    value: float  # tested quantity [-]
+    limit: float  # its limit
     sentence: str
 
 
@@ -43,19 +43,19 @@ class Assessment:
     """Tests of a fit, with the verdict on it."""
 
     checks: tuple[Check, ...]
-    factor: float  # residuals over the noise [-]: the largest of the whole record and of what follows changes of rate
-    open: tuple[str, ...] = ()  # what the record cannot tell, in sentences
-    experiments: tuple[str, ...] = ()  # which would
+    factor: float  # largest ratio of residuals to noise [-], of the whole record and of the parts after changes of rate
+    open: tuple[str, ...] = ()  # sentences about quantities that the record does not determine
+    experiments: tuple[str, ...] = ()  # experiments that would determine them
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """Sentences of failed tests that make intervals too narrow, unless the fit does not explain the record."""
+        """Sentences of failed tests that make intervals too narrow; empty if the fit does not explain the record."""
         failed = (check.sentence for check in self.checks if check.name == "halves" and not check.passed)
         return () if self.verdict == EXPLAINS_NOT else tuple(failed)
 
     @property
     def verdict(self) -> str:
-        """One of three."""
+        """`EXPLAINS`, `EXPLAINS_NOT` or `CANNOT_TELL`."""
         if self.factor > SEVERAL:
             return EXPLAINS_NOT
         return CANNOT_TELL if self.open else EXPLAINS
@@ -66,7 +66,7 @@ class Assessment:
         return self.verdict
 
     def to_dict(self) -> Json:
-        """Everything that JSON can hold."""
+        """JSON-able facts."""
         checks = [asdict(check) for check in self.checks]
         return {"verdict": self.verdict, "factor": self.factor, "checks": checks, "experiments": list(self.experiments)}
 
@@ -96,18 +96,18 @@ def checks_of(
 
 
 def in_doubt(excess: float, shift: float | None) -> bool:
-    """Whether a fit with another trend counts for the sign: its AIC is not much higher, or the trend may begin late."""
+    """Whether a fit with another trend counts for the sign: its AIC is not much higher, or its trend may begin late."""
     return excess < DECISIVE or shift is not None
 
 
 def sign_check(
     difference: Any, others: Mapping[str, tuple[Any, float]], shift: float | None = None, unsteady: str = ""
 ) -> Check | None:
-    """Whether a - b has one sign, with the trend that is taken and with others that are about as likely.
+    """Whether a - b has one sign, with the selected trend and with others that are about as likely.
 
-    `others` holds a - b of fits with another trend or none, and by how much their AIC is higher, by what they are;
-    `shift` is by how much a - b changes if the trend begins with the first change of rate [-], None where the beginning
-    has it too; `unsteady` says why the beginning tells nothing of steady sliding.
+    `others` maps a description of fits with another trend or none to their a - b and the increase of their AIC;
+    `shift` is the change of a - b if the trend begins with the first change of rate [-], None if the beginning has the
+    trend too; `unsteady` is the reason why the beginning does not determine steady sliding.
     """
     if difference is None:
         return None
@@ -129,9 +129,9 @@ def sign_check(
 
 
 def unsteady_beginning(difference: Any, values: Mapping[str, float], loading: Loading) -> str:
-    """Why a fitted beginning off steady sliding hides the sign of a - b; nothing where it does not.
+    """Reason why a fitted beginning off steady sliding hides the sign of a - b; empty if it does not.
 
-    It does where it moves friction by more than the change of rate, and does not fade before that: a drift looks alike.
+    It hides the sign, like a drift, if it changes friction by more than the change of rate and does not decay before.
     """
     step, slip = loading.first_step, values.get("critical_slip", 0.0)
     moved = abs(values.get("evolution_effect", 0.0) * values.get(START_STATE, 0.0))
@@ -146,7 +146,7 @@ def _within(name: str, value: float, limit: float, sentence: str) -> Check:
 
 
 def _noise(raw: Record, first: float) -> tuple[float, str]:
-    """Noise of friction, from sample to sample and about a line before the first change of rate."""
+    """Noise of friction: from sample to sample, and about a line before the first change of rate."""
     least = max(scatter(raw.time, raw.friction), 1e-12)
     before = raw.time < first
     if np.isinf(first) or before.sum() < 20:
@@ -170,7 +170,7 @@ def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
 def _after_steps(
     fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndarray, values: Mapping[str, float]
 ) -> float:
-    """Largest root mean square of residuals within some critical slips of a change of rate, over their noise."""
+    """Largest RMS residual over noise within some critical slips after a change of rate."""
     assert record.load_point is not None
     path, scores = record.load_point[used], fit.whitened / fit.noise
     way = float(np.ptp(path))
@@ -181,7 +181,7 @@ def _after_steps(
 
 
 def _halves(fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndarray) -> Check:
-    """Whether the trend is the same before and after the last change of rate, and the noise as large in both halves."""
+    """Whether the trend is equal before and after the last change of rate, and the noise equal in both halves."""
     assert record.load_point is not None
     path = record.load_point[used]
     hinge = np.maximum(path - np.interp(begins[-1], time, path), 0)

@@ -1,7 +1,7 @@
 """Correlated noise of records: white noise and an Ornstein–Uhlenbeck process.
 
-Servos, filters, screws and the rock itself wander; least squares that takes such noise for independent is too sure.
-The process fades with time or with displacement, whichever has the larger restricted likelihood.
+Servos, filters, screws and the rock itself drift; least squares that treats such noise as independent underestimates
+the intervals. The process decays with time or displacement, whichever has the larger restricted likelihood.
 """
 
 from dataclasses import dataclass
@@ -14,27 +14,27 @@ from scipy.linalg import cho_solve_banded, cholesky, cholesky_banded
 from scipy.linalg.lapack import dtrtri
 from scipy.optimize import minimize
 
-_LEAST_GAIN = 3.0  # of the log-likelihood, for two parameters: AIC with a margin of 1
+_LEAST_GAIN = 3.0  # least gain of the log-likelihood by two parameters: AIC with a margin of 1
 _MOST_DENSE = 1500  # samples whose covariance is factored as a full matrix
-_SHARES = (-2.0, 0.0, 3.0)  # natural logarithms of the first trials, in white variances
-_LENGTHS = (0.003, 0.03)  # of the way
-_LONGEST = 0.05  # of the way: what fades over more of it is not told from the rock
-_LARGEST = 9.0  # natural logarithm of the share
+_SHARES = (-2.0, 0.0, 3.0)  # natural logarithms of initial values, in white variances
+_LENGTHS = (0.003, 0.03)  # initial values, relative to the whole span
+_LONGEST = 0.05  # relative to the whole span: noise of longer decay cannot be separated from the rock
+_LARGEST = 9.0  # natural logarithm of the largest share
 
 
 @dataclass(frozen=True)
 class CorrelatedNoise:
     """Covariance of samples, in variances of the white noise of one measurement."""
 
-    share: float  # variance of the process that fades
-    length: float  # over which it fades, in units of `along`
-    along: ndarray  # where every sample lies: time [s] or displacement [m]
+    share: float  # variance of the correlated process
+    length: float  # its decay length, in units of `along`
+    along: ndarray  # position of every sample: time [s] or displacement [m]
     counts: ndarray  # measurements in every sample
     of_time: bool  # whether `along` is time
-    common: ndarray | None = None  # columns: what a deviation of each unknown of the load moves in all samples
+    common: ndarray | None = None  # columns: effect of one deviation of each unknown of the load on all samples
 
     def to_dict(self, noise: float) -> dict[str, Any] | None:
-        """Size and length with their units, of the white noise [-] of one measurement; None where nothing fades."""
+        """Size and length with units, from the white noise [-] of one measurement; None without correlated noise."""
         if not self.share:
             return None
         size = noise * self.share**0.5
@@ -42,26 +42,26 @@ class CorrelatedNoise:
 
     @property
     def pieces(self) -> float:
-        """Degrees of freedom of the estimated noise of slow changes: one every four lengths of the way.
+        """Degrees of freedom of the estimated slow noise: one every four lengths of the span.
 
-        By Satterthwaite, 2 over the relative variance of the spectral density at frequency zero, 2·share·length. That
-        of the likeliest process over a way T is 8·length/T: share/length is sharp, and 1/length has the variance
-        2/(length·T).
+        By Satterthwaite, 2 over the relative variance of the spectral density at frequency zero, 2·share·length. For
+        the likeliest process over a span T this variance is 8·length/T: share/length is sharp, and 1/length has the
+        variance 2/(length·T).
         """
         return float(np.ptp(self.along)) / (4 * self.length) if self.share else np.inf
 
     @cached_property
     def covariance(self) -> ndarray:
-        """Of all samples."""
+        """Covariance matrix of all samples."""
         apart = np.abs(self.along[:, None] - self.along[None, :]) / self.length
         whole: ndarray = self.share * np.exp(-apart)
         whole[np.diag_indices(len(self.along))] += 1 / self.counts
         return whole if self.common is None else whole + self.common @ self.common.T
 
     def deletion(self, residuals: ndarray, used: ndarray) -> ndarray:
-        """Residuals less what the others tell of them, in their deviations then; those that are not used tell nothing.
+        """Residuals minus their prediction from the other used ones, in standard deviations of this difference.
 
-        The inverse of the covariance has both (Martin 1992, Commun. Stat. Theory Methods 21, 1183).
+        Both follow from the inverse covariance (Martin 1992, Commun. Stat. Theory Methods 21, 1183).
         """
         whitener, beside = self.whitener(used)[:, used], self.covariance[:, used]
         inverse = whitener.T @ whitener
@@ -72,7 +72,7 @@ class CorrelatedNoise:
         return np.asarray(off / np.sqrt(variance))
 
     def whitener(self, used: ndarray) -> ndarray:
-        """Matrix that makes residuals independent with the variance of one measurement, without what is not used."""
+        """Matrix that makes the used residuals independent, with the variance of one measurement."""
         if (key := used.tobytes()) not in self._whiteners:
             factor = cholesky(self.covariance[np.ix_(used, used)], lower=True)
             self._whiteners[key] = np.zeros((int(used.sum()), len(used)))
@@ -81,17 +81,17 @@ class CorrelatedNoise:
 
     @cached_property
     def _whiteners(self) -> dict[bytes, ndarray]:
-        """Those that were made, by the samples that are used."""
+        """Cached matrices, by the used samples."""
         return {}
 
 
 def restricted_likelihood(
     residuals: ndarray, slopes: ndarray, counts: ndarray, steps: ndarray, share: float, length: float
 ) -> float:
-    """Logarithm of the restricted likelihood of residuals, but for a constant.
+    """Logarithm of the restricted likelihood of residuals, up to a constant.
 
-    By the tridiagonal inverse of the process; the size of the noise is at its best. `steps` are the ways between
-    neighbouring samples, `slopes` those of what was fitted; there is no process where the share is 0.
+    By the tridiagonal inverse of the process, at the likeliest size of the noise. `steps` are the distances between
+    neighbouring samples, `slopes` those of the fitted coordinates; a share of 0 means no process.
     """
     number, size = slopes.shape
     together = np.column_stack([residuals, slopes])
@@ -127,9 +127,9 @@ def noise_of(
     used: ndarray,
     most: int = _MOST_DENSE,
 ) -> CorrelatedNoise | None:
-    """Likeliest noise of residuals, by slopes of what was fitted; None where independent samples are as likely.
+    """Likeliest noise of residuals, from the slopes of the fitted coordinates; None if independent noise is as likely.
 
-    None as well where fewer samples than three a slope, or more than `most`, are used.
+    None as well if fewer than three samples per slope, or more than `most`, are used.
     """
     if not 3 * slopes.shape[1] < used.sum() <= most:
         return None

@@ -15,9 +15,9 @@ from quakedesign.fault import FrictionLaw
 
 @dataclass(frozen=True, kw_only=True)
 class Coordinate:
-    """One number that is fitted: sought from `low` to `high` [`unit`, SI], by searches that start between `start`.
+    """One fitted number: between `low` and `high` [`unit`, SI]; searches start inside the interval `start`.
 
-    Where it is `logarithmic`, it is positive and its logarithm is fitted.
+    If it is `logarithmic`, it is positive and its logarithm is fitted.
     """
 
     name: str
@@ -28,18 +28,18 @@ class Coordinate:
     logarithmic: bool = True
 
     def inward(self, value: float) -> float:
-        """What is fitted."""
+        """Fitted coordinate of a value."""
         return math.log(value) if self.logarithmic else value
 
     def outward(self, fitted: float) -> float:
-        """Value in its unit of what is fitted."""
+        """Value, in its unit, of a fitted coordinate."""
         return math.exp(fitted) if self.logarithmic else fitted
 
 
 class Experiment(ABC):
-    """A simulated experiment: what the record's friction would be without noise, for given coordinates.
+    """A simulated experiment: friction of the record without noise, for given coordinates.
 
-    Its law has any values for what is fitted.
+    The fitted quantities of its law may have any values.
     """
 
     law: FrictionLaw
@@ -47,14 +47,14 @@ class Experiment(ABC):
 
     @abstractmethod
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction coefficient [-] at every sample; not finite where there is no such experiment."""
+        """Friction coefficient [-] at every sample; not finite if the experiment does not exist."""
 
     @abstractmethod
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives of `friction`, shape (samples, coordinates)."""
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """What a noise of friction [-] means for what was taken for granted; nothing by default."""
+        """Remarks on assumptions, checked with a noise of friction [-]; empty by default."""
         return ()
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
@@ -68,13 +68,13 @@ class Experiment(ABC):
 
     @property
     def bounds(self) -> tuple[ndarray, ndarray]:
-        """Least and largest of what is fitted."""
+        """Smallest and largest fitted coordinates."""
         ends = [(c.inward(c.low), c.inward(c.high)) for c in self.coordinates]
         low, high = np.array(ends, dtype=float).T
         return low, high
 
     def near(self, values: Mapping[str, float]) -> ndarray:
-        """What is fitted, at values of another experiment; where it has none, the middle of where searches start."""
+        """Fitted coordinates at values of another experiment; where one is missing, the middle of `start`."""
         given = ((c, values.get(c.name)) for c in self.coordinates)
         return np.array([sum(map(c.inward, c.start)) / 2 if v is None else c.inward(v) for c, v in given])
 
@@ -86,16 +86,16 @@ class Experiment(ABC):
 def fitted_quantities(
     law: FrictionLaw, names: Sequence[str], fitted: Any, linear: Collection[str] = ()
 ) -> dict[Any, Any]:
-    """What the symbols of a law stand for: exponentials of what is fitted by name, else its own numbers.
+    """Values of the symbols of a law: exponentials of the fitted coordinates by name, else its own numbers.
 
-    Quantities that may be negative, `linear` ones, are fitted as they are.
+    The `linear` quantities, which may be negative, are fitted without the exponential.
     """
     values = {n: fitted[place] if n in linear else ca.exp(fitted[place]) for place, n in enumerate(names)}
     return {symbol: values.get(name, getattr(law, name)) for name, symbol in law.symbols().items()}
 
 
 def holding(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
-    """A law with other values, those that no fault can have among them: an evolution effect that is not positive."""
+    """A law with other values, even with an evolution effect that is not positive, which no fault can have."""
     if values.get("evolution_effect", 1.0) > 0:
         return replace(law, **values)  # type: ignore[type-var]
     own = {name: getattr(law, name) for name in law.quantities()} | law._options()
@@ -113,7 +113,7 @@ class _Around(Experiment):
 
     @property
     def law(self) -> FrictionLaw:  # type: ignore[override]
-        """That of the whole."""
+        """Law of the whole."""
         return self.whole.law  # type: ignore[no-any-return]
 
     @abstractmethod
@@ -121,44 +121,44 @@ class _Around(Experiment):
         """Coordinates of the whole."""
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """Those of the whole."""
+        """Remarks of the whole."""
         return self.whole.remarks(self.inside(fitted), noise)  # type: ignore[no-any-return]
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
-        """That of the whole."""
+        """Law of the whole."""
         return self.whole.best_law(self.inside(fitted))  # type: ignore[no-any-return]
 
     def resolved(self, fitted: ndarray, accuracy: float) -> Experiment:
-        """With the whole resolved."""
+        """The same experiment with `whole` resolved."""
         finer = self.whole.resolved(self.inside(fitted), accuracy)
         return self if finer is self.whole else replace(self, whole=finer)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Widened(_Around):
-    """An experiment, `whole`, with further coordinates, which come last and move friction in proportion to `columns`.
+    """An experiment, `whole`, with further coordinates, which come last and change friction in proportion to `columns`.
 
-    Trends move it by themselves, for their columns are displacement [m] or time [s]. Delays of changes of rate [s] move
-    it against its growth, to first order; their columns say which samples follow each change, up to the next.
+    Trends add to friction; their columns are displacement [m] or time [s]. Delays of changes of rate [s] act through
+    the negative growth of friction, to first order; their columns mark the samples from each change to the next.
     """
 
     coordinates: tuple[Coordinate, ...]
-    columns: ndarray  # of shape (samples, further coordinates)
+    columns: ndarray  # shape (samples, further coordinates)
     delays: bool = False
 
     def inside(self, fitted: ndarray) -> ndarray:
-        """Coordinates of the experiment without the others."""
+        """Coordinates of `whole`, without the further ones."""
         return fitted[: len(self.whole.coordinates)]
 
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction of the experiment, moved by the further coordinates."""
+        """Friction of `whole`, changed by the further coordinates."""
         own = self.inside(fitted)
         with np.errstate(invalid="ignore", over="ignore"):
             moved = self.columns @ fitted[len(own) :] * (-self.whole.growth(own) if self.delays else 1.0)
             return np.asarray(self.whole.friction(own) + moved)
 
     def slopes(self, fitted: ndarray) -> ndarray:
-        """Derivatives, at delays that are small against what follows the changes."""
+        """Derivatives, for delays that are short compared with the transients after the changes."""
         own = self.inside(fitted)
         moved = -self.whole.growth(own)[:, None] * self.columns if self.delays else self.columns
         return np.column_stack([self.whole.slopes(own), moved])
@@ -168,7 +168,7 @@ DELAY = "delay"
 
 
 def delayed(whole: Any, after: ndarray, most: ndarray) -> Experiment:
-    """An experiment with a delay of each change of rate, of at most so much [s]; as `Widened` has their columns."""
+    """An experiment with a delay of each change of rate, at most `most` [s]; `after`: the columns of `Widened`."""
     if not after.shape[1]:
         return whole  # type: ignore[no-any-return]
     delays = [_about_zero(f"{DELAY}_{place}", "s", end) for place, end in enumerate(most.tolist(), start=1)]
@@ -176,7 +176,7 @@ def delayed(whole: Any, after: ndarray, most: ndarray) -> Experiment:
 
 
 def trended(whole: Experiment, along: ndarray, size: float, name: str = TREND) -> Widened:
-    """An experiment with a trend along displacement [m] or time [s], of at most ten frictions over the whole way."""
+    """An experiment with a trend along displacement [m] or time [s], of at most ten frictions over the whole span."""
     trend = _about_zero(name, "1/m" if name == TREND else "1/s", 10 * size / float(np.ptp(along)))
     return Widened(whole=whole, coordinates=(*whole.coordinates, trend), columns=along[:, None])
 
@@ -187,14 +187,14 @@ def _about_zero(name: str, unit: str, most: float) -> Coordinate:
 
 @dataclass(frozen=True, kw_only=True)
 class Difference(_Around):
-    """An experiment in which a coordinate less others, by their places, stands for the first of them."""
+    """An experiment whose first coordinate is replaced by its difference from others, all by index."""
 
     first: int
     seconds: tuple[int, ...]
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:  # type: ignore[override]
-        """Those of the experiment, with the difference in place of the first."""
+        """Coordinates of the experiment, with the difference in place of the first."""
         changed = list(self.whole.coordinates)
         a, others = changed[self.first], [changed[place] for place in self.seconds]
         changed[self.first] = Coordinate(
@@ -208,7 +208,7 @@ class Difference(_Around):
         return tuple(changed)
 
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction of the experiment; there is none where the first would not be positive."""
+        """Friction of the experiment; not finite if the first coordinate would not be positive."""
         return self.whole.friction(self.inside(fitted))  # type: ignore[no-any-return]
 
     def slopes(self, fitted: ndarray) -> ndarray:
@@ -222,14 +222,14 @@ class Difference(_Around):
         return slopes
 
     def difference(self, fitted: ndarray) -> ndarray:
-        """Coordinates here, of those of the whole."""
+        """Coordinates of this experiment from those of `whole`."""
         changed = np.array(fitted, dtype=float)
         first = self.whole.coordinates[self.first].outward(float(fitted[self.first]))
         changed[self.first] = first - self._others(fitted)
         return changed
 
     def inside(self, fitted: ndarray) -> ndarray:
-        """Coordinates of the whole, of those here; not a number where the first would not be positive."""
+        """Coordinates of `whole` from those of this experiment; NaN if the first would not be positive."""
         changed = np.array(fitted, dtype=float)
         first = fitted[self.first] + self._others(fitted)
         if self.whole.coordinates[self.first].logarithmic:

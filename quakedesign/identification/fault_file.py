@@ -1,9 +1,9 @@
 """Fault files whose friction and box cover every law that a record allows.
 
 The plant is x″ = −N̂[μ(x)(σ′ − p) − μ(0)σ′] − k̂x − …, so multiplying μ by a number and dividing N̂ by it changes
-nothing. A law of the record's box with the static friction s is therefore, on a fault with N̂, the same as s₀/s times
-it on a fault with N̂s/s₀: with s₀ between the smallest and the largest s, all laws of the box have one static
-friction, as a fault has, and its box another half-width of N̂.
+nothing. Let a law of the record's box have the static friction s. On a fault with N̂ it is equivalent to the law times
+s₀/s on a fault with N̂s/s₀. With s₀ between the smallest and the largest s, all laws of the box then have the single
+static friction that a fault file needs, and the half-width of N̂ increases.
 """
 
 import re
@@ -29,7 +29,7 @@ from quakedesign.identification.identification_result import Identification
 from quakedesign.text import quantity
 
 _DIGITS = 6
-_WIDEST_SPREAD = Fraction(1, 5)  # of a, b and D_c, independent of each other, for which guarantees are found
+_WIDEST_SPREAD = Fraction(1, 5)  # largest independent relative uncertainty of a, b, D_c with guarantees
 _WEAKENING = {"residual", "drop", "critical_slip"}
 _OF_TASK = ("target slip", "operation time")
 _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
@@ -38,10 +38,10 @@ _RATE_AND_STATE = ("direct_effect", "evolution_effect", "critical_slip")
 def cover(
     law: FrictionLaw, ranges: Mapping[str, tuple[float, float]], box: UncertaintyBox
 ) -> tuple[FrictionLaw, UncertaintyBox]:
-    """Law that weakens with slip, and box, that cover every law of ranges of residual, drop and critical slip.
+    """Slip-weakening law and box that cover every law with residual, drop and critical slip in given ranges.
 
     The bounds and the slope of the scaled laws are monotone in each of the three, so corners are enough; numbers are
-    rounded to the safe side. `law` is one of the family, `box` that of everything else.
+    rounded to the safe side. `law` is one of the family, `box` the uncertainty of all other parameters.
     """
     ends = {name: [rational(end) for end in ranges[name]] for name in sorted(_WEAKENING)}
     corners = [dict(zip(ends, corner, strict=True)) for corner in product(*ends.values())]
@@ -62,7 +62,7 @@ def cover(
 
 
 def _decimal(value: Fraction, *, up: bool, digits: int = _DIGITS) -> Fraction:
-    """Decimal of a few digits that is not below (`up`) or not above a rational."""
+    """Decimal of a few digits not below (`up`) or not above a rational."""
     context = Context(prec=digits, rounding=ROUND_CEILING if up else ROUND_FLOOR)
     return Fraction(context.divide(Decimal(value.numerator), Decimal(value.denominator)))
 
@@ -70,17 +70,17 @@ def _decimal(value: Fraction, *, up: bool, digits: int = _DIGITS) -> Fraction:
 def identified_fault(identification: Identification, fault: Fault) -> Fault:
     """A fault with the friction of a record in place of its own.
 
-    For a law that weakens with slip, friction and box together hold every law of the record's box, so that `guarantee`
-    and `design` cover all of them. For a law with state friction is the best fit, at the reference rate of a fault that
-    has one, for without control that is the rate at which it is loaded.
+    For a slip-weakening law, friction and box together contain every law of the record's box, so that `guarantee` and
+    `design` cover all of them. For a law with state, friction is the best fit. If the fault has a reference rate, which
+    is its loading rate without control, friction is stated at this rate.
 
     Parameters
     ----------
     identification : Identification
-        Of a record that tells every parameter.
+        Identification of a record that determines every parameter.
     fault : Fault
-        That gives everything but friction. Where the identified friction has a state and that of the fault has none,
-        there is no disturbance, and T_s suits slow sliding, as it does where the fault's was assumed.
+        Source of everything except friction. If only the identified friction has a state, there is no disturbance, and
+        T_s is chosen for slow sliding; T_s also if that of the fault was assumed.
 
     Returns
     -------
@@ -89,7 +89,7 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     Raises
     ------
     RecordError
-        When the record does not tell every parameter, or tells a friction that no fault file holds.
+        When the record does not determine every parameter, or a fault file cannot express its friction.
     """
     text = ""
     if getattr(identification.law, "evolution_effect", 1.0) <= 0:
@@ -116,7 +116,7 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
 
 
 def poor_fit(identification: Identification) -> str:
-    """Why a controller must not be built on a record unless this is accepted; nothing where it is explained."""
+    """Reason why a design on this record must be accepted explicitly; empty if the fit explains the record."""
     assessment = identification.assessment
     if assessment.verdict == EXPLAINS_NOT:
         return f"the fit {assessment}"
@@ -124,7 +124,7 @@ def poor_fit(identification: Identification) -> str:
 
 
 def other_parts(identification: Identification, fault: Fault) -> str:
-    """What a fault file of a record takes from a fault, in words."""
+    """Parts that a fault file of a record takes from a fault, in words."""
     shared = "normal stress, size, task"
     if _gains_a_state(identification, fault):
         return shared
@@ -134,7 +134,7 @@ def other_parts(identification: Identification, fault: Fault) -> str:
 
 
 def task_remarks(identification: Identification, fault: Fault) -> list[str]:
-    """What to look at in the task that a fault file of a record has from a fault: what was assumed, and its rate."""
+    """Remarks on the task that a fault file of a record takes from a fault: assumed values, and its rate."""
     law: Any = identification.law
     task, moved = fault.reference, _at_rate_of(fault, law)
     assumed = [remark for remark in fault.assumed if remark.startswith(_OF_TASK)]
@@ -149,7 +149,7 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
-    """Whether a record has another law with state than the fault names, and none was requested."""
+    """Remark if a record, fitted without a given law, has another law with state than the fault."""
     named, law = fault.friction, identification.law
     if identification.rival is None or named.equilibrium is not law.equilibrium or named.name == law.name:
         return []
@@ -158,9 +158,9 @@ def law_remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def next_command(identification: Identification, path: str | Path | None) -> str:
-    """The command that designs for a fault file of a record, for all constants that the record allows.
+    """Command that designs for a fault file of a record, for all constants that the record allows.
 
-    Without a path, the option that writes a file.
+    Without a path, it names the option that writes a file.
     """
     difference = identification.difference
     if identification.explained and difference is not None and difference.low > 0:
@@ -179,7 +179,7 @@ def next_command(identification: Identification, path: str | Path | None) -> str
 def _at_rate_of(fault: Fault, law: FrictionLaw) -> Any:
     """A law at the reference rate and on the working range of a fault.
 
-    The same friction, as μ_0 moves by (a − b)·ln of the ratio of rates.
+    Friction is the same, as μ_0 changes by (a − b)·ln of the ratio of rates.
     """
     own = fault.friction
     if not isinstance(law, RateAndState) or not isinstance(own, RateAndState):
@@ -196,7 +196,7 @@ def _at_rate_of(fault: Fault, law: FrictionLaw) -> Any:
 
 
 def _step_follows(identification: Identification, fault: Fault) -> bool:
-    """Whether T_s is that of the identified friction: the fault has one for friction of another kind, or none."""
+    """Whether T_s is chosen for the identified friction: the fault's is assumed, or for another kind of friction."""
     slides = identification.law.equilibrium is STEADY_SLIDING
     return slides and (step_assumed(fault) or _gains_a_state(identification, fault))
 
@@ -206,14 +206,14 @@ def _gains_a_state(identification: Identification, fault: Fault) -> bool:
 
 
 def covers(law: FrictionLaw) -> bool:
-    """Whether a fault can hold ranges of a law's parameters, not only their best values."""
+    """Whether a fault file can express ranges of a law's parameters, not only their best values."""
     return set(law.quantities()) == _WEAKENING
 
 
 def save_fault(identification: Identification, fault: Fault, path: str | Path) -> None:
-    """Write `identified_fault` to a TOML file, best fit and ranges as remarks at its head; whole or not at all.
+    """Write `identified_fault` to a TOML file, with best fit and ranges as remarks at its head; whole or not at all.
 
-    Raises `RecordError` as that does, and `OutputError` when it cannot be written.
+    Raises `RecordError` as `identified_fault`, and `OutputError` when the file cannot be written.
     """
     whole, law = identified_fault(identification, fault), identification.law
     if covers(law):
@@ -237,11 +237,11 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
 
 
 def _too_wide(identification: Identification) -> str:
-    """Which of a, b and D_c are too uncertain for a guarantee, and what narrows them; nothing where none is."""
+    """Which of a, b and D_c are too uncertain for a guarantee, and a remedy; empty if none is."""
     wide = {name: share for name, share in _shares(identification).items() if share > _WIDEST_SPREAD}
     if not wide:
         return ""
-    number = ceil((max(wide.values()) / _WIDEST_SPREAD) ** 2)  # as deviations fall with the root of it
+    number = ceil((max(wide.values()) / _WIDEST_SPREAD) ** 2)  # as standard deviations decrease with its square root
     text = ", ".join(f"{name} within {float(share):.0%}" for name, share in wide.items())
     return (
         f"the box is too wide for a guarantee: {text}; about {float(_WIDEST_SPREAD):.0%} is the most. Fit about "
@@ -250,11 +250,11 @@ def _too_wide(identification: Identification) -> str:
 
 
 def _spread(identification: Identification) -> str:
-    """By how much of their best values a, b and D_c leave them in the box, rounded up to two digits."""
+    """Largest relative deviation of a, b and D_c from their best values in the box, rounded up to two digits."""
     return f"{float(_decimal(max(_shares(identification).values()), up=True, digits=2)):g}"
 
 
 def _shares(identification: Identification) -> dict[str, Fraction]:
-    """By how much of its best value each of a, b and D_c leaves it in the box."""
+    """Largest relative deviation of each of a, b and D_c from its best value in the box."""
     estimates = [identification.estimates[name] for name in _RATE_AND_STATE]
     return {e.name: max(abs(rational(end) / rational(e.value) - 1) for end in (e.least, e.most)) for e in estimates}

@@ -20,14 +20,14 @@ from quakedesign.identification.experiment import Experiment
 
 CONFIDENCE = 0.95
 _SHARE_OF_NOISE = 3e-3
-_ALONE = 0.4  # of an outlier, what lies beside it on the same side: more is a peak that is not explained
-_UNFELT = 1e-7  # of the largest slope, below which one is rounding
-_SHARE_OF_EXCESS = 2e-3  # by which a search may still get better when it ends
-_CANDIDATES = 64  # drawn between the ends of every coordinate and simulated once
+_ALONE = 0.4  # share of an outlier that its neighbours may reach on the same side; more is an unexplained peak
+_UNFELT = 1e-7  # share of the largest slope, below which a slope is rounding
+_SHARE_OF_EXCESS = 2e-3  # excess by which a search may still improve when it ends
+_CANDIDATES = 64  # random starting points, simulated once
 _COARSE = 40  # steps of a search before it is compared with the others
-_AGREEMENT = 1e-3  # share by which sums of squares of searches that agree differ at most
-_ROUNDS = 6  # in which outliers are left out and steps are made finer
-_LONGEST_OUTLIER = 2  # samples in a row; more are no accident, and stay
+_AGREEMENT = 1e-3  # largest relative difference of the sums of squares of agreeing searches
+_ROUNDS = 6  # repetitions that remove outliers and refine steps
+_LONGEST_OUTLIER = 2  # successive samples; longer runs are no accident, and are retained
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,25 +35,25 @@ class Fit:
     """The best fit of an experiment to measured friction."""
 
     experiment: Experiment
-    fitted: ndarray  # coordinates as they are fitted
+    fitted: ndarray  # fitted coordinates
     measured: ndarray  # friction [-]
-    counts: ndarray  # of how many measurements every sample is the mean
-    used: ndarray  # samples that count
+    counts: ndarray  # number of measurements averaged in every sample
+    used: ndarray  # used samples
     agreeing: int  # searches that end in the best fit
     starts: int  # searches
-    correlated: CorrelatedNoise | None = None  # noise that samples share with their neighbours
-    pieces: float = math.inf  # independent ones of the noise, where samples of several records are whitened
+    correlated: CorrelatedNoise | None = None  # noise correlated between neighbouring samples
+    pieces: float = math.inf  # independent pieces of the noise, for whitened samples of several records
 
     @cached_property
     def residuals(self) -> ndarray:
-        """Measured less simulated friction [-] at every sample."""
+        """Measured minus simulated friction [-] at every sample."""
         return np.asarray(self.measured - self.experiment.friction(self.fitted))
 
     @property
     def scaled(self) -> ndarray:
-        """Residuals [-] in deviations of one measurement, less what their neighbours tell of them.
+        """Residuals [-] in deviations of one measurement, minus their prediction from the neighbours.
 
-        The noise of a mean of n falls with the root of n.
+        The noise of a mean of n falls with the square root of n.
         """
         if self.correlated is not None:
             return self.correlated.deletion(self.residuals, self.used)
@@ -61,29 +61,29 @@ class Fit:
 
     @cached_property
     def weights(self) -> ndarray:
-        """Of all residuals, 0 for outliers; a matrix that makes them independent where noise is correlated."""
+        """Weights of all residuals, 0 for outliers; for correlated noise a matrix that makes them independent."""
         if self.correlated is not None:
             return self.correlated.whitener(self.used)
         return np.asarray(np.sqrt(self.counts) * self.used)
 
     @cached_property
     def whitened(self) -> ndarray:
-        """Residuals that count, made independent with the variance of one measurement."""
+        """Used residuals, made independent with the variance of one measurement."""
         return weighed(self.weights, self.residuals)
 
     @property
     def squares(self) -> float:
-        """Sum of squares of the residuals that count."""
+        """Sum of squares of the used residuals."""
         return float(np.sum(self.whitened**2))
 
     @property
     def freedom(self) -> int:
-        """Samples that count, less the coordinates."""
+        """Number of used samples minus number of coordinates."""
         return int(self.used.sum()) - len(self.fitted)
 
     @property
     def freedom_of_noise(self) -> float:
-        """Degrees of freedom of the size of noise; where noise fades, its pieces."""
+        """Degrees of freedom of the size of the noise; for correlated noise, its pieces."""
         return min(self.freedom, self.pieces, self.correlated.pieces if self.correlated is not None else math.inf)
 
     @property
@@ -93,12 +93,12 @@ class Fit:
 
     @property
     def accuracy(self) -> float:
-        """Of the simulated friction [-]: a small share of the noise of a sample."""
+        """Required accuracy of the simulated friction [-]: a small share of the noise of a sample."""
         return _SHARE_OF_NOISE * self.noise / float(np.sqrt(np.mean(self.counts)))
 
     @cached_property
     def correlation(self) -> float:
-        """Samples per independent one, at least 1: the integrated autocorrelation of the residuals.
+        """Number of samples per independent sample, at least 1: the integrated autocorrelation of the residuals.
 
         Summed over lags up to five times itself (Sokal 1997, in Functional Integration, NATO ASI B361, 131).
         """
@@ -109,20 +109,20 @@ class Fit:
         return float(max(sums[window[0] if len(window) else -1], 1.0))
 
     def excess(self, squares: float) -> float:
-        """How far a sum of squares is above the smallest, in variances of the noise of independent samples."""
+        """Difference of a sum of squares from the smallest, in variances of the noise of independent samples."""
         return (squares - self.squares) / (self.noise**2 * self.correlation)
 
     def threshold(self, count: int, chance: float = 1 - CONFIDENCE) -> float:
-        """`excess` that so many parameters jointly pass by noise alone with a chance (Fisher's F)."""
+        """`excess` that `count` parameters jointly exceed by noise alone with probability `chance` (Fisher's F)."""
         return float(count * stats.f.isf(chance, count, self.freedom_of_noise))
 
     def distance(self, fitted: ndarray) -> float:
-        """`excess` of given coordinates, infinite where there is no such experiment."""
+        """`excess` of given coordinates; infinite if the experiment does not exist."""
         squares = float(np.sum(weighed(self.weights, self.measured - self.experiment.friction(fitted)) ** 2))
         return self.excess(squares) if np.isfinite(squares) else np.inf
 
     def along(self, place: int) -> ndarray:
-        """Moves of all coordinates, to first order, with one of them by 1 and the others at their best."""
+        """Changes of all coordinates, to first order, when one changes by 1 and the others stay optimal."""
         slopes, moves = self.slopes, np.zeros(len(self.fitted))
         scale = np.linalg.norm(slopes, axis=0)
         others = (scale > _UNFELT * np.max(scale)) & (np.arange(len(scale)) != place)
@@ -133,12 +133,12 @@ class Fit:
 
     @cached_property
     def slopes(self) -> ndarray:
-        """Derivatives of friction in what is fitted, made independent as `whitened`."""
+        """Derivatives of friction by the fitted coordinates, whitened as `whitened`."""
         return weighed(self.weights, _finite(self.experiment.slopes(self.fitted)))
 
     @cached_property
     def deviations(self) -> ndarray:
-        """Standard deviations of what is fitted, from the slopes; infinite where these say nothing."""
+        """Standard deviations of the fitted coordinates from the slopes; infinite where undetermined."""
         scale = np.linalg.norm(self.slopes, axis=0)
         scale[scale == 0] = 1
         values, turn = np.linalg.svd(self.slopes / scale, full_matrices=False)[1:]
@@ -150,7 +150,7 @@ class Fit:
 
 
 def weighed(weights: ndarray, values: ndarray) -> ndarray:
-    """Values of all samples, or columns of them, by weights of `Fit`; those without a weight are left out."""
+    """Values of all samples, or columns of them, times the weights of `Fit`; samples of weight 0 are left out."""
     if weights.ndim == 2:
         used = np.any(weights != 0, axis=0)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -169,12 +169,12 @@ def fit(
     least: int = 4,
     most: int = 16,
 ) -> Fit:
-    """Best fit of all starts, without outliers, on an experiment that is simulated accurately enough for the noise.
+    """Best fit of all starts, without outliers, on an experiment simulated accurately enough for the noise.
 
-    `measured` friction [-] is a mean of so many measurements (`counts`), or of one; `seed` is that of the draw of the
-    starts, the first of which may be told (`near`): `most` of the best candidates, until two of at `least` so many
-    searches end in the best fit and it tells everything. Raises `RecordError` when none can be simulated, or there
-    are too few samples.
+    `measured` friction [-] is a mean of `counts` measurements, or of one; `seed` is for the random starts, the first
+    of which may be given (`near`). Searches start from at most `most` of the best candidates, until at `least` so many
+    have run, two end in the best fit and it determines every coordinate. Raises `RecordError` when no candidate can be
+    simulated, or there are too few samples.
     """
     if len(measured) < 3 * len(experiment.coordinates):
         raise RecordError(
@@ -201,7 +201,7 @@ def fit(
 def _starts(
     experiment: Experiment, measured: ndarray, roots: ndarray, seed: int, most: int, near: ndarray | None = None
 ) -> tuple[Experiment, list[ndarray]]:
-    """The candidates that come nearest, behind the one that is known, and the experiment with steps for the first."""
+    """The given start followed by the best candidates, and the experiment with steps for the first of them."""
     draw = np.random.default_rng(seed)
     ends = np.array([[c.inward(end) for end in c.start] for c in experiment.coordinates])
     candidates = draw.uniform(ends[:, 0], ends[:, 1], (_CANDIDATES, len(ends)))
@@ -231,9 +231,9 @@ def minimised(
     fixed: ndarray | None = None,
     steps: int = 100,
 ) -> tuple[ndarray, float]:
-    """Coordinates with the least sum of squares near a start, and that sum; `fixed` ones stay as they are.
+    """Coordinates with the least sum of squares near a start, and this sum; `fixed` ones do not change.
 
-    Residuals count by their weights, as `weighed` says.
+    Residuals have the weights of `weighed`.
     """
     free = np.ones(len(start), dtype=bool) if fixed is None else ~fixed
     low, high = experiment.bounds
@@ -263,14 +263,14 @@ def minimised(
 
 
 def _finite(slopes: ndarray) -> ndarray:
-    """Slopes with nothing where they leave the floats, as those of transients that no sample sees can."""
+    """Slopes with 0 in place of non-finite ones, as those of transients between samples can be."""
     return np.asarray(np.where(np.isfinite(slopes), slopes, 0.0))
 
 
 def settled(fit: Fit) -> Fit:
-    """A fit on a finer simulation and without outliers, until neither changes.
+    """A fit on a finer simulation and without outliers, repeated until neither changes.
 
-    Steps that suit coordinates a deviation away suit these.
+    Steps that are adequate for coordinates one deviation away are adequate here.
     """
     made_for = np.full_like(fit.fitted, np.inf)
     for _ in range(_ROUNDS):
@@ -287,9 +287,9 @@ def settled(fit: Fit) -> Fit:
 
 
 def outliers(residuals: ndarray) -> ndarray:
-    """Samples so far off that noise alone has one such among all with a chance of 5 %, in runs of at most two.
+    """Samples so far off that noise alone gives one such sample with a probability of 5 %, in runs of at most two.
 
-    The size of the noise is that of the median residual. What rises from its neighbours is no accident, and stays.
+    The size of the noise is that of the median residual. A peak that rises from its neighbours is no outlier.
     """
     off = residuals - np.median(residuals)
     size = np.median(np.abs(off)) / stats.norm.ppf(0.75)
@@ -304,9 +304,9 @@ def outliers(residuals: ndarray) -> ndarray:
 
 
 def advantage(one: Fit, other: Fit) -> tuple[float, float]:
-    """How many times as large the sum of squares of another fit is, and by how much its AIC is higher.
+    """Ratio of the sum of squares of another fit to that of this one, and the increase of its AIC.
 
-    At the samples that both count, of fits with as many parameters: n·ln of that ratio, with n independent samples.
+    At the samples that both fits use, for equal numbers of parameters: n·ln of this ratio, n independent samples.
     """
     both = one.used & other.used
     if one.correlated is not None or other.correlated is not None:
@@ -318,16 +318,16 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
 
 
 _MOST_TRIALS = 14
-_CLOSE = 0.01  # share of the wanted distance at which an end counts as found
-_LIMIT = 0.98  # share of the way to the limit of a coordinate from which on an end counts as there
+_CLOSE = 0.01  # relative tolerance of the required distance at an end
+_LIMIT = 0.98  # share of the distance to the limit of a coordinate from which on an end counts as the limit
 _PATIENCE = 3  # trials after which the limit of a coordinate is tried
-_FIRST = 0.05  # step where the slopes say nothing
+_FIRST = 0.05  # first step if the slopes do not give one
 _BETTER = 0.1  # excess by which a profile has to improve on the fit to replace it
-_FAR = 0.5  # move of a logarithmic coordinate after which the experiment is resolved again
+_FAR = 0.5  # change of a logarithmic coordinate after which the experiment is resolved again
 
 
 class BetterFit(Exception):
-    """A profile has come upon coordinates that fit better."""
+    """A profile contains coordinates that fit better."""
 
     def __init__(self, fitted: ndarray) -> None:
         super().__init__("a better fit")
@@ -336,25 +336,25 @@ class BetterFit(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class ProfilePoint:
-    """Coordinates on a profile, and the experiment there with the coordinates that its steps are made for."""
+    """Coordinates on a profile, and the experiment there with the coordinates for which its steps were chosen."""
 
     experiment: Experiment
     resolved_at: ndarray
     fitted: ndarray
-    step: float = 0.0  # of the coordinate from the fit
-    distance: float = 0.0  # root of the excess
+    step: float = 0.0  # change of the coordinate from the fit
+    distance: float = 0.0  # square root of the excess
 
 
 @dataclass(frozen=True)
 class Profile:
-    """The excess along one coordinate, by its place, with the others at their best, at the points that were tried."""
+    """The excess along one coordinate (index `place`), minimised over the others, at the points that were tried."""
 
     fit: Fit
     place: int
     points: list[ProfilePoint] = field(default_factory=list)
 
     def interval(self, threshold: float) -> tuple[float, float]:
-        """Where `Fit.excess` passes a threshold on either side, as it is fitted; infinite where the record sets no end.
+        """Fitted coordinates where `Fit.excess` passes a threshold on both sides; infinite if the record sets no end.
 
         Raises `BetterFit`.
         """
@@ -363,8 +363,8 @@ class Profile:
     def _end(self, threshold: float, side: int) -> float:
         """End on one side: the root of the distance from the fit, which grows about linearly (bracketed secant).
 
-        Where the distance grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little.
-        An end is none that lies at that limit, or where the experiment cannot be followed.
+        If the distance grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little.
+        An end at this limit, or where the experiment cannot be simulated, does not count.
         """
         fit, place, wanted = self.fit, self.place, math.sqrt(threshold)
         furthest = abs(fit.experiment.bounds[(side + 1) // 2][place] - fit.fitted[place])
@@ -388,7 +388,7 @@ class Profile:
         return float(fit.fitted[place] + above.step) if followed else side * math.inf
 
     def _point(self, step: float, near: ProfilePoint) -> ProfilePoint:
-        """The best of all other coordinates with this one moved, and the root of its excess."""
+        """The optimum over all other coordinates with this one changed, and the square root of its excess."""
         fit, place = self.fit, self.place
         start = near.fitted + fit.along(place) * (step - near.step)
         logarithmic = [c.logarithmic for c in fit.experiment.coordinates]
@@ -403,7 +403,7 @@ class Profile:
 
 
 def _next(below: ProfilePoint, above: ProfilePoint, wanted: float) -> float:
-    """Length of the next step to try, a little beyond where the distance should be reached."""
+    """Length of the next step, slightly beyond the expected end."""
     aim, near, end = wanted * (1 + _CLOSE / 2), abs(below.step), abs(above.step)
     if math.isinf(end):
         return near * min(max(aim / below.distance, 1.01), 3.0) if below.distance > 0 else 3 * near

@@ -17,7 +17,7 @@ from quakedesign.identification.fitting import CONFIDENCE, Fit, Profile
 from quakedesign.identification.record import Record
 
 _OTHER_LAW = {"rest": "another --law", "sliding": "no --law, which fits both laws with a state"}
-_BESIDE = "delay", "start_rate"  # which may stay open: nothing else hangs on them then
+_BESIDE = "delay", "start_rate"  # parameters that may stay undetermined: no other parameter depends on them then
 
 
 _EXPERIMENTS = {
@@ -41,12 +41,12 @@ class ParameterEstimate:
     value : float
         Best fit.
     low, high : float
-        Of this parameter alone; infinite (or 0) where the record sets no end.
+        Ends for this parameter alone; infinite (or 0) where the record sets no end.
     least, most : float
-        Of all parameters at once: ends of the smallest box around their joint region.
+        Ends for all parameters jointly: those of the smallest box that contains their joint region.
     profile : tuple of (float, float)
-        Values that were tried, ascending, and the roots of the excess of their squares in variances of the noise, all
-        other parameters at their best.
+        Tried values, ascending, and the square roots of the excess of their sums of squares in variances of the noise,
+        minimised over all other parameters.
     """
 
     name: str
@@ -60,11 +60,11 @@ class ParameterEstimate:
 
     @property
     def identified(self) -> bool:
-        """Whether the record sets both ends, of the joint region too."""
+        """Whether the record sets both ends, also of the joint region."""
         return all(math.isfinite(end) for end in (self.low, self.high, self.least, self.most))
 
     def to_dict(self) -> Json:
-        """Value and ends, None for an end that the record does not set."""
+        """Value and ends; None for an end that the record does not set."""
         ends = {name: _finite(getattr(self, name)) for name in ("value", "low", "high")}
         return {**ends, "unit": self.unit, "identified": self.identified}
 
@@ -73,8 +73,8 @@ class ParameterEstimate:
 class Outlier:
     """A sample that noise does not explain, left out of the fit."""
 
-    time: float  # as in the record [s], since its first sample
-    size: float  # measured less simulated friction [-]
+    time: float  # time in the record [s], since its first sample
+    size: float  # measured minus simulated friction [-]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,8 +82,8 @@ class Rival:
     """Another law with as many parameters, which explains the record less well."""
 
     law: str  # its name
-    squares: float  # how many times as large the weighted sum of squares is that it leaves
-    excess: float  # by how much its AIC is higher, twice the fall of the logarithm of the likelihood
+    squares: float  # ratio of its weighted sum of squares to that of the selected law
+    excess: float  # increase of its AIC, twice the decrease of the log-likelihood
 
     def __str__(self) -> str:
         little = "" if self.excess > DECISIVE else "; so little that the record hardly tells the laws apart"
@@ -101,21 +101,21 @@ class Identification:
     record : Record
     fit : Fit
     used : ndarray of bool
-        Samples of the record that the fit is about.
+        Samples of the record in the fit.
     estimates : dict of ParameterEstimate
-        By name: quantities of the law, the stiffness where it was fitted.
+        By name: quantities of the law, and the stiffness if fitted.
     difference : ParameterEstimate or None
-        Of the direct and the evolution effect, for laws that have both.
+        Direct minus evolution effect, for laws that have both.
     law : FrictionLaw
-        With the best values.
+        Law with the best values.
     notes : tuple of str
-        What was taken for granted.
+        Assumptions of the fit.
     seed : int
-        Of the starts.
+        Seed of the random starts.
     rival : Rival or None
-        The law that was fitted as well and not taken, where none was asked for.
+        Law that was also fitted but not selected, if no law was given.
     assessment : Assessment
-        Tests of what was taken for granted, and the verdict.
+        Tests of the assumptions, and the verdict.
     """
 
     record: Record
@@ -146,11 +146,11 @@ class Identification:
 
     @property
     def explained(self) -> bool:
-        """Whether the fit explains the record and leaves nothing open."""
+        """Whether the verdict is that the fit explains the record."""
         return self.assessment.verdict == EXPLAINS
 
     def to_try(self) -> list[str]:
-        """What may explain a record better."""
+        """Options that may explain a record better."""
         return [
             "--figure, which shows where",
             *([_OTHER_LAW[self.law.equilibrium.name]] if self.rival is None else []),
@@ -160,26 +160,26 @@ class Identification:
         ]
 
     def experiments(self, sign: Check | None = None) -> list[str]:
-        """Experiments that would tell what this record does not."""
+        """Experiments that would determine the quantities that this record leaves open."""
         open_ = {name for name, estimate in self.estimates.items() if not estimate.identified}
         open_ |= {"sign"} if sign is not None and not sign.passed else set()
         return [experiment for experiment, names in _EXPERIMENTS.items() if open_ & set(names.split())]
 
     @property
     def box(self) -> dict[str, tuple[float, float]]:
-        """Ranges that hold every set of parameters which the record allows at 95 %, by name."""
+        """Ranges, by name, that contain every set of parameters which the record allows at 95 %."""
         return {name: (estimate.least, estimate.most) for name, estimate in self.estimates.items()}
 
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
-        """Samples left out, largest first."""
+        """Excluded samples, largest residual first."""
         left = ~self.fit.used
         sizes, times = self.fit.residuals[left].tolist(), self.record.time[self.used][left].tolist()
         outliers = [Outlier(time=time, size=size) for time, size in zip(times, sizes, strict=True)]
         return tuple(sorted(outliers, key=lambda outlier: -abs(outlier.size)))
 
     def allows(self, values: Mapping[str, float]) -> bool:
-        """Whether the record allows a set of parameters, in the joint region at 95 %: all that were fitted, in SI."""
+        """Whether a set of all fitted parameters, in SI, lies in the joint 95 % region of the record."""
         coordinates = self.fit.experiment.coordinates
         if missing := {c.name for c in coordinates} - set(values):
             raise ParameterError(
@@ -188,7 +188,7 @@ class Identification:
         return self.fit.distance(self.fit.experiment.near(values)) <= self.fit.threshold(len(coordinates))
 
     def untold(self) -> list[str]:
-        """Sentences about what the record cannot tell; none where it tells everything."""
+        """Sentences about parameters that the record does not determine; empty if it determines all."""
         open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith(_BESIDE))]
         texts, only = [], self.difference
         pair = only.name.split(" - ") if only is not None and only.identified else []
@@ -199,7 +199,7 @@ class Identification:
         return texts + [f"{e.name} is not identifiable from this record: {_one_sided(e)}" for e in open_]
 
     def to_dict(self) -> Json:
-        """Everything that JSON can hold; SI units."""
+        """JSON-able facts; SI units."""
         fit, difference = self.fit, self.difference
         return {
             "law": self.law.name,
@@ -232,7 +232,7 @@ class Identification:
 
 
 def estimate(profile: Profile, alone: tuple[float, float], jointly: tuple[float, float]) -> ParameterEstimate:
-    """Estimate of one coordinate from its profile and the ends there, as they are fitted."""
+    """Estimate of one coordinate from its profile and the ends, given as fitted coordinates."""
     fit, best = profile.fit, float(profile.fit.fitted[profile.place])
     coordinate = fit.experiment.coordinates[profile.place]
     points = [(0.0, 0.0), *((each.step, each.distance) for each in profile.points)]

@@ -1,6 +1,6 @@
 """Loading of an experiment: load point and normal stress as piecewise linear functions of time.
 
-Noise of a transducer that is followed sample by sample would drive the simulated spring.
+Following the transducer sample by sample would drive the simulated spring with its noise.
 """
 
 from collections.abc import Sequence
@@ -15,31 +15,31 @@ from quakedesign.identification.correlated_noise import noise_of
 from quakedesign.identification.record import FAR_OFF, Record, reading_step, scatter, thinned
 from quakedesign.identification.sliding_experiment import Drive
 
-_MOST_POINTS = 2000  # means in which changes of rate are sought
+_MOST_POINTS = 2000  # largest number of means in the search for changes of rate
 _CANDIDATES = 400
-_FEWEST = 8  # samples
+_FEWEST = 8  # smallest number of samples
 _MOST_PIECES = 40
-_PATIENCE = 4  # pieces that may explain nothing before the search ends
-_TIMELY = 0.01  # of a sampling period, by which the time of a change may be off unseen
+_PATIENCE = 4  # successive pieces without improvement that end the search
+_TIMELY = 0.01  # error of the time of a change, in sampling periods, that has no visible effect
 _MOST_DELAYS = 4
-_HOLD, _SLOW = 3.0, 0.05  # deviations of a rate about 0, and their share of the largest rate: less is a hold
-_LARGE_CHANGE = 1.25  # of rate, that is a step and no wandering
-_LEAST_CHANGE = 0.03  # of the faster rate: friction feels it by 3 % of a or b
-_ODDS = 4.0  # times log n: what a new piece must improve a fit by, in variances
-_ROUGH = 6.0  # deviations from the pieces, in noise from sample to sample: more is motion
-_SLIGHT = 0.01  # of the whole path
+_HOLD, _SLOW = 3.0, 0.05  # standard deviations of a rate from 0, and their share of the largest rate: less is a hold
+_LARGE_CHANGE = 1.25  # ratio of rates above which a change is a step, not a drift
+_LEAST_CHANGE = 0.03  # relative to the faster rate: changes friction by 3 % of a or b
+_ODDS = 4.0  # required improvement of a fit by a new piece, in variances times log n
+_ROUGH = 6.0  # deviations from the pieces over the noise from sample to sample: more is motion
+_SLIGHT = 0.01  # share of the whole path
 
 
 @dataclass(frozen=True, kw_only=True)
 class Pieces:
     """A load point that moves at a constant rate in every piece."""
 
-    begins: ndarray  # times at which pieces begin [s], the first the first time of the record
+    begins: ndarray  # times at which pieces begin [s], from the first time of the record
     rates: ndarray  # [m/s]
     noise: float  # standard deviation of the displacement from the pieces [m]
-    given: bool = False  # whether the rates were given
-    rough: bool = False  # whether the motion is not made of a few such pieces
-    errors: ndarray | None = None  # deviations of the logarithms of the rates [-]; None where they are known
+    given: bool = False  # whether the rates are given
+    rough: bool = False  # whether a few such pieces do not describe the motion
+    errors: ndarray | None = None  # standard deviations of the logarithms of the rates [-]; None for known rates
 
     @property
     def large_changes(self) -> ndarray:
@@ -61,7 +61,7 @@ def staircase(time: ndarray, rates: ndarray) -> Pieces:
 
 
 def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: float) -> Pieces:
-    """Pieces with the rates of the data, as few as explain it within its noise (`scatter`) and reading step [m]."""
+    """Pieces with rates from the data: the fewest that explain it within its noise (`scatter`) and reading step [m]."""
     if len(time) < _FEWEST or not np.ptp(position) > 0:
         rate = (position[-1] - position[0]) / max(time[-1] - time[0], 1e-300)
         return Pieces(begins=time[:1], rates=np.array([rate]), noise=0.0, rough=bool(np.ptp(position) > 0))
@@ -102,7 +102,7 @@ def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: floa
 
 
 def given_pieces(time: ndarray, position: ndarray, rates: ndarray) -> Pieces:
-    """Pieces with known rates, beginning at the times that suit the data best; refused where they do not suit."""
+    """Pieces with known rates, with the beginnings that fit the data best; rejected if they do not fit."""
     t, x = _means(time, position, most=400)
 
     def off(begins: ndarray) -> float:
@@ -125,16 +125,16 @@ def given_pieces(time: ndarray, position: ndarray, rates: ndarray) -> Pieces:
 
 @dataclass(frozen=True, kw_only=True)
 class Loading:
-    """How the load point of a record moves, and what presses on the fault."""
+    """Motion of the load point of a record, and its normal load."""
 
     pieces: Pieces
-    normal: Pieces | None  # of the normal load, in its unit for displacement; None where constant or as measured
-    level: float | None  # normal load at the first sample, or its constant value; None where as measured
-    notes: tuple[str, ...]  # what was taken for granted
+    normal: Pieces | None  # pieces of the normal load, in its unit instead of m; None if constant or as measured
+    level: float | None  # normal load at the first sample, or its constant value; None if as measured
+    notes: tuple[str, ...]  # assumptions
 
     @property
     def first_rate(self) -> float:
-        """Rate of the load point in the beginning [m/s]."""
+        """Initial rate of the load point [m/s]."""
         return float(self.pieces.rates[0])
 
     @property
@@ -144,19 +144,19 @@ class Loading:
 
     @property
     def before(self) -> float:
-        """Displacement of the load point before the first of them [m]."""
+        """Displacement of the load point before the first large change of rate [m]."""
         return float(self.pieces.position(self.steps[:1])[0]) if len(self.steps) else 0.0
 
     @property
     def first_step(self) -> float | None:
-        """Logarithm of the ratio of rates at the first of them; None without one, or with a hold."""
+        """Logarithm of the ratio of rates at the first large change; None without one, or with a hold."""
         if not len(places := np.flatnonzero(self.pieces.large_changes)):
             return None
         slow, fast = self.pieces.rates[places[0] : places[0] + 2]
         return float(np.log(fast / slow)) if slow > 0 and fast > 0 else None
 
     def delays(self, record: Record) -> tuple[ndarray, ndarray]:
-        """Samples that follow each change of rate whose time noise hides, and by how much it may be off at most [s]."""
+        """Samples after each change of rate with a time uncertain by noise, and the largest errors of the times [s]."""
         begins, rates = self.pieces.begins, self.pieces.rates
         ends = np.append(begins[1:], np.inf)
         off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)
@@ -171,7 +171,7 @@ class Loading:
         return table, np.array([most for _, most in windows])
 
     def drive(self, record: Record) -> tuple[Drive, ndarray]:
-        """Drive between all samples and changes of rate, and which of these instants are samples."""
+        """Drive between all samples and changes of rate, and the indices of the samples among these instants."""
         assert record.load_point is not None
         inside = self.pieces.begins[(self.pieces.begins > record.time[0]) & (self.pieces.begins < record.time[-1])]
         changes = np.array([]) if self.pieces.rough else np.setdiff1d(inside, record.time)
@@ -189,9 +189,9 @@ class Loading:
 
 
 def prepared(record: Record, rates: Sequence[float] = (), fixed: Pieces | None = None) -> tuple[Record, Loading | None]:
-    """A record as means of its samples, with load point and normal load as they drive it; and how these move.
+    """A record as means of its samples, with the driving load point and normal load; and their motion.
 
-    `rates` of the load point [m/s], or the pieces, may be given. Raises `RecordError` where it does not move at these.
+    `rates` of the load point [m/s], or the pieces, may be given. Raises `RecordError` if the record contradicts them.
     """
     time, load = record.time, record.load_point
     if load is None:
@@ -235,7 +235,7 @@ def _in_words(pieces: Pieces) -> str:
 
 
 def _means(time: ndarray, position: ndarray, most: int = _MOST_POINTS) -> tuple[ndarray, ndarray]:
-    """Times and positions, or means of as many neighbours each as leave at most so many."""
+    """Times and positions, or means of neighbours so that at most `most` remain."""
     each = -(-len(time) // most)
     edges = np.arange(0, len(time), each)
     counts = np.diff([*edges, len(time)])
@@ -248,19 +248,19 @@ def _design(u: ndarray, knots: ndarray) -> ndarray:
 
 
 def _hinges(u: ndarray, y: ndarray, knots: ndarray) -> tuple[ndarray, ndarray]:
-    """Rates of all pieces, and the broken line."""
+    """Rates of all pieces, and the piecewise linear function."""
     design = _design(u, knots)
     coefficients, *_ = np.linalg.lstsq(design, y, rcond=None)
     return np.cumsum(coefficients[1:]), design @ coefficients
 
 
 def _squares(u: ndarray, y: ndarray, knots: ndarray) -> float:
-    """Of what the broken line leaves."""
+    """Sum of squares of the residuals of the piecewise linear function."""
     return float(np.sum((y - _hinges(u, y, knots)[1]) ** 2))
 
 
 def _refined(u: ndarray, y: ndarray, knots: ndarray) -> ndarray:
-    """Knots moved to where broken lines fit best (Muggeo 2003, Stat. Med. 22, 3055)."""
+    """Knots at which the piecewise linear function fits best (Muggeo 2003, Stat. Med. 22, 3055)."""
     best, least = knots, np.inf
     for _ in range(8 if len(knots) else 0):
         squares = _squares(u, y, knots)
@@ -281,7 +281,7 @@ def _refined(u: ndarray, y: ndarray, knots: ndarray) -> ndarray:
 def _needed(u: ndarray, y: ndarray, knots: ndarray, floor: float) -> ndarray:
     """Knots without those that explain no more than noise, and those at which the rate hardly changes.
 
-    Two that less than two points part stand for one: a mean of samples before and after a change lies off both lines.
+    Two knots less than two points apart count as one: a mean of samples before and after a change fits neither line.
     """
     left = y - _hinges(u, y, knots)[1]
     noise = max(float(left @ left) / len(u) * _spread(left), floor)
@@ -302,10 +302,10 @@ def _needed(u: ndarray, y: ndarray, knots: ndarray, floor: float) -> ndarray:
 
 
 def _rate_errors(u: ndarray, left: ndarray, knots: ndarray) -> ndarray:
-    """Standard deviation of the slope of each piece: of a separate line, as the knots are free.
+    """Standard deviation of the slope of each piece: that of a separate line, as the knots are free.
 
-    By the long-run variance of what is left, the sum of its covariance over all lags. It is that of the likeliest white
-    noise and process that fades: readings in steps hide in the first correlation alone how long the process lasts.
+    From the long-run variance of the residuals, the sum of their covariance over all lags, of the likeliest white noise
+    and decaying process: with quantised readings, the first correlation alone does not show the decay length.
     """
     ends = np.concatenate([u[:1], knots, u[-1:]])
     inside = np.maximum(np.histogram(u, ends)[0], 1)
@@ -321,7 +321,7 @@ def _rate_errors(u: ndarray, left: ndarray, knots: ndarray) -> ndarray:
 
 
 def _spread(residuals: ndarray) -> float:
-    """Samples per independent one of residuals that follow each other like AR(1), by their first correlation."""
+    """Number of samples per independent sample for AR(1) residuals, from their first correlation."""
     first = float(residuals[1:] @ residuals[:-1] / max(residuals @ residuals, 1e-300))
     first = min(max(first, 0.0), 0.95)
     return (1 + first) / (1 - first)

@@ -1,7 +1,7 @@
 """Laboratory files: text of any dialect, xlook's text and binary formats, MATLAB arrays.
 
-A file becomes columns with the names, units and numbers that it has. What they mean is decided in
-`quakedesign.identification.record`.
+A file becomes columns with its own names, units and numbers. `quakedesign.identification.record` interprets
+them.
 """
 
 import csv
@@ -30,8 +30,8 @@ _CELL = re.compile(rf"{_NUMBER}|\d{{1,4}}[-/.]\d{{1,2}}[-/.]\d{{1,4}}.*")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+(?:[eEdD][+-]?\d+)?")
 _HEADING = re.compile(r"\s*(.*?)\s*(?:\[([^\]]*)\]|\(([^()]*)\))?\s*")
 _BLANK_HEADING = re.compile(r"[^\s\[(]+(?:\s*(?:\[[^\]]*\]|\([^)]*\)))?")
-_PREAMBLE = 200  # lines before the first number
-_HEADERS = {16: 1380, 32: 2724}  # bytes of xlook's header of so many channels
+_PREAMBLE = 200  # largest number of lines before the first number
+_HEADERS = {16: 1380, 32: 2724}  # size of xlook's header [byte], by the number of channels
 _XLOOK_TEXT = "number of records"
 _ARRAYS = {f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)} | {"double", "single"}
 _MOST_NUMBERS = 16 * MOST_SAMPLES
@@ -42,16 +42,16 @@ _UNIT_WORDS |= {f"{each}/{time}" for each in "m mm um µm mic micron microns nm"
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
-    """One column as the file has it."""
+    """One column, as in the file."""
 
-    heading: str  # name and unit as they are written
+    heading: str  # name and unit, as in the file
     name: str
     unit: str | None
-    values: ndarray  # not a number where the file has none
+    values: ndarray  # NaN where the file has no number
 
 
 def read_columns(path: str | Path) -> list[Column]:
-    """Columns of a file, of equal length; `RecordError` when it is of no known kind, or a line unlike its headings."""
+    """Columns of a file, of equal length; `RecordError` for an unknown format, or a line unlike its headings."""
     data = read_bytes(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
     if data.startswith(b"MATLAB 5.0"):
         columns = _matlab(data, path)
@@ -68,14 +68,14 @@ def read_columns(path: str | Path) -> list[Column]:
 
 
 def heading(text: str) -> Column:
-    """Name and unit of a heading, without values: ``Time (s)``, ``tau [MPa]``, ``disp_um``."""
+    """Name and unit of a heading, such as ``Time (s)``, ``tau [MPa]``, ``disp_um``."""
     text = " ".join(text.split())
     name, square, rounded = _HEADING.fullmatch(text).groups()  # type: ignore[union-attr]
     return Column(heading=text, name=name, unit=rounded if square is None else square, values=np.empty(0))
 
 
 def _decoded(data: bytes, path: str | Path) -> str:
-    """Text of bytes: UTF-8, UTF-16 by its mark, or Latin-1, in which older instruments write a micro sign."""
+    """Text of bytes: UTF-8, UTF-16 with its byte-order mark, or Latin-1, as older instruments write a micro sign."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace")
     try:
@@ -108,7 +108,7 @@ def _text(text: str, path: str | Path) -> list[Column]:
 
 
 def _numbers(line: str) -> bool:
-    """Whether a line has numbers, dates or nothing in all its cells, and two of them at least."""
+    """Whether a line has at least two numbers or dates, among them the first cell that is not empty."""
     if not line.strip() or line.strip()[0] in _COMMENTS:
         return False
     cells = [cell.strip() for cell in _cells(line, _sign(line))]
@@ -117,7 +117,7 @@ def _numbers(line: str) -> bool:
 
 
 def _sign(line: str) -> str:
-    """Sign between the columns of a line of numbers, a pattern of blanks where there is no other."""
+    """Separator of the columns of a line of numbers; a pattern of blanks if there is no other."""
     return next((sign for sign in (";", "\t", ",") if sign in line.strip()), r"\s+")
 
 
@@ -127,7 +127,7 @@ def _cells(line: str, sign: str) -> list[str]:
 
 
 def _headings(before: list[str], count: int, sign: str) -> list[Column]:
-    """Names and units of the columns, from the lines before the first numbers; numbers for names where there is none.
+    """Names and units of the columns, from the lines before the first numbers; without headings, numbers as names.
 
     A line of units may stand between headings and numbers, and headings may be a remark, as NumPy writes them.
     """
@@ -148,7 +148,7 @@ def _headings(before: list[str], count: int, sign: str) -> list[Column]:
 
 
 def _heading_cells(line: str, sign: str) -> list[str]:
-    """Cells of a line of headings, which may be divided by another sign than the numbers below."""
+    """Cells of a line of headings, whose separator may differ from that of the numbers below."""
     own = sign if sign == r"\s+" or sign in line else _sign(line)
     cells = _BLANK_HEADING.findall(line) if own == r"\s+" else _cells(line, own)
     return [cell.strip() for cell in cells]
@@ -167,7 +167,7 @@ def _refuse_count(named: list[Column], count: int, sign: str) -> None:
 
 
 def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -> pd.DataFrame:
-    """Numbers of a text by the place of their column."""
+    """Numbers of a text by the index of their column."""
     cells = _cells(line, sign)
     comma = sign != "," and any(_DECIMAL_COMMA.fullmatch(cell.strip()) for cell in cells)
     try:
@@ -189,14 +189,14 @@ def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -
             f"line {int(match[2])} must hold {match[1]} values. Received {match[3]}." if match else "lines must agree."
         )
         raise RecordError(f"{what} Complete or remove it.") from None
-    if len(columns) == len(cells) - 1:  # numbers of rows without a heading, as xlook's, stand first
+    if len(columns) == len(cells) - 1:  # row numbers without a heading, such as xlook's, come first
         table = table.drop(columns=0)
         table.columns = range(table.shape[1])
     return table
 
 
 def _values(cells: pd.Series, column: Column, text: str, first: int) -> ndarray:
-    """Numbers of one column; not a number where nothing was measured. A text that is no number is refused."""
+    """Numbers of one column; NaN where nothing was measured. A text that is no number is rejected."""
     if pd.api.types.is_numeric_dtype(cells):
         values: ndarray = cells.to_numpy(dtype=float, copy=True)
         values[~np.isfinite(values)] = np.nan
@@ -232,7 +232,7 @@ def _remedy(cell: str) -> str:
 
 
 def _xlook_text(text: str) -> list[Column]:
-    """What xlook's command `type` writes: a count, numbers, names, units and lengths of columns, then rows."""
+    """Output of xlook's command `type`: a count; numbers, names, units and lengths of the columns; then rows."""
     lines = text.splitlines()
     names, units = (lines[i].split() if len(lines) > i else [] for i in (2, 3))
     if len(names) != len(units) or len(lines) < 6:
@@ -248,7 +248,7 @@ def _xlook_text(text: str) -> list[Column]:
 
 
 def _xlook_offset(data: bytes) -> tuple[int, int, str] | None:
-    """Bytes of the header of xlook's binary, channels in it, and the kind of its numbers; None for another file."""
+    """Header size [byte], number of channels and number type of an xlook binary file; None for another file."""
     if len(data) < min(_HEADERS.values()):
         return None
     records, channels = (int.from_bytes(data[i : i + 4], "big") for i in (20, 24))
@@ -260,7 +260,7 @@ def _xlook_offset(data: bytes) -> tuple[int, int, str] | None:
 
 
 def _xlook_binary(data: bytes, size: int, channels: int, kind: str) -> list[Column]:
-    """Columns of big-endian floats, or of doubles as the machine wrote them."""
+    """Columns of big-endian floats, or of doubles in the byte order of the machine."""
     table = np.frombuffer(data[size:], dtype=kind)
     if kind == "<f8" and not np.all(np.abs(table) < 1e30):
         table = np.frombuffer(data[size:], dtype=">f8")
@@ -276,7 +276,7 @@ def _xlook_binary(data: bytes, size: int, channels: int, kind: str) -> list[Colu
 
 
 def _matlab(data: bytes, path: str | Path) -> list[Column]:
-    """Numeric arrays of a file of MATLAB's; a matrix gives columns named after their numbers."""
+    """Numeric arrays of a MATLAB file; the columns of a matrix are named by their numbers."""
     try:
         listed = whosmat(io.BytesIO(data))
         kinds = {name: shape for name, shape, kind in listed if kind in _ARRAYS}

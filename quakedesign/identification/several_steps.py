@@ -1,7 +1,7 @@
 """Several velocity steps of one experiment: each fitted alone, and one law fitted to all.
 
-The common fit shares the parameters of the law and the stiffness. Level, trend, beginning and delays are those of each
-step, and so is its noise: samples count in its deviations.
+The common fit shares the parameters of the law and the stiffness. Each step has its own level, trend, beginning, delays
+and noise; its samples are weighted by the standard deviation of its noise.
 """
 
 from collections.abc import Sequence
@@ -28,8 +28,8 @@ from quakedesign.identification.sliding_experiment import STIFFNESS
 from quakedesign.text import counted, shown
 
 _LEVEL = "reference_coefficient"
-_UNLIKELY = 0.01  # probability below which steps do not have one law
-_ROUNDS = 3  # in which steps of the simulation and the common fit follow each other
+_UNLIKELY = 0.01  # probability below which one law does not explain all steps
+_ROUNDS = 3  # alternations between simulation steps and the common fit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +40,9 @@ class Steps:
     ----------
     steps : tuple of Identification
     common : Identification
-        Of the parameters that all share; samples of its fit are in deviations of the noise of each step.
+        Identification of the shared parameters; samples of its fit are in deviations of the noise of each step.
     probability : float
-        Of steps that differ as much as these by chance, if one law holds for all (Fisher's F).
+        Probability of differences as large as these by chance, if one law holds for all steps (Fisher's F).
     """
 
     steps: tuple[Identification, ...]
@@ -50,7 +50,7 @@ class Steps:
     probability: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything that JSON can hold; SI units. That of the common fit, and every step under `steps`."""
+        """JSON-able facts of the common fit, in SI units, and of every step under `steps`."""
         steps = [{"record": step.record.name, **step.to_dict()} for step in self.steps]
         return {**self.common.to_dict(), "probability": self.probability, "steps": steps}
 
@@ -60,7 +60,7 @@ def read_steps(
 ) -> list[Record]:
     """Records of the steps of a file: windows ``0 s to 60 s, 60 s to 120 s``, or as `cut` gives them with ``auto``.
 
-    One of the whole file by default. `how` is that of `read_record`, and so are the errors.
+    By default one record of the whole file. `how` and the errors are those of `read_record`.
     """
     if steps in ("", "auto"):
         record = read_record(path, begin=begin, end=end, **how)
@@ -88,7 +88,7 @@ def read_steps(
 
 
 def cut(record: Record) -> list[Record]:
-    """Parts of a record, one a large change of the rate of loading, from midway to midway between these."""
+    """Parts of a record, one for each large change of the loading rate, cut midway between the changes."""
     _, loading = prepared(record)
     begins = np.empty(0) if loading is None else loading.steps
     if len(begins) < 2:
@@ -111,19 +111,19 @@ def identify_steps(
     trend: str = "auto",
     seed: int = 0,
 ) -> Steps:
-    """Friction parameters of every step, those that all steps share, and whether one law explains all.
+    """Friction parameters of every step, shared parameters of all steps, and whether one law explains all.
 
     Parameters
     ----------
     records : sequence of Record
-        One a step, at least two, none of whose samples is in another.
+        One a step, at least two, without common samples.
     law, stiffness, rates, states, trend, seed
         As for `identify`; `rates` are those of every step.
 
     Raises
     ------
     RecordError
-        When a record does not suit the law, or stiffnesses of steps have different units.
+        When a record has not the columns that the law needs, or stiffnesses of steps have different units.
     """
     if len(records) < 2:
         raise RecordError(f"several steps must be at least 2. Received {len(records)}. Use identify for one.")
@@ -156,7 +156,7 @@ def identify_steps(
 
 
 def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
-    """The common fit, the names that it shares, and by how much its squares exceed those of the steps' own fits."""
+    """The common fit, the names of shared parameters, and its sum of squares minus those of the steps' own fits."""
     fits = [step.fit for step in steps]
     of_steps = [fit.experiment.coordinates for fit in fits]
     quantities = steps[0].law.quantities()
@@ -188,7 +188,7 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
 
 
 def _assessed(common: Identification, steps: Sequence[Identification], probability: float) -> Assessment:
-    """Whether one law explains all steps, and whether a - b has one sign in it and in a step at least."""
+    """Whether one law explains all steps, and whether a - b has one sign in it and in at least one step."""
     text = "explains" if probability >= _UNLIKELY else "does not explain"
     sentence = f"one set of parameters {text} all steps (chance {probability:.2g})"
     one = Check(name="common", passed=probability >= _UNLIKELY, value=probability, limit=_UNLIKELY, sentence=sentence)
@@ -210,13 +210,13 @@ def _assessed(common: Identification, steps: Sequence[Identification], probabili
 class _Joint(Experiment):
     """Steps with shared coordinates; samples are made independent, in deviations of the noise of their step."""
 
-    fits: tuple[Fit, ...]  # of the steps by themselves, which say how much samples count
+    fits: tuple[Fit, ...]  # separate fits of the steps, which give the weights of samples
     parts: tuple[Experiment, ...]
-    places: tuple[ndarray, ...]  # of the coordinates of each step among those of all
+    places: tuple[ndarray, ...]  # indices of the coordinates of each step among all coordinates
     coordinates: tuple[Coordinate, ...]
 
     def joined(self, values: Sequence[ndarray]) -> ndarray:
-        """Values of the samples of each step, weighed."""
+        """Weighted values of the samples of each step."""
         return np.concatenate([weighed(w, v) for w, v in zip(self._weights, values, strict=True)])
 
     @cached_property
@@ -224,7 +224,7 @@ class _Joint(Experiment):
         return [fit.weights / fit.noise for fit in self.fits]
 
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction of all steps, weighed."""
+        """Weighted friction of all steps."""
         return self.joined([each.friction(fitted[at]) for each, at in zip(self.parts, self.places, strict=True)])
 
     def slopes(self, fitted: ndarray) -> ndarray:
@@ -237,10 +237,10 @@ class _Joint(Experiment):
         return np.vstack(rows)
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
-        """That of the first step."""
+        """Law of the first step."""
         return self.parts[0].best_law(fitted[self.places[0]])
 
     def resolved(self, fitted: ndarray, accuracy: float) -> "_Joint":
-        """With each step resolved for its own noise."""
+        """The same experiment with each step resolved for its own noise."""
         parts = zip(self.parts, self.places, self.fits, strict=True)
         return replace(self, parts=tuple(each.resolved(fitted[at], fit.accuracy) for each, at, fit in parts))

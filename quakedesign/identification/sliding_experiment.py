@@ -1,9 +1,9 @@
 """Simulated velocity-step and hold experiments with rate-and-state friction.
 
 A spring loads a block. Its far end follows the recorded load point, from sample to sample at a constant rate. Inertia
-is left out: the spring balances friction, k(x − slip) = σ'μ, and the time derivative of that gives the slip rate (the
-plant of `quakedesign.symbolic.rate_and_state_plant`, without damping, on a record's time). The stiff equations are
-integrated by an L-stable Rosenbrock step of order 3, with exact derivatives.
+is neglected: the spring balances friction, k(x − slip) = σ'μ, and the time derivative of this balance gives the slip
+rate (the plant of `quakedesign.symbolic.rate_and_state_plant`, without damping, on the time scale of a record). The
+stiff equations are integrated by an L-stable Rosenbrock step of order 3, with exact derivatives.
 """
 
 from collections.abc import Callable
@@ -45,24 +45,24 @@ def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.S
     return y + 2 * first + third + fourth, fourth
 
 
-_MOST_STEPS = 30  # a sample on average; what needs more runs away, or is far too sparse for its law
+_MOST_STEPS = 30  # mean number of steps per sample; more mean instability, or samples far too sparse for the law
 _SAFETY = 0.9
-_WILD = 1e3  # error of friction, or none at all, that says nothing of the next length
-_SHORTEST = 1e-8  # of the time between two samples
+_WILD = 1e3  # error of friction above which, or if not finite, it does not give the next length
+_SHORTEST = 1e-8  # share of the time between two samples
 STIFFNESS = "stiffness"
-START_STATE = "start_state"  # logarithm of the state at the first sample over that of steady sliding
-START_RATE = "start_rate"  # logarithm of the slip rate at the first sample over that of the load point
+START_STATE = "start_state"  # logarithm of the ratio of the state at the first sample to that of steady sliding
+START_RATE = "start_rate"  # logarithm of the ratio of the slip rate at the first sample to the load-point rate
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """What an experiment is driven with, between neighbouring samples."""
+    """Inputs of an experiment between neighbouring samples."""
 
     lengths: ndarray  # [s]
-    rates: ndarray  # of the load point [m/s]
+    rates: ndarray  # rates of the load point [m/s]
     growth: ndarray  # d(log σ')/dt [1/s]
-    compliance: ndarray  # 1/σ' half-way [1/Pa, 1/N, or 1]
-    first_rate: float  # at which it slides steadily before the first sample [m/s]
+    compliance: ndarray  # 1/σ' at the middle [1/Pa, 1/N, or 1]
+    first_rate: float  # rate of steady sliding before the first sample [m/s]
 
     @cached_property
     def inputs(self) -> ndarray:
@@ -77,20 +77,20 @@ class SlidingExperiment(Experiment):
     law: FrictionLaw
     drive: Drive
     coordinates: tuple[Coordinate, ...]
-    stiffness: float | None  # where it is given, in units of the normal load per m
-    normal_unit: str  # Pa, N or nothing
-    steps: tuple[tuple[float, ...], ...]  # lengths [s] of those between neighbouring instants
+    stiffness: float | None  # given stiffness, in units of the normal load per m
+    normal_unit: str  # Pa, N or empty
+    steps: tuple[tuple[float, ...], ...]  # step lengths [s] between neighbouring instants
     measured: ndarray  # instants that are samples; the others are changes of rate between them
 
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction coefficient [-] at every sample, sliding steadily at the first."""
+        """Friction coefficient [-] at every sample, with steady sliding at the first."""
         states = self._states(fitted)[:, self._sampled]
         return np.asarray(self._build["friction"](states, np.asarray(fitted)[:, None])[0])
 
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes.
 
-        Those of one step are found for all at once; a banded linear system joins them.
+        The derivatives of the single steps are computed for all steps at once; a banded linear system combines them.
         """
         q, states = np.asarray(fitted)[:, None], self._states(fitted)
         size, count = len(states), len(q)
@@ -111,14 +111,14 @@ class SlidingExperiment(Experiment):
         return rates
 
     def growth(self, fitted: ndarray) -> ndarray:
-        """Slope of friction in time [1/s] at every sample, as the spring gives it behind a change of rate."""
+        """Time derivative of friction [1/s] at every sample, from the spring after a change of rate."""
         ends, place = np.flatnonzero(self.measured), [c.name for c in self.coordinates]
         after = np.minimum(ends, len(self.drive.rates) - 1)
         stiffness = self.stiffness if self.stiffness is not None else float(np.exp(fitted[place.index(STIFFNESS)]))
         return np.asarray(stiffness * self.drive.compliance[after] * (self.drive.rates[after] - self.rates(fitted)))
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """The mass from which on inertia would have been seen."""
+        """Remark with the mass above which inertia would be visible."""
         rates = np.exp(self._states(fitted)[0, self._ends])
         acceleration = float(np.max(np.abs(np.diff(rates) / self.drive.lengths * self.drive.compliance)))
         if not (acceleration > 0 and self.normal_unit):
@@ -134,17 +134,17 @@ class SlidingExperiment(Experiment):
         return holding(law, {n: end for n, end in (ends | effect).items() if n in law.quantities()})
 
     def resolved(self, fitted: ndarray, accuracy: float) -> "SlidingExperiment":
-        """The same experiment in as many steps as an accuracy of friction needs at given coordinates.
+        """The same experiment with the steps that an accuracy of friction requires at given coordinates.
 
-        By the embedded estimate; the same steps are then taken at other coordinates too, so that friction is smooth in
-        them. Where no number of steps suffices, because the block runs away, nothing changes.
+        By the embedded error estimate; the same steps are then used at other coordinates too, so that friction is a
+        smooth function of them. If no number of steps suffices, because the block is unstable, nothing changes.
         """
         q = np.asarray(fitted)
         taken = _steps(self._build["trial"], q, accuracy, self.drive, self._build["start"](q))
         return self if taken is None else replace(self, steps=taken)
 
     def _states(self, fitted: ndarray) -> ndarray:
-        """Logarithms of rate and states [SI] after every step, the first before all of them."""
+        """Logarithms of rate and states [SI]: initial values, then after every step."""
         q = np.asarray(fitted)
         if q.tobytes() not in self._latest:
             start = self._build["start"](q).full()
@@ -155,12 +155,12 @@ class SlidingExperiment(Experiment):
 
     @cached_property
     def _latest(self) -> dict[bytes, ndarray]:
-        """The states that were asked for last: friction, its growth and its slopes ask in turn."""
+        """Cache of the last states: friction, its growth and its slopes use them in turn."""
         return {}
 
     @cached_property
     def _ends(self) -> ndarray:
-        """Steps up to every instant."""
+        """Number of steps up to every instant."""
         return np.concatenate([[0], np.cumsum([len(lengths) for lengths in self.steps])])
 
     @cached_property
@@ -185,7 +185,7 @@ class SlidingExperiment(Experiment):
 def _steps(
     trial: Any, fitted: ndarray, accuracy: float, drive: Drive, start: Any
 ) -> tuple[tuple[float, ...], ...] | None:
-    """Lengths of the steps between all samples that one simulation chooses; None where too many, or too short ones."""
+    """Step lengths between all samples from one simulation; None if the steps are too many or too short."""
     y, length, steps, left = start, float("inf"), [], _MOST_STEPS * len(drive.lengths)
     for whole, between in zip(drive.lengths.tolist(), drive.inputs.T.tolist(), strict=True):
         taken: list[float] = []
@@ -209,7 +209,7 @@ def _steps(
 def _built(
     law: FrictionLaw, names: tuple[str, ...], stiffness: float | None, first_rate: float, linear: frozenset[str]
 ) -> dict[str, Any]:
-    """CasADi Functions of a step, its derivatives and what is read, for logarithms of rate, states and coordinates.
+    """CasADi Functions of a step, its derivatives and outputs, for logarithms of rate, states and coordinates.
 
     Quantities of the law are exponentials of the coordinates, or numbers.
     """
@@ -233,7 +233,7 @@ def _built(
         drawn -= sum(slope * change for slope, change in zip(others[:size], others[size:], strict=True))
         return ca.vertcat(drawn / (v * mu_rate), *(others[size + i] / ca.exp(y[1 + i]) for i in range(size)))
 
-    # steady sliding, but for a state and a rate that are off by what is fitted
+    # steady sliding, except for fitted deviations of state and rate
     values = fitted_quantities(law, names, q, linear) | {rate: ca.SX(first_rate)}
     steady = ca.log(ca.vertcat(*to_casadi(symbolic.steady_state(rate), values)))
     older, faster = (q[names.index(n)] if n in names else 0 for n in (START_STATE, START_RATE))

@@ -16,7 +16,7 @@ SECOND_EFFECT, SECOND_SLIP = "second_effect", "second_slip"
 class _TwoStates(RateAndState):
     """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c) + b_2 log(v_0 θ_2/d_2); both states evolve by the law of one.
 
-    The second effect may be negative. No fault can have such friction: it describes records.
+    The second effect may be negative. Such friction only describes records; no fault can have it.
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("theta", "theta_2")
@@ -63,7 +63,7 @@ class _TwoStates(RateAndState):
 
 
 def with_two_states(name: str) -> type[FrictionLaw]:
-    """The law of two states that goes with the ageing or the slip law."""
+    """The two-state law of the ageing or the slip law."""
     one = friction_law(name)
     return type(
         "TwoStates", (_TwoStates,), {"one": one, "name": f"{name}, two states", "source": one.source, "__slots__": ()}

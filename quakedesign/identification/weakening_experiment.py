@@ -1,4 +1,4 @@
-"""Experiments with slip-weakening friction: at a measured slip, or with a block behind a stiff spring."""
+"""Experiments with slip-weakening friction: at a measured slip, or with a block pulled by a stiff spring."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,12 +14,12 @@ from quakedesign.symbolic.casadi_printer import to_numpy
 from quakedesign.symbolic.plant import x1
 
 START = "start_friction"
-_SMALL_SHARE = 0.3  # of the noise of friction, that adds 4 % to it
+_SMALL_SHARE = 0.3  # share of the noise of friction, which increases it by 4 %
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Weakening(Experiment):
-    """An experiment with a law that depends on slip alone, whose quantities are its first coordinates."""
+    """An experiment with a law that depends on slip alone; the quantities of the law are the first coordinates."""
 
     law: FrictionLaw
     coordinates: tuple[Coordinate, ...]
@@ -51,7 +51,7 @@ class _Weakening(Experiment):
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredSlip(_Weakening):
-    """Friction of a law at the slip [m] that was measured, not negative; `slip_noise` is its deviation [m]."""
+    """Friction of a law at the measured, non-negative slip [m]; `slip_noise` is its standard deviation [m]."""
 
     slip: ndarray
     slip_noise: float
@@ -61,11 +61,11 @@ class MeasuredSlip(_Weakening):
         return self.strength(self.slip, fitted)[0]
 
     def slopes(self, fitted: ndarray) -> ndarray:
-        """Derivatives in the logarithms, and in what else is fitted."""
+        """Derivatives by the logarithms, and by the other fitted coordinates."""
         return self.strength_slopes(self.slip, fitted)
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """Whether the noise of the slip, which the fit leaves out, is felt in friction."""
+        """Remark if the noise of the slip, which the fit neglects, affects friction."""
         felt = float(np.max(np.abs(self.strength(self.slip, fitted)[1]))) * self.slip_noise
         text = f"the slip is known exactly, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}"
         return (text,) if felt > _SMALL_SHARE * noise else ()
@@ -73,11 +73,11 @@ class MeasuredSlip(_Weakening):
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn(_Weakening):
-    """A block that sticks until its strength is reached and then slips as far as the spring and friction balance.
+    """A block at rest until its strength is reached, which then slips until the spring balances friction.
 
-    Slip never falls. A spring so soft that friction falls faster than it makes the block jump, which no balance
-    describes: there is no such experiment then. The load point is the displacement since the first sample [m], the
-    normal load in Pa, N or 1. Coordinates are those of the law, the stiffness where it is not given, and `START` last.
+    Slip never decreases. With a soft spring, friction falls faster than the spring force and the block jumps. No
+    balance describes this, so the experiment does not exist then. The load point is the displacement since the first
+    sample [m], the normal load in Pa, N or 1. Coordinates: those of the law, the stiffness if not given, `START` last.
     """
 
     load_point: ndarray
@@ -90,7 +90,7 @@ class Drawn(_Weakening):
         return np.asarray(limit - softness * self.slip(fitted)[0])
 
     def slopes(self, fitted: ndarray) -> ndarray:
-        """Derivatives, those of slip from the balance at the sample where it was reached."""
+        """Derivatives; those of slip follow from the balance at the sample where it was reached."""
         (slip, since), (_, softness) = self.slip(fitted), self._without_slip(fitted)
         at_fixed_slip = np.zeros((len(slip), len(fitted)))
         at_fixed_slip[:, -1] = self.normal[0] / self.normal
@@ -104,7 +104,7 @@ class Drawn(_Weakening):
         return np.asarray(at_fixed_slip - softness[:, None] * moved)
 
     def _without_slip(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
-        """Shear over normal force if nothing slips, and its fall per slip [1/m]."""
+        """Shear over normal force without slip, and its decrease per slip [1/m]."""
         softness = (np.exp(fitted[-2]) if self.stiffness is None else self.stiffness) / self.normal
         return np.asarray(fitted[-1] * self.normal[0] / self.normal + softness * self.load_point), softness
 

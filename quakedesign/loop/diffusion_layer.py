@@ -14,23 +14,21 @@ from quakedesign.laws.sampled_law import unit_row
 from quakedesign.loop.periodic import Fading, PeriodicLoop
 
 # ----------------------------------------------------------------------
-# Flow through the rock between well and fault: slow modes exactly, and a bound of all the others.
+# Diffusion between well and fault: exact slow modes, and a bound of the truncation error.
 #
 # **Statement.** Let ∂p/∂t = D∂²p/∂x² in a layer of length L, without pressure at first, with the pressure u at the well
 # and without outflow at the fault, and τ = L²/D. With λ_n = ((2n + 1)π/2)²/τ and c_n = (4/π)(−1)ⁿ/(2n + 1) the pressure
 # in the fault t after a unit step of u is 1 − Σ c_n·e^{−λ_n·t} (Carslaw and Jaeger, Conduction of Heat in Solids, 1959,
-# sec. 3.4), Σ c_n = 1. So it is Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with z_n′ = λ_n(u − z_n) and what is left out,
-# R(t) = Σ_k Δu_k·E(t − t_k) over the steps of u, E(t) = −Σ_{n≥N} c_n·e^{−λ_n·t}. These terms alternate and shrink, so
-# |E(t)| ≤ |c_N|e^{−λ_N·t}.
+# sec. 3.4), Σ c_n = 1. So it is Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with z_n′ = λ_n(u − z_n) and the truncation
+# error R(t) = Σ_k Δu_k·E(t − t_k) over the steps of u, E(t) = −Σ_{n≥N} c_n·e^{−λ_n·t}. The terms of E alternate in sign
+# and decrease, so |E(t)| ≤ |c_N|e^{−λ_N·t}.
 #
-# **In rationals.** π is replaced by π̂ = π(1 − δ), 0 ≤ δ ≤ 10⁻²⁰, so λ̂_n = λ_n(1 − δ)² and ĉ_n = c_n/(1 − δ), which
-# adds
-# to |E(t)| at most Σ_{n<N} |c_n|(2δ + 3δλ̂_n·t)e^{−λ̂_n·t} ≤ 6Nδe^{−λ̂_0·t/2}.
+# **In rationals.** π is replaced by π̂ = π(1 − δ), 0 ≤ δ ≤ 10⁻²⁰, so λ̂_n = λ_n(1 − δ)² and ĉ_n = c_n/(1 − δ). This
+# adds to |E(t)| at most Σ_{n<N} |c_n|(2δ + 3δλ̂_n·t)e^{−λ̂_n·t} ≤ 6Nδe^{−λ̂_0·t/2}.
 #
-# - *A well whose pressure is held*, with a step at most every T: |R(t)| ≤ max|Δu_k|·(h·e^{−λ̂_N·θ} + f), θ the time
-#   since
-#   the last step, h = |ĉ_N|(1 + 1/(λ̂_N·T)) and f = 6Nδ(1 + τ/T), since Σ_{k≥0} e^{−xk} ≤ 1 + 1/x.
-# - *A well whose pressure moves*: |R(t)| ≤ max|u′|·∫|E| ≤ max|u′|(|ĉ_N|/λ̂_N + 6Nδτ). ∎
+# - *Zero-order hold at the well*, with steps at least T apart: |R(t)| ≤ max|Δu_k|·(h·e^{−λ̂_N·θ} + f), θ the time
+#   since the last step, h = |ĉ_N|(1 + 1/(λ̂_N·T)) and f = 6Nδ(1 + τ/T), since Σ_{k≥0} e^{−xk} ≤ 1 + 1/x.
+# - *Continuous pressure at the well*: |R(t)| ≤ max|u′|·∫|E| ≤ max|u′|(|ĉ_N|/λ̂_N + 6Nδτ). ∎
 
 MODES = 8
 _PI = Fraction("3.14159265358979323846")  # π̂
@@ -58,7 +56,7 @@ class Layer:
         return Fraction((-1) ** number * 4) / (_PI * (2 * number + 1))
 
     def left_out(self, step: Fraction) -> tuple[Fraction, Fraction, Fraction]:
-        """h [-], λ̂_N [1/s] and f [-] of a well that steps at most every `step` [s]."""
+        """h [-], λ̂_N [1/s] and f [-] of a well whose pressure steps are at least `step` [s] apart."""
         rate, rounding = self.rate(MODES), 6 * MODES * _SHORT
         return abs(self.share(MODES)) * (1 + 1 / (rate * step)), rate, rounding * (1 + self.time / step)
 
@@ -69,43 +67,40 @@ class Layer:
 
     @property
     def area(self) -> Fraction:
-        """A = −∫E [s], exactly; see `known_area`."""
+        """A = −∫E [s], exactly; see the next section."""
         return self.time / 2 - sum((self.share(n) / self.rate(n) for n in range(MODES)), Fraction(0))
 
     @property
     def awaited_in_all(self) -> Fraction:
-        """Bound of ∫|F| [s²], F(t) = −∫E from t on."""
+        """Bound of ∫|F| [s²], F(t) = −∫_t^∞ E."""
         return abs(self.share(MODES)) / self.rate(MODES) ** 2 + 6 * MODES * _SHORT * self.time**2
 
 
 # ----------------------------------------------------------------------
-# What the fast modes of a layer bring into the slip rate at each step of the well: as one known kick, and a
-# remainder.
+# Effect of the fast modes of a layer on the slip rate at each pressure step: a known jump, and a remainder.
 #
-# **Statement.** Let R be what the modes n < N of a layer leave out of the pressure in the fault (`layer`), E that of a
-# unit step, and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly, and with F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k)
-# over the steps so far, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is the same
-# as
+# **Statement.** Let R be the truncation error of the modes n < N of a layer (previous section), E that of a unit step,
+# and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly. With F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k) over the past
+# steps, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is equivalent to
 #
 #     e1′ = x2 + β0·bY,   x2′ = s0·e1 − w0·x2 + β0·v + a − w0·β0·bY,   x2 ← x2 − β0·A·bΔu_k at every step.
 #
 # *Proof.* ∫₀^∞ Σ c_n·e^{−λ_n·t}dt = τ/2, since 1/cosh √(sτ) = 1 − sτ/2 + …; so F(0) = A, and R − Y′ = −A·Σ_k Δu_k·δ(t −
-# t_k). ∎ Y is as unknown as R is, but λ_N times smaller and not differentiated: what the steps so far will still bring.
+# t_k). ∎ Y, the future effect of the past steps, is as unknown as R, but λ_N times smaller and not differentiated.
 #
-# **Bounds.** |F(t)| ≤ |ĉ_N|/λ̂_N·e^{−λ̂_N·t} + 6Nδτ·e^{−λ̂_0·t/2}: the terms c_n/λ_n·e^{−λ_n·t} alternate and shrink as
-# those of E, and the errors of ĉ_n and λ̂_n add at most 6Nδ·e^{−λ̂_0·t/2} to |E|, 2/λ̂_0 < τ.
+# **Bounds.** |F(t)| ≤ |ĉ_N|/λ̂_N·e^{−λ̂_N·t} + 6Nδτ·e^{−λ̂_0·t/2}: the terms c_n/λ_n·e^{−λ_n·t} alternate and decrease
+# as those of E, and the errors of ĉ_n and λ̂_n add at most 6Nδ·e^{−λ̂_0·t/2} to |E|, 2/λ̂_0 < τ.
 #
-# - *A well whose pressure is held*: |Y| ≤ max|Δu_k|·(h/λ̂_N·e^{−λ̂_N·θ} + f·τ) with θ, h and f of `layer`.
-# - *A well whose pressure moves*: with Y = ∫u′(σ)F(t − σ)dσ there are no kicks, but R = Y′ − A·u′, so that A·u′ is
-#   less
-#   in v, and |Y| ≤ max|u′|·(|ĉ_N|/λ̂_N² + 6Nδτ²). ∎
+# - *Zero-order hold at the well*: |Y| ≤ max|Δu_k|·(h/λ̂_N·e^{−λ̂_N·θ} + f·τ) with θ, h and f of the previous section.
+# - *Continuous pressure at the well*: with Y = ∫u′(σ)F(t − σ)dσ there are no jumps, but R = Y′ − A·u′, so that A·u′
+#   is subtracted from v, and |Y| ≤ max|u′|·(|ĉ_N|/λ̂_N² + 6Nδτ²). ∎
 
 
 def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
     """A loop of `held_loop` through a layer, with x2 in place of e2 and Y in place of R times β0.
 
-    ``awaited`` is bY over what bounds it, so that it is at most the output ``left_out`` (times its weight, where the
-    well steps): an input, and what the law is told of it, the sampled input ``awaited_told``.
+    The input ``awaited`` is bY over its bound, so that it is at most the output ``left_out`` (times its weight, with
+    zero-order hold at the well). The sampled input ``awaited_told`` is its share in the measurements of the law.
 
     Parameters
     ----------
@@ -113,7 +108,7 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
     gain : Fraction
         β0 [-].
     layer : Layer
-        Between well and fault.
+        Diffusion path between well and fault.
     """
     size, slip_rate = len(loop.states), loop.states.index("e2")
     *others, last = loop.segments
@@ -145,7 +140,7 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
 
 
 def _share_and_fading(loop: PeriodicLoop, layer: Layer) -> tuple[Fraction, Fading]:
-    """Largest |bY| over the bound of |b·R|, and how it fades."""
+    """Largest |bY| over the bound of |b·R|, and its decay."""
     (own,) = loop.fading.values()
     height, rate, floor = layer.left_out(loop.period)
     awaited = height / rate, floor * layer.time

@@ -1,4 +1,4 @@
-"""Discrete control law: expressions in the signals of one sample, with numbers as parameters."""
+"""Discrete control law: expressions in the signals of one sample; numbers become parameters."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -52,15 +52,15 @@ class DiscreteLaw:
 
 @dataclass(frozen=True)
 class Lifted:
-    """Expressions whose numbers are symbols, so that laws with other gains share machine code."""
+    """Expressions with symbols in place of numbers, so that laws with other gains share machine code."""
 
     expressions: tuple[sp.Expr, ...]
-    numbers: tuple[sp.Symbol, ...]  # Positive ones: signs stay in the expressions
-    values: tuple[float, ...]  # What the symbols stand for
+    numbers: tuple[sp.Symbol, ...]  # Positive; signs stay in the expressions
+    values: tuple[float, ...]  # Values of the symbols
 
     @classmethod
     def of(cls, expressions: tuple[sp.Expr, ...]) -> "Lifted":
-        """Replace every number but 0, ±1 and exponents."""
+        """Replace every number by a symbol, except 0, ±1 and exponents."""
         symbols: dict[sp.Expr, sp.Symbol] = {}
         lifted = tuple(_lift(sp.sympify(expression), symbols) for expression in expressions)
         return cls(lifted, tuple(symbols.values()), tuple(float(number.evalf(30)) for number in symbols))
@@ -81,5 +81,5 @@ def _lift(node: Any, symbols: dict[sp.Expr, sp.Symbol]) -> Any:
 
 
 def _structure(node: sp.Expr) -> Any:
-    """Key for sorting that does not depend on a factor of the node, so that names do not depend on values."""
+    """Sorting key without the numerical factor of the node, so that names do not depend on values."""
     return sp.default_sort_key(node.as_independent(*node.free_symbols, as_Add=False)[1])

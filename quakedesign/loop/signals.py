@@ -13,7 +13,7 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @dataclass(frozen=True, slots=True)
 class Interconnection:
-    """States in their order, and signals by name, each a combination of states, inputs and other signals."""
+    """Ordered states, and signals by name, each a linear combination of states, inputs and other signals."""
 
     states: tuple[str, ...]
     signals: Mapping[str, Signal]
@@ -28,21 +28,21 @@ class Interconnection:
         return whole
 
     def row(self, signal: Signal) -> Row:
-        """Entries of a signal for the states."""
+        """Coefficients of the states in a signal."""
         return self.column(self.resolved(signal))
 
     def column(self, entries: Signal) -> Row:
-        """What enters the states, 0 where nothing is given."""
+        """Column over the states of given entries, 0 elsewhere."""
         return tuple(entries.get(name, _ZERO) for name in self.states)
 
     def flow(self, rates: Mapping[str, Signal]) -> Matrix:
-        """Rows of x′; states without a rate stay."""
+        """Rows of x′; states without a rate stay constant."""
         return tuple(self.row(rates.get(name, {})) for name in self.states)
 
     def jump(self, updates: Mapping[str, Signal]) -> Matrix:
-        """Rows of x⁺; states without an update stay."""
+        """Rows of x⁺; states without an update stay constant."""
         return tuple(self.row(updates.get(name, {name: _ONE})) for name in self.states)
 
     def entry(self, updates: Mapping[str, Signal], name: str) -> Row:
-        """What an input adds to the states at a jump."""
+        """Coefficients of an input in the states after a jump."""
         return self.column({state: self.resolved(signal).get(name, _ZERO) for state, signal in updates.items()})

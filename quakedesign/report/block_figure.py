@@ -14,7 +14,7 @@ _STAGES = 6
 
 
 def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> Any:
-    """A matplotlib figure; `proved` stands below it."""
+    """Matplotlib figure of a run; the sentence `proved` is written below it."""
     from matplotlib import colormaps
 
     drawing, axes = figure(2, 5.2, 2)

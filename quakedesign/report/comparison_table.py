@@ -15,7 +15,7 @@ from quakedesign.synthesis import Design, assess
 
 
 class Comparison(Compared):
-    """Uncontrolled, published and designed on one fault, see `Compared`."""
+    """Natural behaviour, published and designed controllers of one fault, see `Compared`."""
 
     def to_dict(self) -> dict[str, Any]:
         """Keys of ``design --json``, see docs/reference/json.md."""
@@ -61,28 +61,28 @@ def compare(
     progress: Callable[[str, float], None] | None = None,
     **entered: Quantity | None,
 ) -> Comparison:
-    """Run all controllers of a fault over the whole task, step T_s; with rate-and-state friction over 500 D_c/V.
+    """Run all controllers of a fault with step T_s over the whole task, or 500 D_c/V for rate-and-state friction.
 
     Parameters
     ----------
     fault : Fault
     designs : sequence of Design, Controller or SampledLaw
-        Designs; one without a controller is reported and not run. Given laws are assessed first.
+        Designed controllers; a design without a controller is reported and not run. Given laws are assessed first.
     setup : LoopSetup
         Loop setup of the given laws; a design has its own.
     with_published : bool
-        Add the paper's gains, where the fault has any, with their verdicts and premises; not with designs for a delay,
-        a lag or a diffusion path.
+        Add the paper's gains, if the fault has any, with their verdicts and premises; not for designs with a delay, a
+        lag or a diffusion path, for which those gains are not designed.
     scheme, published_scheme : str
-        Schemes of the runs of designed and of published gains, see `quakedesign.loop.schemes`; default ``continuous``,
-        as in the paper. Labels name them where they differ. A sampled law runs as designed, as do all designs that
+        Schemes of the runs of designed and published gains, see `quakedesign.loop.schemes`; by default ``continuous``,
+        as in the paper. Labels distinguish them if they differ. A sampled law runs as designed, as do all designs that
         are not continuous.
     whole_task : bool
-        Run the whole task of friction with a state, of any duration.
+        Run the whole task for friction with a state, however slow.
     plant : str, optional
-        Plant of the runs of friction without a state: ``stick-slip`` (default) or ``printed``, as in `simulate`.
+        Plant of the runs for friction without a state: ``stick-slip`` (default) or ``printed``, as in `simulate`.
     progress : callable, optional
-        Called with the present step and the fraction done [-].
+        Called with the current activity and the fraction done [-].
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
@@ -126,11 +126,11 @@ def designed_comparison(
     Parameters
     ----------
     tell : callable
-        Progress.
+        Called with the progress.
     options : mapping, optional
-        Of `quakedesign.design`, such as ``objective`` and ``continuous``.
+        Options of `quakedesign.design`, such as ``objective`` and ``continuous``.
     whole_task, plant : bool, str
-        As of `compare`; the plant also of `quakedesign.design`.
+        As in `compare`; the plant also as in `quakedesign.design`.
     **schemes
         ``scheme`` and ``published_scheme`` of `compare`.
     """
@@ -142,5 +142,5 @@ def designed_comparison(
 
 
 def _schemes(scheme: str | None = None, published_scheme: str | None = None) -> dict[str, str]:
-    """Schemes by origin."""
+    """Schemes by origin of the gains."""
     return {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}

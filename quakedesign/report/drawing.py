@@ -24,16 +24,16 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# What all figures share: size, colours, units, and the line that says how the runs were made.
+# Common style of all figures: size, colours, units, and the line with the settings of the runs.
 
-WIDTH = 7.16  # two columns of a printed page [in]
-SMALL = 8  # size of letters [pt], still readable in print
+WIDTH = 7.16  # width of two columns of a printed page [in]
+SMALL = 8  # font size [pt], still readable in print
 NATURAL, INDUCED, PROVED = "#000000", "#CC79A7", "#000000"
 ORIGINS = {"published": (0, (4, 2)), "designed": "solid"}
 """Line style of every origin, in the order in which they stand side by side."""
 PALE = 0.45
-_NOTE = 115  # of the smallest letters in a line of the width of a figure
-_LINE = 0.125  # height of a line of the smallest letters [in]
+_NOTE = 115  # characters of the smallest font in a line across a figure
+_LINE = 0.125  # line height of the smallest font [in]
 _PALETTE = ("#0072B2", "#009E73", "#D55E00", "#E69F00", "#56B4E9", "#777777")
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 _YEAR = 31_557_600.0
@@ -43,7 +43,7 @@ _TIMES = ((2 * _YEAR, _YEAR, "years"), (2 * 3600.0, 3600.0, "h"), (10 * 60.0, 60
 def colour(name: str) -> str:
     """Colour of a control law, the same in every figure.
 
-    From the palette of Okabe and Ito (https://jfly.uni-koeln.de/color/): told apart with every common colour vision.
+    From the palette of Okabe and Ito (https://jfly.uni-koeln.de/color/), which suits all common types of colour vision.
     """
     names = sorted(control_laws())
     return _PALETTE[min(names.index(name), len(_PALETTE) - 1)] if name in names else _PALETTE[-1]
@@ -91,7 +91,7 @@ def figure(
 
 
 def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *, legend: Any = None) -> Any:
-    """Give a figure its title above, and below the legend of one axis (three columns) and how the runs were made."""
+    """Add to a figure its title above, and below it the legend of one axis (three columns) and the run settings."""
     drawing.suptitle(title, fontsize=SMALL + 2)
     whole = "; ".join(part for part in (note, made(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
     rows = wrap(whole, _NOTE, break_on_hyphens=False)
@@ -109,12 +109,12 @@ def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *,
 
 
 def named(axis: Any, title: str) -> None:
-    """Give one axis its title."""
+    """Set the title of one axis."""
     axis.set_title(title, fontsize=SMALL)
 
 
 def made(runs: Iterable["Shown"]) -> str:
-    """Scheme, step, method and plant of runs; what differs between entries after their labels, what all share last."""
+    """Scheme, step, method and plant of runs: differing settings after the labels of the entries, then common ones."""
     ways: dict[tuple[str, ...], list[str]] = {}
     for shown in runs:
         label, run = (shown[0].label, shown[1]) if isinstance(shown, tuple) else ("", shown)
@@ -130,23 +130,23 @@ def made(runs: Iterable["Shown"]) -> str:
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Size and name of the unit with a prefix that suits a largest value; ``(1e6, "MPa")`` for 5e6 Pa."""
+    """Size and name of the unit with the prefix for a largest value; ``(1e6, "MPa")`` for 5e6 Pa."""
     size, prefix = next(((s, p) for s, p in _PREFIXES if largest >= s), (1.0, ""))
     return size, prefix + unit
 
 
 def length(largest: float) -> tuple[float, str]:
-    """Millimetres below 0.1 m, else metres."""
+    """Size [m] and name of the unit of length: millimetres below 0.1 m, else metres."""
     return (1e-3, "mm") if largest < 0.1 else (1.0, "m")
 
 
 def clock(last: float) -> tuple[float, str]:
-    """Size [s] and name of the unit of time that suits a run that ends at `last` s."""
+    """Size [s] and name of the unit of time for a run that ends at `last` s."""
     return next((size, unit) for least, size, unit in _TIMES if last >= least)
 
 
 def band(time: np.ndarray, values: np.ndarray, width: int = 40) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Middle time, smallest and largest value of every `width` samples; what is left over belongs to the last."""
+    """Mean time, smallest and largest value of every `width` samples; remaining samples belong to the last band."""
     starts = np.arange(max(len(values) // width, 1)) * width
     ends = np.append(starts[1:], len(values)) - 1
     low, high = (extreme.reduceat(values, starts) for extreme in (np.minimum, np.maximum))
@@ -154,12 +154,12 @@ def band(time: np.ndarray, values: np.ndarray, width: int = 40) -> tuple[np.ndar
 
 
 def runs_of(entries: Iterable["Entry"]) -> "list[tuple[Entry, Trajectory]]":
-    """Entries that have a run which did not diverge, with it."""
+    """Entries with a run that did not diverge, and this run."""
     return [(e, e.run) for e in entries if e.run is not None and "diverged" not in e.run.events]
 
 
 def with_diverged(entries: "Iterable[Entry]", note: str = "") -> str:
-    """Note that also names the runs which diverged: their last values would leave no room for all others."""
+    """Note that also names the diverged runs, whose last values would compress all others."""
     diverged = [(e.label, e.run.events["diverged"]) for e in entries if e.run and "diverged" in e.run.events]
     lines = [f"{label} diverges at {time:.3g} s and is not drawn" for label, time in diverged]
     return "; ".join([*([note] if note else []), *lines])
@@ -172,7 +172,7 @@ def present(values: np.ndarray | None) -> np.ndarray:
 
 
 # ----------------------------------------------------------------------
-# Figures as files that journals accept: letters of 8 pt to 9 pt, fonts embedded, no date, at the width of a page.
+# Figures as files that journals accept: fonts of 8 pt to 9 pt, embedded, no date, page width.
 
 Format = Literal["svg", "pdf", "png"]
 FORMATS: tuple[Format, ...] = ("svg", "pdf", "png")
@@ -194,14 +194,14 @@ def figure_bytes(drawing: Any, kind: str, name: str) -> bytes:
     kind : str
         One of `FORMATS`.
     name : str
-        Makes the names inside an SVG.
+        Seed of the identifiers inside an SVG.
     """
     import matplotlib as mpl
 
     stream = io.BytesIO()
     style: Any = _STYLE | {"svg.hashsalt": name}
     with mpl.rc_context(style):
-        if (engine := drawing.get_layout_engine()) is not None:  # which `savefig` would call again in every format
+        if (engine := drawing.get_layout_engine()) is not None:  # `savefig` would repeat it in every format
             engine.execute(drawing)
             drawing.set_layout_engine(None)
         drawing.savefig(stream, format=kind, metadata=_UNDATED[kind])
@@ -209,24 +209,24 @@ def figure_bytes(drawing: Any, kind: str, name: str) -> bytes:
 
 
 def write_figures(folder: Path, drawn: Mapping[str, Any], formats: Sequence[str]) -> None:
-    """Write figures, each by its name, in every format into a folder that exists."""
+    """Write figures, named by their keys, in every format into an existing folder."""
     for name, drawing in drawn.items():
         for kind in formats:
             (folder / f"{name}.{kind}").write_bytes(figure_bytes(drawing, kind, name))
 
 
 def write_results(folder: Path, values: Mapping[str, Any]) -> None:
-    """Write ``results.json`` into a folder that exists."""
+    """Write ``results.json`` into an existing folder."""
     write_whole(folder / "results.json", json.dumps(values, indent=1, allow_nan=False) + "\n")
 
 
 def file_names(name: str, formats: Sequence[str]) -> str:
-    """Of one figure, as a message lists them."""
+    """File names of one figure, as listed in a message."""
     return ", ".join(f"{name}.{kind}" for kind in formats)
 
 
 # ----------------------------------------------------------------------
-# Figures as SVG inside a page: small, with colours that follow the page, and what a pointer needs to read values.
+# Figures as SVG inside a page: compact, with the colours of the page, and with axis data to read values by pointer.
 
 _INKS = {"#000000": "var(--ink)", "#444444": "var(--soft)", "#b0b0b0": "var(--line)", "#cccccc": "var(--line)"}
 """Colours of frames, letters and grids; those of the curves stay."""
@@ -234,7 +234,7 @@ _PAPER = "#ffffff"
 
 
 def inline_svg(drawn: str, drawing: Any, name: str, description: str) -> Markup:
-    """SVG element of a figure, with names of its own, that tells what it shows.
+    """SVG element of a figure, with unique identifiers and a description.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def inline_svg(drawn: str, drawing: Any, name: str, description: str) -> Markup:
     name : str
         Unique in its page.
     description : str
-        For readers who do not see it.
+        Text alternative of the figure.
     """
     body = drawn[drawn.index("<defs>", drawn.index("</metadata>") if "</metadata>" in drawn else 0) :]
     width, height = (72 * float(size) for size in drawing.get_size_inches())
@@ -252,7 +252,7 @@ def inline_svg(drawn: str, drawing: Any, name: str, description: str) -> Markup:
 
 
 def _tightened(body: str, name: str) -> str:
-    """Two decimals of a point [1/72 in], colours of the page, names that no other figure has, no line breaks."""
+    """Compact SVG: two decimals of a point [1/72 in], colours of the page, unique identifiers, no line breaks."""
     body = re.sub(r"<g id=\"figure_1\">\s*<g id=\"patch_1\">.*?</g>", '<g id="figure_1">', body, count=1, flags=re.S)
     body = re.sub(r"<[^>]*>", lambda tag: re.sub(r"-?\d+\.\d{3,}", _shorter, tag[0]), body)
     for colour, ink in _INKS.items():
@@ -267,7 +267,7 @@ def _shorter(number: re.Match[str]) -> str:
 
 
 def _axes(drawing: Any, height: float) -> list[dict[str, Any]]:
-    """Place in the picture and scales of every axis that carries labels."""
+    """Position in the picture and scales of every axis."""
     axes = []
     for axis in drawing.axes:
         low, high = axis.get_window_extent().get_points() * 72 / drawing.dpi
@@ -280,7 +280,7 @@ def _axes(drawing: Any, height: float) -> list[dict[str, Any]]:
 
 
 def _side(axis: Any, label: str) -> dict[str, Any]:
-    """Ends of a side on its own scale, and what it takes to come back from there to values."""
+    """Label, scale and transformed limits of an axis, with the parameters of the inverse transformation."""
     transform = axis.get_transform()
     low, high = (float(v) for v in transform.transform(axis.get_view_interval()))
     side = {"label": label, "scale": axis.get_scale(), "low": low, "high": high}
@@ -291,7 +291,7 @@ def _side(axis: Any, label: str) -> dict[str, Any]:
 
 
 # ----------------------------------------------------------------------
-# Figures kept on the user's disk, see `quakedesign.cache`: found by all that they could show before one is drawn.
+# Figures in the user's cache, see `quakedesign.cache`: the key is all data that they may show.
 
 Drawn = tuple[bytes, Markup]
 
@@ -302,11 +302,11 @@ def drawn_once(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], sh
     Parameters
     ----------
     draw : callable
-        Gives figures of matplotlib by name, not drawn yet, that depend on what they show alone.
+        Returns matplotlib figures by name, which depend only on `shown`.
     alt : mapping of str to str
-        For readers who do not see a figure, by its name.
+        Text alternatives of the figures, by name.
     shown : Any
-        All that is shown, but for how long it took.
+        All shown data; durations of computations are ignored.
     """
 
     def texts() -> bytes:
@@ -319,7 +319,7 @@ def drawn_once(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], sh
 
 
 def _stated(alt: Mapping[str, str], shown: Any) -> bytes | None:
-    """All inputs of drawings: contents, settings and fonts; None if they are unknown."""
+    """Cache key of drawings: contents, settings and fonts; None if they cannot be stated."""
     import matplotlib as mpl
     from matplotlib.font_manager import fontManager
 
@@ -327,16 +327,16 @@ def _stated(alt: Mapping[str, str], shown: Any) -> bytes | None:
         fonts = [(font.fname, (file := os.stat(font.fname)).st_size, file.st_mtime_ns) for font in fontManager.ttflist]
     except OSError:
         return None
-    settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # which would be loaded
+    settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # its access loads a backend
     return cache.stated((dict(alt), shown, settings, fonts), _Untimed)
 
 
 class _Untimed(cache.CachedStatement):
-    """A value by its fields, without how long it took and how it was computed."""
+    """A value by its fields, without durations and backends of its computation."""
 
     def __init__(self, content: io.BytesIO) -> None:
         super().__init__(content)
-        self.fast = True  # what is equal is written the same, be it one value or two
+        self.fast = True  # equal values are written equally, whether or not they are the same object
 
     def field(self, value: Any, name: str) -> Any:
         stated = super().field(value, name)

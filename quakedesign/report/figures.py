@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# States and pressure in closed loop: a row for every control law, published gains beside designed ones.
+# States and pressure in closed loop: a row for every control law, columns for designed and published gains.
 
 _INSET = (0.16, 0.66, 0.82, 0.31)
-_ROOM = 0.9  # for the insets above the data, over the height of the data
+_ROOM = 0.9  # space for insets above the data, relative to the height of the data
 
 
 def grid(comparison: "Compared") -> tuple[list[str], list[str], dict[tuple[str, str], "Entry"]]:
-    """Laws and origins that have a run, in order, and the entry of each pair."""
+    """Laws and origins with a run, in order, and the entry of each pair."""
     entries = {(e.design.name, e.origin): e for e, _ in runs_of(comparison.entries)}
     laws = list(dict.fromkeys(name for name, _ in entries))
     return laws, [o for o in ORIGINS if any(origin == o for _, origin in entries)], entries
@@ -85,7 +85,7 @@ def states(comparison: "Compared") -> Any:
 
 
 def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, float]) -> None:
-    """Curves that lie on each other, each narrower than the one below it."""
+    """Draw overlapping slip curves, each narrower than the one below it."""
     divisor, size = sizes
     runs = runs_of(comparison.of(origin))
     for place, (entry, run) in enumerate(runs):
@@ -117,7 +117,7 @@ def _power_of_ten(value: float) -> float:
 
 
 def _decades(axis: Any) -> Any:
-    """Ticks at zero and at every other power of ten beyond the linear part, or further apart: at most five."""
+    """Ticks at zero and at powers of ten beyond the linear part, at least two decades apart: at most five."""
     from matplotlib.ticker import FixedLocator
 
     last = int(np.floor(np.log10(max(np.abs(axis.get_ylim())))))
@@ -127,7 +127,7 @@ def _decades(axis: Any) -> Any:
 
 
 def _time_below(column: Any, drawing: Any, unit: str) -> None:
-    """Label the lowest axis of a column that is drawn, and the ticks of all."""
+    """Label the lowest drawn axis of a column, and the ticks of all its axes."""
     drawn = [axis for axis in column if axis in drawing.axes]
     for axis in drawn:
         axis.tick_params(labelleft=True)
@@ -137,7 +137,7 @@ def _time_below(column: Any, drawing: Any, unit: str) -> None:
 
 
 def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None" = None) -> Any:
-    """Fluid pressure of every run as the band that it fills; with close-ups, each has an inset with every step.
+    """Fluid pressure of every run as a band; with close-ups, each axis has an inset with every step.
 
     Parameters
     ----------
@@ -190,14 +190,14 @@ def _inset(axis: Any, run: "Trajectory", shade: str) -> None:
 
 
 # ----------------------------------------------------------------------
-# Figures of faults whose friction has a state: their cycle, and how they are held in slow sliding.
+# Figures of faults whose friction has a state: their cycle, and controlled slow sliding.
 
-_BANDS = 600  # of a run at most: more are not seen, and make a file of many megabytes
-_PER_BAND = 16  # instants at least, four periods
+_BANDS = 600  # most instants of a run: more are invisible, and make a file of many megabytes
+_PER_BAND = 16  # smallest number of instants, four periods
 
 
 def state_figures(comparison: "Compared") -> dict[str, Any]:
-    """``cycle``, where it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law that ran."""
+    """``cycle``, if it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law with a run."""
     drawn = {} if comparison.uncontrolled.failed else {"cycle": cycle(comparison)}
     for one in runs_of(comparison.entries)[:1]:
         drawn |= {"slow-sliding": slow_sliding(*one), "sliding-errors": errors(*one)}
@@ -222,7 +222,7 @@ def cycle(comparison: "Compared") -> Any:
 
 
 def slow_sliding(entry: "Entry", run: "Trajectory") -> Any:
-    """Slip, slip rate, pressure and state of a law that holds slow sliding."""
+    """Slip, slip rate, pressure and state of a law that stabilises slow sliding."""
     fault, shade = entry.design.fault, colour(entry.design.name)
     drawing, ((slip,), (rate,), (pressure,), (state,)) = figure(4, 6.6)
     divisor, unit = clock(float(run.time[-1]))
@@ -252,7 +252,7 @@ def slow_sliding(entry: "Entry", run: "Trajectory") -> Any:
 
 
 def errors(entry: "Entry", run: "Trajectory") -> Any:
-    """Slip and slip rate less their references."""
+    """Slip and slip rate minus their references."""
     drawing, axes = figure(2, 3.6)
     divisor, unit = clock(float(run.time[-1]))
     shown = ((present(run.slip_error), "m", "slip error"), (present(run.slip_rate_error), "m/s", "slip-rate error"))
@@ -271,7 +271,7 @@ def _filled(axis: Any, time: "np.ndarray", values: "np.ndarray", shade: str) -> 
 
 
 def _width(time: "np.ndarray") -> int:
-    """Instants of a band."""
+    """Number of instants of a band."""
     return max(_PER_BAND, len(time) // _BANDS)
 
 
@@ -299,13 +299,13 @@ def figures(comparison: "Compared") -> dict[str, Any]:
 
 
 def overviews(comparison: "Compared") -> dict[str, Any]:
-    """``overview`` where there are both a natural earthquake and a run under control."""
+    """``overview``, if there are both a natural earthquake and a controlled run."""
     failed = comparison.uncontrolled.failed
     return {} if failed or not runs_of(comparison.of("designed")) else {"overview": overview(comparison)}
 
 
 def overview(comparison: "Compared") -> Any:
-    """Slip rate and slip with and without control over logarithmic time, with the proved bound and what limits it."""
+    """Slip rate and slip with and without control over logarithmic time, with the proved bound and limits."""
     free = comparison.uncontrolled
     best, own = min(
         runs_of(comparison.of("designed")),
@@ -325,8 +325,8 @@ def overview(comparison: "Compared") -> Any:
     first = min(float(own.time[1]), max(0.1 * moves, 1e-9 * last))
     levels = list(_levels(best))
     over = float(free.time[np.flatnonzero(speed > floor)[-1]]) if speed.max() > floor else last
-    place = over if over < np.sqrt(first * last) else first  # beside the natural earthquake, if there is room
-    top = free.time[int(np.argmax(speed > speed.max() / 2))]  # of the first earthquake
+    place = over if over < np.sqrt(first * last) else first  # next to the natural earthquake, if there is space
+    top = free.time[int(np.argmax(speed > speed.max() / 2))]  # time of the first earthquake
     left = top > np.sqrt(first * last)
     look = {"xytext": (-8 if left else 8, -4), "textcoords": "offset points", "fontsize": SMALL}
     text = f"without control: {quantity(float(speed.max()), 'm/s')}"
@@ -351,7 +351,7 @@ def overview(comparison: "Compared") -> Any:
 
 
 def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
-    """Proved bound of the slip rate, worst case found, and performance limit, as far as they are known."""
+    """Proved bound of the slip rate, worst case found, and performance limit, if they are known."""
     if entry.proof is None or entry.guarantee is None:
         return
     peak = entry.proof.peak_slip_rate
@@ -373,7 +373,7 @@ def _largest(time: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.
 
 
 def uncontrolled(comparison: "Compared") -> Any:
-    """Slip and slip rate of the natural earthquake, and where the statics let it rest."""
+    """Slip and slip rate of the natural earthquake, and the rest slip from statics."""
     run, fault = comparison.uncontrolled, comparison.fault
     drawing, ((slip,), (rate,)) = figure(2, 3.2)
     size, unit = length(float(run.slip.max()))
@@ -392,13 +392,13 @@ def uncontrolled(comparison: "Compared") -> Any:
 
 
 def end(*runs: "Trajectory") -> float:
-    """Time [s] until which earthquakes are shown: somewhat longer than the last takes to complete its slip."""
+    """Time [s] up to which earthquakes are shown: slightly after the last one has completed its slip."""
     settled = [run.time[int(np.argmax(np.abs(run.slip) >= 0.995 * np.abs(run.slip).max()))] for run in runs]
     return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])
 
 
 def error_figure(comparison: "Compared") -> Any:
-    """Size of both tracking errors over time, as envelopes."""
+    """Envelopes of the absolute values of both tracking errors over time."""
     drawing, ((slip,), (rate,)) = figure(2, 3.9)
     runs = runs_of(comparison.entries)
     divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
@@ -476,7 +476,7 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
     """Draw the stable and the unstable region of a fault, bounded by its symbolic stability conditions.
 
     The left panel varies the effective normal stress σ' at the given pressure, the right one the pressure p at the
-    fault's σ'. Mass, damping and friction are the fault's. The point is the fault; its verdict is exact.
+    fault's σ'. Mass, damping and friction are the fault's. The marker is the fault; its verdict is exact.
 
     Parameters
     ----------
@@ -484,9 +484,9 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
     pressure : float
         Injected pressure [Pa] at which the fault is marked, below its effective normal stress.
     loading_rate : float, optional
-        Slip rate [m/s] of steady sliding; without it the law's ``operating_rate``.
+        Slip rate [m/s] of steady sliding; by default the law's ``operating_rate``.
     inertia : bool
-        Whether the mass counts.
+        Whether inertia is included.
 
     Raises
     ------
@@ -522,7 +522,7 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
 
 
 def _region(axis: Any, plane: Plane, size: float, stiffness: np.ndarray, high: float) -> None:
-    """Colour one panel by what is stable, and draw the critical stiffness and where damping alone decides."""
+    """Colour the stable part of one panel, and draw the critical stiffness and the limits of damping alone."""
     across, critical = plane.across / size, np.where(plane.critical > 0, plane.critical, np.nan) / high
     levels = [-0.5, 0.5, 1.5]
     axis.contourf(across, stiffness, plane.stable.astype(float), levels=levels, colors=list(_COLOURS.values()))

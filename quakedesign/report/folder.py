@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Refuse early a folder that cannot be written or that holds results."""
+    """Reject early a folder that cannot be written or that contains results."""
     if os.path.exists(out) and not force:
         raise OutputError(
             f"output folder must be new. Received {out}, which exists. Give another --out, or --force to replace it."
@@ -37,12 +37,12 @@ def prepare(out: Path, *, force: bool) -> None:
 
 
 def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
-    """Everything of a comparison that JSON can hold, with the keys of ``--json`` and the versions of all libraries.
+    """JSON-able facts of a comparison, with the keys of ``--json`` and the versions of all libraries.
 
     Parameters
     ----------
     stored : bool
-        Name the files of certificates; None stands for them where nothing is written.
+        Name the certificate files; if False, None replaces their names.
     """
     results = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
     for origin, group in (("designed", "controllers"), ("published", "published")) if stored else ():
@@ -94,25 +94,25 @@ def write_folder(
     command: str = "",
     tell: Callable[[str, float], None] = lambda _what, _done: None,
 ) -> dict[str, Any]:
-    """Write certificates, figures, results and the page into a folder, atomically.
+    """Write certificates, figures, results and the page into a folder, whole or not at all.
 
     Parameters
     ----------
     force : bool
         Replace a folder of earlier results.
     study : PaperStudy, optional
-        Of the same comparison: its figures instead of the comparison's, and ``numbers.csv``.
+        Study of the same comparison: its figures instead of the comparison's, and ``numbers.csv``.
     formats : sequence of str
-        Of the figures beside the page, see `quakedesign.report.drawing.FORMATS`.
+        Formats of the figure files, see `quakedesign.report.drawing.FORMATS`.
     command : str
-        With which the report is made, for its readers.
+        Command that makes the report, stated in it.
     tell : callable
-        Progress.
+        Called with the progress.
 
     Returns
     -------
     dict
-        What ``results.json`` holds.
+        Content of ``results.json``.
     """
     prepare(out, force=force)
     values = study_results(study, formats) if study else results(comparison)
@@ -146,7 +146,7 @@ def _write_certificates(folder: Path, comparison: Comparison) -> None:
 def _write_figures(
     folder: Path, shown: "Comparison | PaperStudy", formats: Sequence[str], tell: Callable[[str, float], None]
 ) -> dict[str, Markup]:
-    """Write every figure in every format; return what the page holds of it, drawn with its SVG file at once."""
+    """Write every figure in every format; return the SVG elements for the page, drawn together with the SVG files."""
     (folder / "figures").mkdir()
     draw = cache(shown.figures)
     tell("figures", 0.0)

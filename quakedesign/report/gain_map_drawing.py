@@ -17,7 +17,7 @@ _FAILED = "#D55E00"
 
 
 def gain_map_figure(drawn: GainMap) -> Any:
-    """Draw a map: shades are levels that were screened in floating point, markers are points proved exactly."""
+    """Draw a map: shades are levels screened in floating point, markers are exactly proved points."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
 
@@ -58,7 +58,7 @@ def _label(drawn: GainMap, which: int) -> str:
 
 
 def _shades(count: int) -> list[Any]:
-    """Pale blues, the higher the level the darker."""
+    """Pale blues, darker for higher levels."""
     from matplotlib import colormaps
 
     return [colormaps["Blues"](0.18 + 0.5 * k / max(count - 1, 1)) for k in range(count)]
@@ -71,7 +71,7 @@ def _patch(shade: Any, label: str) -> Any:
 
 
 def _markers(axis: Any, drawn: GainMap, first: np.ndarray, second: np.ndarray) -> list[Any]:
-    """Markers of everything that was tried, and their legend entries."""
+    """Markers of all tried points, and their legend entries."""
     looks = {
         "edge": {"marker": "s", "s": 5, "color": "black", "label": "proved, at the edge of a level"},
         "interior": {"marker": "o", "s": 7, "facecolors": "none", "edgecolors": "black", "linewidths": 0.5,
@@ -93,7 +93,7 @@ def _kind(drawn: GainMap, place: Place) -> str:
 
 
 def _borders(values: np.ndarray) -> np.ndarray:
-    """Borders of the cells around values that grow by equal steps or equal ratios."""
+    """Cell boundaries between values with equal steps or equal ratios."""
     if values[0] > 0:
         return np.asarray(np.exp(_borders_of(np.log(values))))
     return _borders_of(values)
@@ -105,7 +105,7 @@ def _borders_of(values: np.ndarray) -> np.ndarray:
 
 
 def _ticks(axis: Any, first: np.ndarray, second: np.ndarray) -> None:
-    """Plain numbers on logarithmic axes."""
+    """Set plain numbers on logarithmic axes."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     for which, values in ((axis.xaxis, first), (axis.yaxis, second)):
@@ -159,7 +159,7 @@ def _file(place: Place) -> str:
 
 
 def gain_map_units(drawn: GainMap) -> dict[str, str]:
-    """Units of the gains; none for a bare loop, which says nothing about them."""
+    """Units of the gains; empty for a bare loop, which has none."""
     subject = drawn.sheet.subject
     if isinstance(subject, LoopField):
         return {}
@@ -168,7 +168,7 @@ def gain_map_units(drawn: GainMap) -> dict[str, str]:
 
 
 def gain_map_values(drawn: GainMap) -> dict[str, Any]:
-    """What a map says in numbers: exact quantities as texts."""
+    """Numbers of a map; exact quantities are texts."""
     sheet, top = drawn.sheet, len(drawn.sheet.levels)
     return {
         "law": sheet.loop.law,
@@ -190,7 +190,7 @@ def gain_map_values(drawn: GainMap) -> dict[str, Any]:
 
 
 def gain_map_lines(drawn: GainMap) -> list[str]:
-    """The same for people."""
+    """The numbers of a map as lines of text."""
     lines = [f"{_title(drawn)}: {len(drawn.screened)} points, {drawn.solves} solves"]
     for k, bound in enumerate(drawn.sheet.levels, 1):
         level = drawn.counts(k)
@@ -202,12 +202,12 @@ def gain_map_lines(drawn: GainMap) -> list[str]:
 
 
 def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
-    """Write the figure ``map``, ``map.csv``, ``results.json`` and all certificates into a folder, atomically.
+    """Write the figure ``map``, ``map.csv``, ``results.json`` and all certificates into a folder, whole or not at all.
 
     Returns
     -------
     dict
-        What ``results.json`` holds.
+        Content of ``results.json``.
     """
     values = gain_map_values(drawn)
     with whole_folder(folder) as partial:

@@ -22,15 +22,15 @@ _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _DASHED = 0, (4, 2)
 _MOST_OUTLIERS = 8
 _MOST_PANELS = 4
-_SHOWN = 12.0  # critical slips after a step
+_SHOWN = 12.0  # shown range after a step, in critical slips
 _LAGS = 40
-_SMALL_EFFECT = 0.1  # of friction, that is written in thousandths
+_SMALL_EFFECT = 0.1  # friction below which values are written in thousandths
 _SYMBOLS = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "$D_c$"}
-_SHORT, _LONG = 2e-7, 0.01  # D_c [m] that no gouge of a laboratory has
+_SHORT, _LONG = 2e-7, 0.01  # range of D_c [m] of laboratory gouges
 
 
 def identification_lines(result: Identification | Steps, *, verbose: bool = False) -> list[str]:
-    """For people, within 80 columns: the answer, a table, and what to do next; with `verbose` all that was tested."""
+    """Lines of at most 80 characters: the verdict, a table, and the next command; with `verbose` also all tests."""
     if isinstance(result, Steps):
         each = [line for step in result.steps for line in identification_lines(step, verbose=True)]
         table = [_STEP_HEAD, *(_step_row(i, step) for i, step in enumerate(result.steps, start=1))][: 1 + _MOST_STEPS]
@@ -68,7 +68,7 @@ _COLUMNS = {"direct_effect": 10, "evolution_effect": 10, "difference": 10, "crit
 
 
 def _step_row(number: int, step: Identification) -> str:
-    """Values of a step; a question mark behind those without an interval."""
+    """Values of a step; a question mark after those without an interval."""
     entries = {**step.estimates, "difference": step.difference}
     cells = []
     for name, width in _COLUMNS.items():
@@ -79,7 +79,7 @@ def _step_row(number: int, step: Identification) -> str:
 
 
 def _more(result: Identification) -> list[str]:
-    """Tests that passed, noise and searches, what was assumed."""
+    """Passed tests, noise, searches and assumptions."""
     fit, rate = result.fit, getattr(result.law, "reference_rate", None)
     means, all_ = len(fit.counts), round(float(np.sum(fit.counts)))
     samples = f"{int(fit.used.sum())} samples" if all_ == means else f"{all_} samples averaged to {means}"
@@ -106,7 +106,7 @@ def _row(estimate: ParameterEstimate) -> str:
 
 
 def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
-    """Value, interval and unit with its prefix, in as many digits as the interval calls for."""
+    """Value, interval and unit with its prefix, in as many digits as the interval justifies."""
     power = power_of(estimate.value) if estimate.unit in _PREFIXED else 0
     wide = estimate.high - estimate.low
     finite = math.isfinite(wide) and wide > 0
@@ -119,7 +119,7 @@ def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
 
 
 def _warnings(identification: Identification) -> list[str]:
-    """What looks wrong, noise that is not white, and outliers."""
+    """Warnings: implausible values, correlated noise, and outliers."""
     notes, critical = [], identification.estimates.get("critical_slip")
     evolves = "evolution_effect" in identification.law.quantities()
     if critical is not None and evolves and not _SHORT <= critical.value <= _LONG:
@@ -139,7 +139,7 @@ def _warnings(identification: Identification) -> list[str]:
 
 
 def steps_figure(steps: Steps) -> Any:
-    """A panel a step with its own fit and the common one, and the regions of a and b of all."""
+    """One panel per step with its own and the common fit, and the regions of a and b of all steps."""
     joint: Any = steps.common.fit.experiment
     at, count = steps.common.fit.fitted, len(steps.steps)
     names = [f"step {i}" for i in range(count)] + ["."] * (count % 2)
@@ -161,7 +161,7 @@ def steps_figure(steps: Steps) -> Any:
 
 
 def identification_figure(identification: Identification) -> Any:
-    """Friction with fit and trend, rate of the load point, every step, residuals, their correlation, a joint region."""
+    """Friction with fit and trend, load-point rate, every step, residuals, their correlation, and a joint region."""
     record, used, fit = identification.record, identification.used, identification.fit
     way = record.time[used] if record.path is None else record.path[used] * 1e6
     slipped = "time [s]" if record.slip is None else "slip [µm]"
@@ -253,7 +253,7 @@ def _friction(axis: Any, identification: Identification, way: ndarray, part: sli
 
 
 def _correlation(axis: Any, fit: Fit) -> None:
-    """Autocorrelation of residuals, and of what is left of them when their neighbours are taken into account."""
+    """Autocorrelation of residuals, and of residuals minus their prediction from the neighbours."""
     for left, colour, label in (
         ((fit.residuals * np.sqrt(fit.counts))[fit.used], _MEASURED, "residuals"),
         (fit.whitened, _FITTED, "made independent"),
@@ -269,7 +269,7 @@ def _correlation(axis: Any, fit: Fit) -> None:
 
 
 def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:
-    """Root of the excess at the values that were tried, with the thresholds for one parameter and for all."""
+    """Square root of the excess at the tried values, with the thresholds for one parameter and for all."""
     alone, jointly = (math.sqrt(fit.threshold(count)) for count in (1, len(fit.fitted)))
     small = not estimate.unit and abs(estimate.value) < _SMALL_EFFECT
     power = power_of(estimate.value) if estimate.unit in _PREFIXED else -3 * small
@@ -284,14 +284,14 @@ def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:
 
 
 def _pair(fit: Fit) -> list[str]:
-    """The two parameters whose region is drawn."""
+    """Indices of the two parameters whose region is drawn."""
     names = [c.name for c in fit.experiment.coordinates]
     pair: list[str] = [name for name in ("direct_effect", "evolution_effect") if name in names]
     return pair if len(pair) == 2 else names[:2]
 
 
 def _region(axis: Any, identification: Identification, label: str = "", colour: str = _FITTED) -> None:
-    """Region of 95 % of two parameters by the slopes of the fit."""
+    """95 % region of two parameters, from the slopes of the fit."""
     fit, pair = identification.fit, _pair(identification.fit)
     places = [[c.name for c in fit.experiment.coordinates].index(name) for name in pair]
     size = np.maximum(np.linalg.norm(fit.slopes, axis=0), 1e-300)
@@ -312,13 +312,13 @@ def _region(axis: Any, identification: Identification, label: str = "", colour: 
 
 
 def require_format(path: Path) -> None:
-    """Refuse a figure of another format than SVG, PNG or PDF."""
+    """Reject a figure format other than SVG, PNG or PDF."""
     if path.suffix[1:] not in FORMATS:
         raise OutputError(f"a figure must end in .{', .'.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
 
 
 def save_figure(identification: Identification | Steps, path: Path) -> None:
-    """Write the figure, whole or not at all, without a date so that the same figure is the same file."""
+    """Write the figure, whole or not at all, without a date, so that the file is reproducible bitwise."""
     require_format(path)
     draw: Any = steps_figure if isinstance(identification, Steps) else identification_figure
     write_whole(path, figure_bytes(draw(identification), path.suffix[1:], path.stem))

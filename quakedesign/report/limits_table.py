@@ -20,7 +20,7 @@ _FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
 
 
 def limits_lines(limits: Limits) -> list[str]:
-    """For people, within 80 columns."""
+    """The result as lines of at most 80 characters."""
     task = limits.fault
     head = [
         f"{task.name}: performance limits, and proved bounds of designs",
@@ -38,7 +38,7 @@ def limits_lines(limits: Limits) -> list[str]:
 
 
 def _delay(limits: Limits) -> str:
-    """Delay of the loop; limits of slow sliding have none."""
+    """Delay of the loop; limits of slow sliding have no delay."""
     late = 0 if isinstance(limits, SlidingLimits) else ExactSetup.of(limits.sensing.setup).delay
     return f", delay {quantity(float(late), 's')}" if late else ""
 
@@ -115,19 +115,19 @@ def _constants(proof: SlidingProof) -> str:
 
 
 def _box(limits: Limits) -> str:
-    """The box, which rate-and-state friction does not have."""
+    """Name of the box; empty for slow sliding, which has no box."""
     return "" if isinstance(limits, SlidingLimits) else f"box {limits.fault.box.name}, "
 
 
 def _path(proof: SlidingProof) -> str:
-    """What the design that is proved stands behind."""
+    """Lag or diffusion path of the proved design."""
     ways = {"a lag of": proof.held.lag, "a diffusion path of L^2/D =": proof.held.diffusion}
     lines = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
     return f" behind {' and '.join(lines)}" if lines else ""
 
 
 def _undecided(limits: Limits) -> list[str]:
-    """That neither side reaches the fault's own T_s, where it is so."""
+    """Statement that neither proof nor limit decides the fault's own T_s, if this is so."""
     step, own = limits.largest_step, rational(limits.fault.sampling_time)
     proved = step.proved_up_to is not None and own <= step.proved_up_to
     if proved or step.impossible_beyond is None or own > step.impossible_beyond:
@@ -148,7 +148,7 @@ def _shown(bound: Bound | None, unit: str) -> str:
 
 
 def limits_figure(limits: Limits) -> Any:
-    """Slip-rate errors over T_s: impossible, proved, and the natural earthquake's slip rate."""
+    """Slip-rate errors over T_s: infeasible, proved, and the natural earthquake's slip rate."""
     drawing, axes = figure(1, 4.2)
     axis, natural = axes[0, 0], limits.natural_peak
     axis.set(xscale="log", yscale="log", xlabel="T_s [s]", ylabel="slip-rate error [m/s]")
@@ -176,7 +176,7 @@ def limits_figure(limits: Limits) -> Any:
 
 
 def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
-    """Write the figure ``limits`` and ``results.json`` into a folder, atomically; return its content."""
+    """Write the figure ``limits`` and ``results.json`` into a folder, whole or not at all; return the results."""
     values = limits.to_dict()
     with whole_folder(folder) as partial:
         write_figures(partial, {"limits": limits_figure(limits)}, formats)

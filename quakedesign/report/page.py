@@ -1,7 +1,7 @@
 """HTML report on one page with its figures and equations, without external resources.
 
 Chapters: units and numbers as HTML; equations as MathML; account of every controller; parameter table;
-information for reproduction; captions.
+reproduction; captions; page.
 """
 
 import os
@@ -55,12 +55,12 @@ _SIGNS = (("&lt;=", "≤"), ("&gt;=", "≥"), ("T_s", "T<sub>s</sub>"))
 
 
 def unit_html(unit: str) -> Markup:
-    """``Pa s/m^2`` with a raised exponent and dots between factors; nothing for a pure number."""
+    """``Pa s/m^2`` with a raised exponent and dots between factors; empty for a pure number."""
     return Markup("") if unit in ("", "-") else _set(unit.replace(" ", "·"))
 
 
 def typeset(text: object) -> object:
-    """A sentence of a program as people set it: signs, raised exponents, powers of ten; markup stays as it is."""
+    """A sentence of plain text, typeset: signs, raised exponents, powers of ten; markup is unchanged."""
     return _set(text) if isinstance(text, str) and not isinstance(text, Markup) else text
 
 
@@ -79,7 +79,7 @@ def _power_of_ten(number: re.Match[str]) -> str:
 
 
 # ----------------------------------------------------------------------
-# Equations as MathML, which browsers draw without a script or a network.
+# Equations as MathML, which browsers render without a script or a network.
 
 
 def mathml(latex: str, *, display: str = "block") -> Markup:
@@ -89,9 +89,9 @@ def mathml(latex: str, *, display: str = "block") -> Markup:
 
 
 # ----------------------------------------------------------------------
-# What the page tells of every controller: guarantee, run, limits, proof, each in sentences and rows.
+# Account of every controller on the page: guarantee, run, limits, proof, each in sentences and rows.
 
-_SHOWN_STATES = 4  # of a law whose matrices are shown
+_SHOWN_STATES = 4  # largest number of states of a law whose matrices are shown
 ASKED = {
     "sampling_time": "the pressure is renewed at least this often",
     "delay": "no more time passes from the measurement to the pressure",
@@ -110,11 +110,11 @@ ASKED = {
 
 @dataclass(frozen=True, kw_only=True)
 class Account:
-    """What the report states of one controller."""
+    """Statements of the report about one controller."""
 
     label: str
     badge: str
-    good: bool  # Whether the loop that ran has a guarantee, or its proof covers it
+    good: bool  # Whether the simulated loop has a guarantee, or the proof covers it
     # guarantee, run, limits, verdict, proof: Sentences without a full stop
     guarantee: list[str]
     run: list[str]
@@ -122,7 +122,7 @@ class Account:
     verdict: list[str]
     proof: list[str]
     law: list[Markup]  # Equations with the numbers of the design
-    python: list[str]  # Lines of the sampled linear law for python-control; none for others
+    python: list[str]  # Lines of the sampled linear law for python-control; empty for other laws
     gains: list[tuple[str, str, Markup]]  # Name, value, unit
     # Rows of the tables: premises of the first proof, premises of the certificate of the base gains in continuous time,
     # and certified values with a feed-forward
@@ -132,12 +132,12 @@ class Account:
 
 
 def accounts(comparison: "Compared") -> list[Account]:
-    """Of all controllers, designed ones first."""
+    """Accounts of all controllers, designed ones first."""
     return [_account(entry) for origin in ("designed", "published") for entry in comparison.of(origin)]
 
 
 def _cards(every: Iterable[Account]) -> list[Account]:
-    """Accounts; controllers of which everything is the same share one."""
+    """Accounts; controllers with equal statements share one."""
     cards: dict[tuple[Any, ...], Account] = {}
     for one in every:
         key = (tuple(one.guarantee), tuple(one.run), tuple(one.verdict))
@@ -153,7 +153,7 @@ def _account(entry: "Entry") -> Account:
     guaranteed, limits = guarantee_lines(entry), limit_lines(entry)
     compensated = [entry.guarantee.compensation.sentence()] if entry.guarantee and entry.guarantee.compensation else []
     domain = [domain_sentence(design.domain)] if design.domain else []
-    # How a law of samples runs; nothing for a law in continuous time.
+    # Sampling of a sampled law; None for a law in continuous time.
     sampling = design.controller.sampling if design.controller else None
     return Account(
         label=entry.label,
@@ -180,7 +180,7 @@ def _account(entry: "Entry") -> Account:
 
 
 def _slowly(entry: "Entry") -> list[str]:
-    """How a guarantee of slow sliding is found; nothing for others."""
+    """Explanation of a guarantee of slow sliding; empty for other guarantees."""
     proof = entry.proof
     if proof is None or not proof.cells:
         return []
@@ -197,13 +197,13 @@ def _slowly(entry: "Entry") -> list[str]:
 
 
 def _linear_law(entry: "Entry") -> "LinearLaw | None":
-    """The sampled linear law of a guarantee; None for laws with an implicit step, and without a guarantee."""
+    """Sampled linear law of a guarantee; None for laws with an implicit step, and without a guarantee."""
     law = getattr(getattr(entry.proof, "held", None), "law", None)
     return law if isinstance(law, LinearLaw) and law.root is None else None
 
 
 def _at_samples(entry: "Entry") -> list[str]:
-    """What the difference equations of the stick–slip plant stand for; nothing for other laws."""
+    """Symbols of the difference equations of a stick–slip law; empty for other laws."""
     law = getattr(getattr(entry.proof, "held", None), "law", None)
     if not isinstance(law, StickSlipLaw):
         return []
@@ -216,7 +216,7 @@ def _at_samples(entry: "Entry") -> list[str]:
 
 
 def _equations(entry: "Entry") -> list[Markup]:
-    """The law in continuous time, where it has one, and that of the stick–slip plant at its samples."""
+    """Equations of the law in continuous time, if any, and of a stick–slip law at its samples."""
     sampled: Any = getattr(entry.proof, "held", None)
     controller, law = entry.design.controller, getattr(sampled, "law", None)
     latex = [] if isinstance(controller, StickSlipController) else law_latex(controller)
@@ -226,7 +226,7 @@ def _equations(entry: "Entry") -> list[Markup]:
 
 
 def _difference(entry: "Entry") -> list[Markup]:
-    """A sampled linear law as a difference equation, four digits."""
+    """A sampled linear law as a difference equation, in four digits."""
     law = _linear_law(entry)
     if law is None or len(law.states) > _SHOWN_STATES:
         return []
@@ -285,7 +285,7 @@ def _gains(entry: "Entry") -> list[tuple[str, str, Markup]]:
 
 
 # ----------------------------------------------------------------------
-# Parameters of a fault with symbols and units, as rows for people.
+# Parameters of a fault with symbols and units, as table rows.
 
 _DERIVED = {
     "mass": ("m", "kg"),
@@ -302,9 +302,9 @@ HEADINGS = ("parameter", "symbol", "value", "unit", "where")
 
 
 def parameter_rows(fault: Fault) -> list[Row]:
-    """One row a parameter under `HEADINGS`: those of the fault file, its uncertainty, and what follows from them.
+    """One row a parameter under `HEADINGS`: those of the fault file, its uncertainty, and derived ones.
 
-    No disturbance of friction with a state: what pushes such a fault is the stress of its guarantee.
+    No disturbance for friction with a state: the disturbance of such a fault is the stress of its guarantee.
     """
     refused = fault.friction.equilibrium.refused
     rows = [
@@ -337,18 +337,18 @@ def _parameter_row(name: str, value: float | None, unit: str, where: str, symbol
 
 
 # ----------------------------------------------------------------------
-# What it takes to make a report again: when, with which versions, by which command, from which numbers.
+# Data to reproduce a report: date, versions, command, and numbers of the fault.
 
 _PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "scipy", "control", "python-flint")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduction:
-    """How a report was made."""
+    """Data to reproduce a report."""
 
-    date: str  # UTC; that of SOURCE_DATE_EPOCH where it is set, for pages that are the same byte for byte
-    command: str  # As it was typed; empty where the report was not made by one
-    versions: Mapping[str, str]  # Of the package, of all libraries that numbers depend on, and of Python
+    date: str  # UTC; that of SOURCE_DATE_EPOCH if set, for pages that are reproducible bitwise
+    command: str  # Command as typed; empty if no command made the report
+    versions: Mapping[str, str]  # Versions of the package, of all libraries that affect numbers, and of Python
     scenario: list[str]  # Lines of the fault as TOML
 
 
@@ -358,7 +358,7 @@ def versions() -> dict[str, str]:
 
 
 def reproduction(fault: Fault, command: str = "") -> Reproduction:
-    """How a report of a fault is made now."""
+    """Reproduction data of a report of a fault, at this time."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     now = datetime.fromtimestamp(int(epoch), UTC) if epoch.isdecimal() else datetime.now(UTC)
     return Reproduction(
@@ -370,7 +370,7 @@ def reproduction(fault: Fault, command: str = "") -> Reproduction:
 
 
 # ----------------------------------------------------------------------
-# What every figure shows, in words: below it in the report, and for readers who do not see it.
+# Captions of the figures, which are also their text alternatives.
 
 CAPTIONS = {
     "overview": "How fast does the fault slip? Slip rate and slip over logarithmic time, without control and with the "
@@ -402,7 +402,7 @@ CAPTIONS = {
 
 
 # ----------------------------------------------------------------------
-# The report as one HTML page that holds its figures and equations and loads nothing.
+# The report as one HTML page that contains its figures and equations and loads nothing.
 
 MODEL_LIMITS = (
     "the model is one block: it does not describe where an earthquake stops, rupture speed, heating, or seismicity "
@@ -430,7 +430,7 @@ def table_html(comparison: "Compared") -> str:
 
 
 def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Reproduction) -> str:
-    """Whole report as HTML with its figures, SVG elements by name, inside."""
+    """Whole report as HTML, including its figures, SVG elements by name."""
     every, first = accounts(comparison), summary(comparison)
     page: str = (
         _environment()
@@ -467,7 +467,7 @@ def _figure(name: str, drawn: Markup) -> dict[str, str]:
 
 
 def _natural(comparison: "Compared") -> str:
-    """What the fault does without control."""
+    """Natural behaviour of the fault without control."""
     fault, run = comparison.fault, comparison.uncontrolled
     if cycle := cycle_sentences(comparison):
         return cycle[0]
@@ -481,7 +481,7 @@ def _natural(comparison: "Compared") -> str:
 
 
 def _limits(comparison: "Compared", every: list[Account]) -> list[str]:
-    """What cannot be had, each said once with whom it is about, and what the model leaves out."""
+    """Limits, each stated once with the controllers concerned, and limitations of the model."""
     about: dict[str, list[str]] = {}
     for account in every:
         for line in account.limits:
@@ -506,7 +506,7 @@ _of_runs = by_equilibrium(
 
 
 def _way(comparison: "Compared") -> str:
-    """What the pressure of the runs goes through."""
+    """Actuator stages and diffusion path of the runs, in words."""
     paths = (e.design.setup.path.items() for e in comparison.of("designed"))
     stages = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)
     return f"the pressure in the runs acts {'through ' + ', '.join(stages) if stages else 'without delay'}"
@@ -519,7 +519,7 @@ def _tables(comparison: "Compared") -> dict[str, Any]:
 
 
 def _terms(fault: "Fault") -> list[list[str]]:
-    """Symbol, meaning and unit of what a report of the fault may speak of."""
+    """Symbol, meaning and unit of the terms in a report of the fault."""
     terms: dict[str, list[list[str]]] = tomllib.loads(_text("glossary.toml"))
     own = terms[fault.friction.equilibrium.name]
     return sorted(terms["every"] + own, key=lambda term: not term[0])  # symbols first
@@ -538,5 +538,5 @@ def _environment() -> Any:
 
 
 def _shown(value: Any) -> Any:
-    """Text of users as text; the page's own markup has none."""
+    """User text, escaped; the page's own markup is unchanged."""
     return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# Figures of the paper that show simulations, drawn anew for any fault, published gains beside designed ones.
+# Figures of the paper that show simulations, redrawn for any fault with published and designed gains.
 #
 # Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV. Its figures
 # of the laboratory show experiments; here the laboratory fault is simulated like any other.
@@ -54,7 +54,7 @@ PAPER = {
 def paper_figures(study: "PaperRuns") -> dict[str, Any]:
     """Figures of a study by name: those of a comparison, and the paper's (`PAPER`).
 
-    Those in closed loop are there if anything ran, the bars if an e-LQR did. Friction with a state has its own.
+    Closed-loop figures need a run, the bars a run of an e-LQR. Friction with a state has other figures.
     """
     comparison = study.comparison
     if study.induced is None:
@@ -73,7 +73,7 @@ def paper_figures(study: "PaperRuns") -> dict[str, Any]:
 
 
 def peak_against_tracking(study: "PaperRuns") -> Any:
-    """Errors that were seen over the slip-rate error that is guaranteed, one point a design."""
+    """Simulated errors over the guaranteed slip-rate error, one point a design."""
     claims = [point.guarantee.claims for point in study.front]
     drawing, axes = figure(1, 3.2, 2)
     largest = max(float(claim.slip_rate_error) for claim in claims)
@@ -131,7 +131,7 @@ def earthquakes(comparison: "Compared", induced: "Trajectory") -> Any:
 
 
 def friction_coefficient(comparison: "Compared") -> Any:
-    """Friction coefficient over time in closed loop; all laws that follow the reference share one curve."""
+    """Friction coefficient over time in closed loop; laws that track the reference share one curve."""
     drawing, ((axis,),) = figure(1, 3.2)
     runs = runs_of(comparison.entries)
     divisor, unit = clock(max(float(run.time[-1]) for _, run in runs))
@@ -171,7 +171,7 @@ def errors_and_power(comparison: "Compared") -> Any:
 
 
 def _bars(axis: Any, shown: "list[tuple[Entry, dict[str, Any]]]", name: str, title: str) -> None:
-    """One panel; on a logarithmic axis bars start at 1, so that better and worse point to different sides."""
+    """Draw one panel; on a logarithmic axis bars start at 1, so that better and worse values have different sides."""
     values = [entry_ratios[name] for _, entry_ratios in shown]
     logarithmic = name != "rms_pressure" and min(values) > 0
     start = 1.0 if logarithmic else 0.0
@@ -192,7 +192,7 @@ def _bars(axis: Any, shown: "list[tuple[Entry, dict[str, Any]]]", name: str, tit
 
 
 def _notes(axis: Any, basis: "Entry") -> None:
-    """What 1 stands for, in the free panel."""
+    """Write the reference values of the ratios into the free panel."""
     run = basis.run
     assert run is not None
     lines = [f"1 stands for {basis.label}:", ""]

@@ -8,14 +8,14 @@ from quakedesign.errors import ParameterError
 from quakedesign.studies.scaling import SCALED
 
 # ----------------------------------------------------------------------
-# Gains carried between faults, in lines for people.
+# Scaled gains as lines of text.
 
 _THREE_DIGITS = 0.005
 _KEYS = {"scale_factors", "title", "from", "to", "source_gains", "gains", "published", "exponents", "unrounded"}
 
 
 def scale_lines(result: Mapping[str, Any]) -> list[str]:
-    """The answer of `scale_answer` for people."""
+    """The result of `scale_answer` as lines of text."""
     if lacking := _KEYS - result.keys():
         raise ParameterError(f"answer must be one of scale_answer. Received one without {', '.join(sorted(lacking))}.")
     factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in result["scale_factors"].items())
@@ -36,7 +36,7 @@ def scale_lines(result: Mapping[str, Any]) -> list[str]:
 
 
 def _rounded(printed: Mapping[str, Any] | None) -> bool:
-    """True where printed gains differ, but by no more than rounding to three digits explains."""
+    """Whether printed gains differ, but by no more than rounding to three digits."""
     off = [abs(e["deviation"]) for e in (printed or {}).values() if not e["agrees"] and e["deviation"] is not None]
     return bool(off) and max(off) < _THREE_DIGITS
 
@@ -79,7 +79,7 @@ def _short(text: str) -> str:
 
 
 def export_lines(result: dict[str, Any]) -> list[str]:
-    """The same for people."""
+    """The result of `export_result` as lines of text."""
     measured = ", ".join(f"{name} [{unit}]" for name, unit in result["measurement"].items())
     lines = [
         *result["remarks"],

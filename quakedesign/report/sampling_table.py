@@ -43,7 +43,7 @@ FOOTNOTE = (
 
 
 def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
-    """Write ``results.json`` and the subfolder ``figures`` into a folder, atomically; return its content."""
+    """Write ``results.json`` and a folder ``figures`` into a folder, whole or not at all; return the results."""
     values = report.to_dict()
     with whole_folder(folder) as partial:
         (partial / "figures").mkdir()
@@ -53,7 +53,7 @@ def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] 
 
 
 def print_sampling(report: SamplingReport, console: Any) -> None:
-    """Table of the schemes, and one of every study."""
+    """Print a table of the schemes, and one of every study."""
     console.print(report.fault.name, style="bold", end=", ")
     console.print(f"T_s = {report.fault.sampling_time:g} s")
     console.print(_table(OUTCOMES, [row_outcome(row) for row in report.rows], OUTCOME_WIDTHS), soft_wrap=False)
@@ -77,7 +77,7 @@ def print_sampling(report: SamplingReport, console: Any) -> None:
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int, ...]) -> Table:
-    """Table whose columns of text, the first one or two, have the widths given; so have others as far as given."""
+    """Table with the given widths of the first columns; the first two of these, at most, are text."""
     sides = "l" * min(len(widths), 2) + "r" * len(head)
     return table(zip_longest(head, widths, sides[: len(head)]), rows)
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# Scope of a proof: the loop that ran and its task, or the premises that fail, with ratios.
+# Scope of a proof: the simulated loop and its task, or the premises that fail, and by how much.
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
 """Premises of a linear law's stability that its certified peaks do not need."""
@@ -61,7 +61,7 @@ def _unmet(entry: "Entry") -> str:
 
 
 def _unstable_with_hold(entry: "Entry") -> bool:
-    """Whether a run in continuous time hides that the law is unstable with zero-order hold."""
+    """Whether a run in continuous time hides an instability with zero-order hold."""
     if entry.run is None or entry.zero_order_hold is None:
         return False
     return entry.run.provenance["scheme"] == "continuous" and entry.zero_order_hold.runs.verdict is Verdict.REFUTED
@@ -78,7 +78,7 @@ def _failing(premise: Premise) -> str:
 
 
 def _hold_gaps(entry: "Entry") -> list[str]:
-    """Reasons in the scheme of the run why the proof does not cover it."""
+    """Parts of the proof that do not apply to the scheme of the run."""
     if entry.run is None:
         return []
     scheme, step = entry.run.provenance["scheme"], entry.run.provenance["step"]
@@ -99,14 +99,14 @@ def _hold_gaps(entry: "Entry") -> list[str]:
 
 
 # ----------------------------------------------------------------------
-# Headline of a run: outcome, pressure, and whether the pressure was sufficient for the task.
+# First sentences about a run: outcome, pressure, and whether this pressure was sufficient.
 
 _NEGLIGIBLE = 1e-6
 """Of the larger end of a range of pressures: a smaller end is said to be zero."""
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
-    """Outcome of a run, the expected onset if it is too short, its pressure, and a shortfall of pressure."""
+    """Outcome of a run, the expected beginning of its event if the run is too short, and its pressure."""
     extremes = pressure_extremes(run)
     pressure = pressure_sentence(*extremes) if extremes else None
     parts = [outcome_sentence(run), waiting_sentence(run, fault), pressure, shortfall(run, fault)]
@@ -124,7 +124,7 @@ def outcome_sentence(run: Trajectory) -> str:
 
 
 def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
-    """Expected onset of the event in a run without control that ends earlier; None for other runs."""
+    """Expected beginning of the event, for an uncontrolled run that ends before it; None for other runs."""
     event = waiting(run, fault)
     if event is None:
         return None
@@ -158,11 +158,11 @@ def _percent(share: float) -> str:
 
 
 # ----------------------------------------------------------------------
-# Lines about an e-LQR: certified margins, sampling and peaks.
+# Sentences about an e-LQR: certified margins, sampling and peaks.
 
 
 def hold_sentences(stability: HeldLoop) -> list[str]:
-    """Whether the law that runs is stable with zero-order hold, and up to which T_s."""
+    """Stability of the running law with zero-order hold, and the largest proved T_s."""
     over = f"with zero-order hold over T_s = {float(stability.step):.12g} s"
     if stability.runs.verdict is Verdict.REFUTED and stability.runs.witness is not None:
         return [f"UNSTABLE {over} ({_near(stability.runs.witness)})", _proved_up_to(stability)]
@@ -180,7 +180,7 @@ def _proved_up_to(stability: HeldLoop) -> str:
 
 
 def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
-    """Bound of the slip rate in continuous time, for every requested class of disturbances."""
+    """Largest slip rate in continuous time, for every requested class of disturbances."""
     lines = [
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
@@ -225,16 +225,16 @@ def margin_lines(analysis: Analysis) -> list[str]:
 
 
 def _near(vertex: Sequence[Fraction]) -> str:
-    """A corner of the box, rounded: its exact numbers are in the JSON facts."""
+    """A corner of the box, rounded; its exact numbers are in the JSON facts."""
     return "near β = {:.4g}, s = {:.4g} 1/s^2, w = {:.4g} 1/s".format(*map(float, vertex))
 
 
 # ----------------------------------------------------------------------
-# Lines about a comparison: outcome and verdict of every controller with failing conditions, domains, schemes.
+# Sentences about a comparison: outcome, verdict and failed premises of every controller, domains, schemes.
 
 
 def guarantee_lines(entry: "Entry") -> list[str]:
-    """Guarantee of the sampled loop, worst case found and performance limits; for designed laws."""
+    """Guarantee of the running loop, worst case found, and performance limits; for designed laws."""
     if entry.guarantee is None:
         return []
     reason = entry.design.details.get("reason") if entry.guarantee.proved else None
@@ -244,12 +244,12 @@ def guarantee_lines(entry: "Entry") -> list[str]:
 
 
 def limit_lines(entry: "Entry") -> list[str]:
-    """Performance limits in `guarantee_lines`: of every controller, and of designs of this kind."""
+    """The limits in `guarantee_lines`: for every controller, and for designs of this kind."""
     return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_reach(entry)]
 
 
 def _reach(entry: "Entry") -> list[str]:
-    """Largest T_s and delay that the search of a design found for designs of the same kind."""
+    """Longest T_s and delay for designs of the same kind, as far as the design search tests them."""
     certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}
     if not certified:
         return []
@@ -261,11 +261,11 @@ def _reach(entry: "Entry") -> list[str]:
 
 
 def brief(entry: "Entry") -> str:
-    """Guarantee and headline."""
+    """The guarantee, and the headline."""
     return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
 
 
-_WHOLE = 1e-3  # of a task that a run may leave out, as the last sample has no period
+_WHOLE = 1e-3  # share of a task that a complete run may omit, as the last sample has no period
 HEADLINE = 200
 """Characters of a headline at most: two lines and a half of a terminal."""
 
@@ -283,7 +283,7 @@ def remarks(entry: "Entry") -> list[str]:
 
 
 def beside_guarantee(lines: Sequence[str], entry: "Entry") -> list[str]:
-    """Lines about a controller, without a reason that its `guarantee_lines` have given."""
+    """Sentences about a controller, without a reason that its `guarantee_lines` already state."""
     reason, guaranteed = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
     stated = bool(reason) and str(reason) in guaranteed
     return [line for line in lines if not (stated and line.endswith(str(reason)))]
@@ -296,7 +296,7 @@ def _fitting(lines: Sequence[str]) -> int:
 
 
 def sentences(entry: "Entry") -> list[str]:
-    """All sentences about a run and its proof, most important first, without full stops."""
+    """All sentences about a run and its proof, the most important first, without full stops."""
     design = entry.design
     if design.controller is None:
         return _because(Verdict.UNDECIDED, design.details.get("reason", "no gains with a proof were found"))
@@ -318,7 +318,7 @@ def sentences(entry: "Entry") -> list[str]:
 
 
 def part_of_task(run: Trajectory, fault: Fault) -> str:
-    """Part of the task that an incomplete run shows; empty for complete runs and for those that ended early."""
+    """Shown part of the task; empty for a complete run, or one that ended by itself."""
     task, last = fault.reference.operation_time, float(run.time[-1])
     if last > (1 - _WHOLE) * task or not run.outcome.harmless:
         return ""
@@ -326,7 +326,7 @@ def part_of_task(run: Trajectory, fault: Fault) -> str:
 
 
 def _verdict(design: Design, run: Trajectory | None) -> list[str]:
-    """Of the sampled loop or in continuous time, with the reason where it is not positive."""
+    """Verdict on the sampled loop or in continuous time, with the reason if it is not positive."""
     if design.verdict is Verdict.PROVED:
         ran: FaultProof | None = design.runs if design.runs is not None and design.runs.proved else None
         lasts, proved = (ran.lasts, ran.plant) if ran else ("for all t >= 0", TrackingProof.plant)
@@ -340,13 +340,13 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
 
 
 def _because(verdict: Verdict, reason: str) -> list[str]:
-    """In one sentence where that leaves half of the headline to others."""
+    """Verdict and reason, in one sentence if it takes at most half of the headline."""
     text = f"{verdict}: {reason}"
     return [text] if len(text) <= HEADLINE // 2 else [str(verdict), reason]
 
 
 def _step_verdict(entry: "Entry") -> list[str]:
-    """Whether the step that ran, or that of the fault, is stable."""
+    """Stability at the step of the run, or that of the fault."""
     lines = []
     if entry.growth_per_step is not None:
         lines.append(f"{'stable' if entry.growth_per_step < 1 else 'UNSTABLE'} at the step used")
@@ -358,7 +358,7 @@ def _step_verdict(entry: "Entry") -> list[str]:
 
 
 def _premises(entry: "Entry") -> list[str]:
-    """Every premise that fails, and further conditions of the proof."""
+    """Failed premises, and further facts about the proof."""
     premises = entry.design.conditions
     design, texts = (
         entry.design,
@@ -387,7 +387,7 @@ def _sampled(design: Design) -> bool:
 
 
 def domain_sentence(domain: Domain) -> str:
-    """Domain in which the certificate holds with the effect of the control on h, and what limits it."""
+    """Domain where the certificate holds although the control itself changes h, and its limiting premise."""
     which = (
         "certified domain" if domain.feedforward == "none" else f"certified domain, {domain.feedforward} feed-forward"
     )
@@ -401,7 +401,7 @@ def domain_sentence(domain: Domain) -> str:
 
 
 def feedforward_rows(variants: Iterable[Variant]) -> list[tuple[str, ...]]:
-    """One row a feed-forward under `FEEDFORWARD_COLUMNS`."""
+    """One row per feed-forward under `FEEDFORWARD_COLUMNS`."""
     rows = []
     for variant in variants:
         ratios = {p.name: p.ratio for p in variant.premises}
@@ -448,17 +448,17 @@ _SAID = {
 
 
 # ----------------------------------------------------------------------
-# Lines about a run of a fault whose friction has a state, without control or in controlled slow sliding.
+# Sentences about a run of a fault whose friction has a state, without control or in slow sliding.
 
 _MOST_EVENTS = 8
-_LOCKED = 0.5  # of the loading displacement: a fault that slips less is locked
+_LOCKED = 0.5  # share of the loading: a fault that slips less stores the rest
 FASTEST_PLATE = 1e-8
 """Loading rate [m/s] above that of every plate: 0.3 m a year."""
 _LABORATORY = 10.0  # length of a fault [m] below which a machine loads it
 
 
 def state_run_lines(result: dict[str, Any]) -> list[str]:
-    """Lines from the JSON of `run_state`: outcome, cycle, events."""
+    """Lines of text, from the JSON of `run_state`: outcome, cycle, events."""
     outcome, cycle, events = result["outcome"], result["cycle"], result["slip_events"]
     least, largest = (p / 1e6 for p in result["pressure"])
     state = ", ".join(f"{name} = {value:.4g} s" for name, value in result["start"]["state"].items())
@@ -488,13 +488,13 @@ def state_run_lines(result: dict[str, Any]) -> list[str]:
 
 
 def cycle_sentences(comparison: "Compared") -> list[str]:
-    """Seismic cycle of a fault without control, and initial state of run and proof; none without a cycle."""
+    """Seismic cycle of a fault without control, and the beginning of run and proof; empty without a cycle."""
     run, fault = comparison.uncontrolled, comparison.fault
     return [] if run.cycle is None else [_cycle(run, run.cycle, fault), steady_start_sentence(run, fault)]
 
 
 def _cycle(run: Trajectory, cycle: dict[str, float | None], fault: Fault) -> str:
-    """Behaviour of a fault with rate-and-state friction without control, with its last complete event."""
+    """Behaviour without control of a fault whose friction has a state, with its last complete event."""
     if run.failed:
         return f"Without control: unknown, since its cycle could not be computed ({run.failed.rstrip('.')})"
     peak = f"slip rate up to {run.outcome.peak_slip_rate:.3g} m/s"
@@ -506,7 +506,7 @@ def _cycle(run: Trajectory, cycle: dict[str, float | None], fault: Fault) -> str
 
 
 def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
-    """Initial state of run and proof of slow sliding, and share of the task in the slip of an earthquake."""
+    """Beginning of run and proof of slow sliding, and the share of an earthquake's slip in their task."""
     task = fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
     text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
@@ -519,7 +519,7 @@ def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
 
 
 def _loading(run: Trajectory, fault: Fault) -> str:
-    """Loading rate and plant of a cycle, with a warning of a loading rate above that of plates."""
+    """Loading rate of a cycle, its plant, and a warning if the rate is an implausible default."""
     moved = "with inertia" if run.provenance["plant"] == "smooth" else "quasi-dynamic"
     rate = fault.friction.operating_rate
     loaded = f"loaded at {rate:.3g} m/s ({moved})"
@@ -532,7 +532,7 @@ def _loading(run: Trajectory, fault: Fault) -> str:
 
 
 def left_out_lines(comparison: "Compared") -> list[str]:
-    """Laws that are not available for this fault, each reason once."""
+    """Laws that do not apply to this fault, each reason once."""
     named: dict[str, list[str]] = {}
     for name, why in comparison.left_out.items():
         named.setdefault(why, []).append(control_laws()[name].title)
@@ -540,7 +540,7 @@ def left_out_lines(comparison: "Compared") -> list[str]:
 
 
 def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") -> str:
-    """Proof of the law of a run, and the options of the run that the proof does not cover; empty without one."""
+    """Guarantee of the law of a run, and options of the run that the proof does not cover; empty without a proof."""
     if sentence is None:
         return ""
     if outside:
@@ -551,7 +551,7 @@ def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") ->
 
 
 def exceeded_line(metrics: "Metrics", least: Bound, largest: Bound) -> str:
-    """Excess of the pressures of a run [Pa] over proved ones; empty if there is none."""
+    """Pressures of a run [Pa] that exceed the proved ones; empty if none does."""
     low, high = metrics.min_pressure, metrics.max_pressure
     if low is None or high is None or (low >= least and high <= largest):
         return ""
@@ -560,7 +560,7 @@ def exceeded_line(metrics: "Metrics", least: Bound, largest: Bound) -> str:
 
 
 def sliding_run_lines(result: dict[str, Any]) -> list[str]:
-    """Lines from the JSON of `run_sliding`: outcome, errors, pressure, and proof."""
+    """Lines of text, from the JSON of `run_sliding`: outcome, errors, pressure, and guarantee."""
     outcome, metrics = result["outcome"], result["metrics"]
     least, largest = (p / 1e6 for p in result["pressure"])
     path = "".join(f", through a {name.replace('_', ' ')}" for name in result["stages"])

@@ -41,14 +41,14 @@ class Row:
 class Summary:
     """First part of the text of a comparison."""
 
-    guarantee: str  # Guarantee, relative to the natural earthquake
+    guarantee: str  # Main sentence: guarantee relative to the natural earthquake
     rows: tuple[Row, ...]
     conditions: str  # Sentence of this guarantee, or the reason why there is none
-    notes: tuple[str, ...]  # Limitations of the answer
+    notes: tuple[str, ...]  # Limitations of the guarantee
 
 
 def summary(comparison: "Compared") -> Summary:
-    """Answer, table and notes of a comparison."""
+    """Main sentence, table and notes of a comparison."""
     designed = comparison.of("designed")
     proved = [(bool(e.design.other_step), e.proof.peak_slip_rate, e) for e in designed if e.proof]
     best = min(proved, key=lambda one: one[:2])[2] if proved else None
@@ -79,7 +79,7 @@ def guaranteed_sentence(
     magnitude: float,
     law: str = "",
 ) -> str:
-    """The guarantee in a sentence, relative to slip rate [m/s] and magnitude of the natural earthquake if there is one.
+    """The guarantee in a sentence, relative to slip rate [m/s] and magnitude of a natural earthquake.
 
     The magnitude is NaN where the fault alone does not determine it.
     """
@@ -171,7 +171,7 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
 
 
 def _with_stick(guarantee: "Guarantee") -> Iterator[str]:
-    """Worst case found on the stick–slip plant, why there is no proof on it, and what is not searched there."""
+    """Worst case found on the stick–slip plant, why there is no proof on it, and the limits of the search."""
     seen, why = guarantee.worst_with_stick, guarantee.not_at_rest
     if seen is not None:
         yield (
@@ -183,7 +183,7 @@ def _with_stick(guarantee: "Guarantee") -> Iterator[str]:
 
 
 def _published(verdict: str) -> str:
-    """The verdict on published gains without the names of the conditions that fail, which the report explains."""
+    """Verdict on published gains without the names of failed conditions, which the report explains."""
     if not verdict.startswith("proved, but "):
         return verdict
     missing = verdict.removeprefix("proved, but ").split("; ")
@@ -194,7 +194,7 @@ def _published(verdict: str) -> str:
 
 
 def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
-    """Why two sliding modes have the same bounds."""
+    """Reason why two sliding modes have the same bounds."""
     sliding = [(e, e.proof, e.guarantee.compensation) for e in designed if e.guarantee and e.guarantee.compensation]
     same = [entry for entry, proof, law in sliding if proof and law.deadbeat]
     if len(same) > 1 and len({str(proof.claims) for _, proof, law in sliding if proof and law.deadbeat}) == 1:
@@ -289,7 +289,7 @@ def _cells(group: Sequence[Number], power: int, unit: str) -> str:
 
 
 def _fitted(value: Number, power: int, width: int) -> str:
-    """Number in three digits, or in as many as leave a blank before it."""
+    """Number in three digits, or fewer to leave a blank before it."""
     shown = (_cell(value, power, digits) for digits in (3, 2, 1))
     return next((cell for cell in shown if len(cell) < width), "–" if value is None else f"{_scaled(value, power):.0e}")
 

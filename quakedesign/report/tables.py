@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# Metrics of a comparison, as plain rows for every medium.
+# Metrics of a comparison as plain rows, for terminal, page and CSV.
 
 COLUMNS = (
     "controller",
@@ -36,8 +36,8 @@ _METRICS = (
 def rows(comparison: "Compared") -> list[tuple[str, ...]]:
     """One row a controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
 
-    Largest errors, RMS and total variation (path) of the pressure and the share at rest count after a quarter
-    of the task, the least and the largest pressure over all of it.
+    Largest errors, RMS and total variation (path) of the pressure and the share at rest are evaluated after a quarter
+    of the task, the least and the largest pressure over the whole task.
     """
     return [(e.label, *_cells(e.run)) for e in comparison.entries]
 
@@ -51,7 +51,7 @@ def _cells(run: "Trajectory | None") -> tuple[str, ...]:
 
 
 def csv_text(rows: list[dict[str, Any]]) -> str:
-    """Rows as CSV with a head line; what does not apply is empty."""
+    """Rows as CSV with a header line; inapplicable cells are empty."""
     heads = list(dict.fromkeys(name for row in rows for name in row))
     stream = io.StringIO()
     writer = csv.DictWriter(stream, heads, lineterminator="\n")

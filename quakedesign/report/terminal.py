@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True) -> None:
-    """The summary; with `whole` also fault, gains, verdicts with premises, and tables."""
+    """Print the summary; with `whole` also fault, gains, verdicts with premises, and tables."""
     for line in summary_lines(summary(comparison)):
         console.print(line)
     if not whole:
@@ -67,7 +67,7 @@ def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True
 
 
 def _whole(entry: "Entry") -> list[str]:
-    """All lines about a controller."""
+    """All statements about a controller as lines of text."""
     others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
     return [
         *guarantee_lines(entry),
@@ -96,7 +96,7 @@ def _gains(entry: "Entry") -> str:
 
 
 def table(columns: Iterable[tuple[str, int | None, str]], rows: Iterable[Sequence[str]], indent: int = 0) -> Table:
-    """Table of columns with heading, width and side (l or r); within 80 places no number is cut or broken."""
+    """Table of columns with heading, width and alignment (l or r); within 80 characters no number is cut or broken."""
     made = Table(box=None, pad_edge=False, padding=(0, 1, 0, indent))
     for heading, width, side in columns:
         made.add_column(heading, justify="left" if side == "l" else "right", width=width)
@@ -115,7 +115,7 @@ def _line(premise: "Premise") -> str:
 
 
 def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", console: Any) -> None:
-    """Outcome, pressure, metrics with units, events and premises of one run."""
+    """Print outcome, pressure, metrics with units, events and premises of one run."""
     console.print(run.name, style="bold")
     for sentence in run_sentences(run, fault):
         console.print(f"  {sentence}")
@@ -143,7 +143,7 @@ LABORATORY = (
 
 
 def printed_lines(rows: list[dict[str, Any]], fault: str = "") -> list[str]:
-    """Printed numbers beside ours, with the plant of ours; nothing where the paper says nothing of the fault."""
+    """Printed numbers of the paper with ours and our plant; empty if the paper has none for the fault."""
     if not rows:
         return ["", *LABORATORY] if fault == "lab-fault" else []
     sticks = any(row["plant"] == "stick-slip" for row in rows)

@@ -1,4 +1,4 @@
-"""Questions that several rooms answer together."""
+"""Studies that combine several packages: limits, comparisons, runs, exports and checks of the paper."""
 
 from quakedesign.arguments import attach
 

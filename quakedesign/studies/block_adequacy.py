@@ -1,4 +1,4 @@
-"""Whether one block is an adequate model of a fault: guarantees of the fault cut into several blocks."""
+"""Adequacy of a one-block model of a fault: guarantees for the fault divided into several blocks."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from quakedesign.synthesis import guarantee
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlocksResult:
-    """What is proved of a fault cut into numbers of blocks."""
+    """Guarantees for a fault divided into different numbers of blocks."""
 
     fault: Fault
     wells: str  # ``"one"`` or ``"each"``
     step: Fraction  # T_s [s]
-    proofs: Mapping[int, PlantProof | NoProof]  # By the number of blocks
+    proofs: Mapping[int, PlantProof | NoProof]  # Guarantees by the number of blocks
 
     @property
     def proved(self) -> bool:
@@ -29,7 +29,7 @@ class BlocksResult:
         return all(one.proved for one in self.proofs.values())
 
     def peaks(self, blocks: int) -> tuple[Any, Any] | None:
-        """Largest slip error [m] and slip-rate error [m/s] of all blocks, as they are proved."""
+        """Largest proved slip error [m] and slip-rate error [m/s] of all blocks."""
         one = self.proofs[blocks]
         if not one.proved:
             return None
@@ -37,7 +37,7 @@ class BlocksResult:
         return max(outputs[:blocks]), max(outputs[blocks:])
 
     def lines(self) -> list[str]:
-        """For people."""
+        """The result as lines of text."""
         wells = "one well for all" if self.wells == "one" else "a well for each block"
         parts = [
             f"{self.fault.name} cut into blocks, {wells}, a law designed for each number of blocks; the certificates "
@@ -77,7 +77,7 @@ def one_block(
     coupling: Any = None,
     step: Any = None,
 ) -> BlocksResult:
-    """Whether one block may stand for a fault: what is proved when it is cut into several.
+    """Guarantees for a fault divided into blocks, as a check whether one block is an adequate model.
 
     Parameters
     ----------
@@ -86,9 +86,9 @@ def one_block(
     wells : str
         ``"one"`` well for all blocks, whose law measures the means of slip and slip rate, or ``"each"``.
     coupling : number, optional
-        As of `UncertainPlant.from_blocks` [1/s²].
+        As in `UncertainPlant.from_blocks` [1/s²].
     step : str, float or Fraction, optional
-        T_s; the fault's unless given.
+        T_s; by default the fault's.
     """
     setup = LoopSetup(step=rational(fault.sampling_time) if step is None else step)
     proofs: dict[int, PlantProof | NoProof] = {}

@@ -1,16 +1,16 @@
 """Performance limits of a fault of several blocks: unstable modes that no well reaches.
 
 **Limit.** Let every block weaken at its steepest slope, with its least damping, and let ℓ be a left eigenvector of an
-unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). With constant φ of size H whose
-signs are those of ℓ, z grows from 0, as long as friction weakens so, unless Σ_j|ℓ·βb_j||P_j − P*_j| reaches HΣ|ℓ_i|: a
-controller of any kind needs pressures that far from balance, with the largest β. A mode that no well reaches grows.
-Pressures q that diffuse, q′ = Fq + G(P − P*) from q = 0, are those of S(p) = (pI − F)⁻¹G in place of S: unless the
+unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). Let φ be constant, of size H
+and with the signs of ℓ. Then, as long as friction weakens at this slope, z grows from 0 unless Σ_j|ℓ·βb_j||P_j − P*_j|
+reaches HΣ|ℓ_i|: every controller needs pressures this far from balance, with the largest β. A mode that no well reaches
+grows. For diffusing pressures q, q′ = Fq + G(P − P*) from q = 0, S(p) = (pI − F)⁻¹G replaces S: unless the
 integral of e^{−pt}ℓ·(φ + βbq) is 0, z grows, and that of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
 
-Blocks in slow sliding are linearised as one is (`limit_theorems`): S_iy_i = −ΣK_ijx_j − W_iz_i + μ_iΣs_ijq_j + d_i, s
-the shares, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i). Theorem 2 there holds for ζ = ℓ·(x, z) of each mode with a real
-pole, with Σ_i|ℓ·e_i| and Σ_j|ℓ·b_j| in place of the gains of stress and pressure, where rock of one diffusion time lies
-before every well; theorem 1 holds for each y_i, with stresses that turn on all blocks.
+Blocks in slow sliding are linearised as one block (`limit_theorems`): S_iy_i = −ΣK_ijx_j − W_iz_i + μ_iΣs_ijq_j + d_i,
+s the shares, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i). Theorem 2 there holds for ζ = ℓ·(x, z) of each mode with a real
+pole, with Σ_i|ℓ·e_i| and Σ_j|ℓ·b_j| in place of the gains of stress and pressure, if diffusion paths of one diffusion
+time precede all wells; theorem 1 holds for each y_i, with stresses that change sign on all blocks.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -30,9 +30,9 @@ from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.coupled_sliders import CoupledSliders
 from quakedesign.text import counted, quantity
 
-_SAME = 1e-6  # poles that are one, relative to the largest
-_UNREACHED = 1e-9  # of a mode's vectors
-_MOST_SKEWED = 1e10  # of the matrix of all modes
+_SAME = 1e-6  # largest relative difference of poles that count as equal
+_UNREACHED = 1e-9  # relative gain of a mode below which no well reaches it
+_MOST_SKEWED = 1e10  # largest condition number of the matrix of all modes
 _APART = (
     "limits of blocks need modes that floating point tells apart. Received blocks of very different stiffness, or a "
     "double pole. Make lengths, stresses and critical slips of the blocks more alike."
@@ -43,18 +43,18 @@ _APART = (
 class UnstableMode:
     """An unstable mode of a fault of several blocks."""
 
-    pole: float  # Its real part [1/s]
-    frequency: float  # Its imaginary part [rad/s]
+    pole: float  # Real part of the pole [1/s]
+    frequency: float  # Imaginary part of the pole [rad/s]
     shape: tuple[float, ...]  # Slips of the blocks, the largest 1 [-]
     reached: bool  # Whether a well reaches it
-    # Least size [Pa] of pressures less their balance that a controller of any kind needs, where it is known
+    # Smallest pressure deviation from balance [Pa] that every controller needs, if known
     pressure: float | None
-    # Of blocks in slow sliding: longest T_s and delay [s], and farthest well from the fault [m], of such a controller
+    # Blocks in slow sliding: longest T_s and delay [s], and farthest well from the fault [m], for any controller
     longest_step: float | None = None
     farthest_well: float | None = None
 
     def row(self) -> str:
-        """For people."""
+        """Table row as text."""
         needed = "oscillates" if self.frequency else "-"
         needed = needed if self.pressure is None else f"at least {quantity(self.pressure, 'Pa')}"
         ends = ((self.longest_step, "s"), (self.farthest_well, "m"))
@@ -69,10 +69,10 @@ class ChainLimits:
 
     chain: BlockChain
     modes: tuple[UnstableMode, ...]
-    stress: float | None = None  # On blocks in slow sliding [Pa]
-    largest_pressure: float = 0.0  # Pressure beside the plan of their wells [Pa]
-    diffusivity: float = 1.0  # Of the rock between them and the fault [m²/s]
-    slip_rate_error: tuple[float, ...] = ()  # Of every block in slow sliding [m/s], below which none stays
+    stress: float | None = None  # Stress on blocks in slow sliding [Pa]
+    largest_pressure: float = 0.0  # Largest pressure of their wells relative to the plan [Pa]
+    diffusivity: float = 1.0  # Diffusivity between these wells and the fault [m²/s]
+    slip_rate_error: tuple[float, ...] = ()  # Lower bounds of the slip-rate errors of blocks in slow sliding [m/s]
 
     @property
     def feasible(self) -> bool:
@@ -80,7 +80,7 @@ class ChainLimits:
         return all(mode.reached for mode in self.modes)
 
     def lines(self) -> list[str]:
-        """For people, within 80 columns."""
+        """The result as lines of at most 80 characters."""
         chain = self.chain
         assumed = [f"(box {chain.fault.box.name}, every block at its steepest friction, for constant disturbances)"]
         if chain.ages:
@@ -116,7 +116,7 @@ class ChainLimits:
         return parts if self.modes else [*parts, "", "no mode is unstable"]
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; null where no well reaches a mode, where it oscillates, and where no stress is given."""
+        """Plain values, SI; null if no well reaches a mode, if it oscillates, or without a stress."""
         modes, values = [asdict(mode) for mode in self.modes], {"fault": self.chain.name, "feasible": self.feasible}
         if not self.chain.ages:
             shown = ("pole", "shape", "reached", "pressure")
@@ -126,7 +126,7 @@ class ChainLimits:
 
 
 def _count(chain: BlockChain, slopes: Sequence[Fraction]) -> int:
-    """Unstable modes of blocks that damping never pushes, exactly: pivots above 0 of what weakens less what holds."""
+    """Exact number of unstable modes for non-negative damping: positive pivots of the weakening minus spring matrix."""
     pulls, count, before = {(i, j): K for i, j, K in chain.springs}, 0, Fraction(0)
     for i, slope in enumerate(slopes):
         pivot = slope - pulls.get((i, i - 1), 0) - pulls.get((i, i + 1), 0)
@@ -146,15 +146,15 @@ def chain_limits(
     ----------
     chain : BlockChain
     stress, pressure : float, optional
-        Of blocks in slow sliding: bound of the shear stress on every block, without which modes alone are found, and
-        largest pressure beside the plan of the wells [Pa]; the smallest effective normal stress unless given.
+        For blocks in slow sliding: bound of the shear stress on every block (without it, only modes are computed), and
+        largest pressure of the wells relative to the plan [Pa]; by default the smallest effective normal stress.
     diffusivity : float, optional
-        Of the rock between their wells and the fault [m²/s]; 1 unless given.
+        Diffusivity of the rock between their wells and the fault [m²/s]; 1 by default.
 
     Raises
     ------
     ParameterError
-        For modes that floating point does not tell apart, and for numbers that are not positive.
+        For modes that floating point cannot distinguish, and for numbers that are not positive.
     """
     if not chain.ages:
         if {stress, pressure, diffusivity} != {None}:
@@ -194,7 +194,7 @@ def chain_limits(
 
 
 def _steepest(chain: BlockChain) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, Callable[[float], np.ndarray]]:
-    """A, entries of the disturbances, B, their size [m/s²], and B at a pole, where every block weakens most."""
+    """A, disturbance entries, B, disturbance size [m/s²], and B at a pole, at the steepest weakening of every block."""
     tasks, N = [uncertain_plant(fault) for fault in chain.faults], len(chain.blocks)
     stiff = np.diag([float(task.slip_chord[1]) for task in tasks])
     add_springs(stiff, chain.springs, 1.0)
@@ -212,7 +212,7 @@ def _steepest(chain: BlockChain) -> tuple[np.ndarray, np.ndarray, np.ndarray, fl
 
 
 def _sliding(chain: BlockChain) -> tuple[np.ndarray, ...]:
-    """A, entries of the stresses and B about slow sliding, of slip errors over D of block 1 and log states.
+    """A, stress entries and B about slow sliding; states are slip errors over D of block 1 and log states.
 
     Then the rows of ln(v/V) over these states, and over the stresses.
     """
@@ -232,7 +232,7 @@ def _sliding(chain: BlockChain) -> tuple[np.ndarray, ...]:
 
 
 def _transmitted(chain: BlockChain, pole: float) -> np.ndarray:
-    """Transfer functions from pressures of wells (columns) to those of blocks (rows) at a pole [1/s]."""
+    """Transfer functions from well pressures (columns) to block pressures (rows) at a pole [1/s]."""
     flow, pressures = np.array(chain.flow, dtype=float), np.array(chain.pressures, dtype=float)
     if not len(flow):
         return pressures
@@ -248,9 +248,9 @@ def _modes(
     size: float | None,
     through: Callable[[float], np.ndarray] | None = None,
 ) -> Iterator[UnstableMode]:
-    """Unstable modes under disturbances of a size, if it is known; B at a pole by `through`, without it as it is.
+    """Unstable modes under disturbances of a size, if known; `through` gives B at a pole, by default `B` itself.
 
-    Without it poles may have waves, of which nothing is found but which are reached.
+    Without `through` poles may be complex; for these modes only the reach of the wells is computed.
     """
     (poles, right), N = np.linalg.eig(A), len(A) // 2
     largest = max(abs(poles))
@@ -269,7 +269,7 @@ def _modes(
             groups[-1].append(i)
         else:
             groups.append([i])
-    for group in groups:  # of one pole: combinations that the wells reach, and those that none does
+    for group in groups:  # modes of one pole: combinations that the wells reach, and those that no well reaches
         pole = poles[group[0]]
         wave = float(pole.imag) if abs(pole.imag) > _SAME * largest else 0.0
         rows, columns = (v if wave else np.real(v) for v in (left[group], right[:N, group]))

@@ -31,7 +31,7 @@ from quakedesign.simulation import Trajectory, simulate
 from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.synthesis import Design
 
-_LARGEST_FAMILY = 24  # monomials of V
+_LARGEST_FAMILY = 24  # largest number of monomials of V
 MAXIMIZE = ("lipschitz", "beta", "beta-factor", "decay")
 _AGAINST = {
     "exact": "an exact counterexample was found, an equilibrium away from the origin",
@@ -42,7 +42,7 @@ _AGAINST = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Certified:
-    """One answer about given gains.
+    """Verdict on given gains.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Certified:
     facts : mapping
         Exact quantities as texts, measured ones as numbers.
     lines : tuple of str
-        The same for people.
+        The same as sentences.
     """
 
     verdict: Verdict
@@ -68,23 +68,23 @@ def certified(
     maximize: str | None = None,
     gain_range: tuple[Number, Number] = (1, 1),
 ) -> Certified:
-    """Verdict on given gains for a bound L̄, or how far they reach.
+    """Verdict on given gains for a bound L̄, or the largest certified value of a quantity.
 
     Parameters
     ----------
     name : str
-        Law.
+        Control law.
     lipschitz : number or text, optional
-        L̄. Not needed to maximise it; if given all the same, the smallest scale λ for it is told.
+        L̄. Not needed to maximise it; if given nevertheless, the smallest scale λ for it is reported.
     maximize : str, optional
         One of `MAXIMIZE`: L̄; the upper end b_M of the range of β; f in [b/f, b·f]; κ of the decay.
     gain_range : tuple of two
-        b_m and b_M; one value b twice where the range is asked for.
+        b_m and b_M; one value b twice to maximise the range.
 
     Raises
     ------
     ParameterError, UnknownNameError, CertificateError
-        For unknown wishes, and as `quakedesign.lyapunov.certify`.
+        For an unknown `maximize`, and as in `quakedesign.lyapunov.certify`.
     """
     began = perf_counter()
     low, high = (rational(v, "gain_range") for v in gain_range)
@@ -123,7 +123,7 @@ def _results(
 
 
 def _values(bound: Fraction | None, ends: "Ends", **values: Any) -> dict[str, Any]:
-    """Facts of every answer; what is not given is not known."""
+    """Facts of every verdict; missing values are unknown."""
     empty: dict[str, Any] = {"decay": None, "settling": None, "limit": None, "counterexample": "none", "dual": []}
     return {"lipschitz": _text(bound), "gain_range": [str(v) for v in ends], **empty, **values}
 
@@ -168,7 +168,7 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
 def _excluded(loop: Loop) -> list[int]:
     """Degrees whose sums of even signed monomials an exact dual excludes, from the lowest on and without gaps.
 
-    Families of a few seconds only.
+    Only families that take a few seconds.
     """
     small = (
         m for m in candidate_degrees(loop) if len(signed_monomials(loop.states, m, loop.domain)) <= _LARGEST_FAMILY
@@ -191,7 +191,7 @@ def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[in
 def _of_reach(
     name: str, gains: tuple[Number, ...], reach: CertifiedLimit, ends: Ends, lipschitz: Number | None
 ) -> Results:
-    """How far gains reach in L̄ or in the range of β."""
+    """Largest certified L̄ or range of β of given gains."""
     tried = ends if reach.quantity == "lipschitz" else (ends[0], ends[0])
     lowest = closed_loop(
         name, gains, lipschitz=0 if reach.quantity == "lipschitz" else str(lipschitz), gain_range=tried
@@ -266,7 +266,7 @@ def _text(value: Fraction | None) -> str | None:
 
 
 # ----------------------------------------------------------------------
-# How finely a loop must be sampled for its premise on |h'| to hold on the run itself.
+# Sampling time for which the premise on |h'| holds on the run itself.
 
 _WINDOW = 4000
 _FINEST = 1000.0
@@ -291,7 +291,7 @@ def on_trajectory(lipschitz: float, run: Trajectory) -> Premise | None:
 def largest_sampling_time(fault: Fault, controller: Controller, lipschitz: float) -> float | None:
     """Largest T_s [s] for which a run stays inside |Δh/Δt| ≤ lipschitz, by bisection on a window of 4000 T_s.
 
-    Measured on the first part of the task only, so an indication; None when even a thousandth of T_s does not do.
+    Measured only on the first part of the task, so an indication; None if even a thousandth of T_s is too long.
     """
     window = min(_WINDOW * fault.sampling_time, fault.reference.operation_time)
 
@@ -315,11 +315,11 @@ def largest_sampling_time(fault: Fault, controller: Controller, lipschitz: float
 
 
 # ----------------------------------------------------------------------
-# The premise that a run itself decides: |h'| along it against what is certified.
+# The premise that a run decides: |h'| along it against the certified bound.
 
 
 def certified_bound(design: Design | None) -> Fraction | None:
-    """Bound on |h'| for λ = 1 [m/s³] that a design is proved with; None for a linear law, and without a proof."""
+    """Proved bound on |h'| of a design for λ = 1 [m/s³]; None for a linear law, and without a proof."""
     law = design.controller if design else None
     if design is None or design.certificate is None or law is None or law.lipschitz_limit is None:
         return None
@@ -332,8 +332,8 @@ def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory
     Parameters
     ----------
     lipschitz : float or None
-        Certified bound on |h'| [m/s³]. None where there is no certificate: then nothing is certified, the premise does
-        not hold whatever the run does, and its note names the limit that no certificate of these gains exceeds.
+        Certified bound on |h'| [m/s³]. None without a certificate: then nothing is certified, the premise fails for
+        every run, and its note names the limit that no certificate of these gains exceeds.
     """
     if law.lipschitz_limit is None:
         return None

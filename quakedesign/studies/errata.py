@@ -1,4 +1,4 @@
-"""Errata of the paper: each one a check that computes, found in ``proofs/errata``."""
+"""Errata of the paper: each row has a computed check in ``proofs/errata``."""
 
 import sys
 from collections.abc import Callable, Iterable
@@ -17,15 +17,15 @@ KINDS = ("symbolic identity", "counterexample", "numeric reproduction")
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What a check computed."""
+    """Result of a check."""
 
-    holds: bool  # Whether the corrected form stands, and the printed one falls where the row says so
+    holds: bool  # Whether the corrected form holds, and the printed one fails if the row states this
     evidence: str  # The numbers, in one line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrataRow:
-    """One point at which the paper is corrected, with its check.
+    """One correction of the paper, with its check.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def errata_rows() -> tuple[ErrataRow, ...]:
 
 
 def _load(path: Path) -> ModuleType:
-    """Module at a path; registered, so that its functions can be found again by name."""
+    """Module at a path; registered, so that its functions can be imported by name."""
     name = f"quakedesign_errata_{path.stem}"
     spec = spec_from_file_location(name, path)
     assert spec is not None
@@ -94,12 +94,12 @@ def _load(path: Path) -> ModuleType:
 
 
 def find_rows(numbers: Iterable[int | str] = ()) -> tuple[ErrataRow, ...]:
-    """Rows of given numbers in the order asked for, each once; all of them without numbers.
+    """Rows of given numbers in the given order, each once; all rows without numbers.
 
     Raises
     ------
     UnknownNameError
-        For a number without a row, and for anything that is not a whole number.
+        For a number without a row, and for a value that is not a whole number.
     """
     rows = {str(row.number): row for row in errata_rows()}
     wanted = list(dict.fromkeys(str(n).strip() for n in numbers))
@@ -119,7 +119,7 @@ def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:
     Parameters
     ----------
     numbers : iterable of int or str
-        Rows wanted; all without any.
+        Requested rows; all rows if empty.
 
     Returns
     -------
@@ -129,7 +129,7 @@ def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:
     Raises
     ------
     UnknownNameError
-        For a number without a row; nothing runs then.
+        For a number without a row; no check runs then.
     """
     return [_run(row) for row in find_rows(numbers)]
 

@@ -30,24 +30,24 @@ def export_result(
     fmu: bool = False,
     force: bool = False,
 ) -> dict[str, Any]:
-    """Export a controller; return its facts, files and, with a differentiator, the premise of that.
+    """Export a controller; return its facts, files and, with a differentiator, the premise of the differentiator.
 
     Parameters
     ----------
     fault, law, folder, step, remarks, fmu, force
         As in `quakedesign.simulation.export_controller`.
     scheme : str, optional
-        That of a law of samples, or ``explicit``, unless given.
+        By default that of a sampled law, or ``explicit``.
     differentiator_bound : float, optional
-        λ_d [m/s^(n_d + 1)] of a differentiator; the law then is told its estimates.
+        λ_d [m/s^(n_d + 1)] of a differentiator, whose estimates the law then uses.
     differentiator_order : int
-        n_d of it.
+        n_d of the differentiator.
     filter_order : int
-        n_f of it.
+        n_f of the differentiator.
     averaging : int
-        Number of readings whose mean it gets.
+        Number of readings whose mean is the input of the differentiator.
     differentiator_steps : int
-        Of it for every reading.
+        Steps of the differentiator per reading.
 
     Returns
     -------

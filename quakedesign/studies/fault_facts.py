@@ -33,9 +33,9 @@ from quakedesign.symbolic.stability import StabilityVerdict, nucleation_length, 
 from quakedesign.text import lasting
 
 # ----------------------------------------------------------------------
-# Equations of a fault and of its laws in LaTeX, as their expressions are.
+# Equations of a fault and of its laws in LaTeX, from their expressions.
 
-_LONG = 100  # numerators and denominators of more are written as decimals
+_LONG = 100  # largest number of digits of numerators and denominators; longer ones are written as decimals
 
 
 def plant_latex(fault: Fault) -> list[str]:
@@ -67,7 +67,7 @@ _latex = by_equilibrium(rest=_at_rest, sliding=_with_state)
 
 
 def law_latex(law: Controller | None) -> list[str]:
-    """Commanded pressure of a law while a fault moves, and rates of its states, in four digits; empty without law."""
+    """Pressure of a law while the fault moves and rates of its states, in four digits; empty without a law."""
     if law is None:
         return []
     law = law.while_moving
@@ -86,12 +86,12 @@ def law_latex(law: Controller | None) -> list[str]:
 
 
 def stick_slip_latex(law: StickSlipLaw, step: float) -> list[str]:
-    """Difference equations of a `StickSlipLaw` in four digits: what it computes at the sample k.
+    """Difference equations of a `StickSlipLaw` at the sample k, in four digits.
 
     Parameters
     ----------
     law : StickSlipLaw
-        One with an implicit step must be deadbeat, so that its target slip rate is linear.
+        A law with an implicit step must be deadbeat, so that its target slip rate is linear.
     step : float
         T_s [s].
     """
@@ -114,7 +114,7 @@ def _number(value: float) -> str:
 
 
 def _written(expression: Any) -> str:
-    """LaTeX with numbers of many digits to four of them."""
+    """LaTeX of an expression, with long numbers rounded to four digits."""
     sums = sp.expand(sp.sympify(expression))
     numbers = {part for part in sums.atoms(sp.Pow) if part.is_number}
     numbers |= {n for n in sums.atoms(sp.Rational) if max(abs(n.p), n.q) > _LONG}
@@ -126,7 +126,7 @@ def _written(expression: Any) -> str:
 
 
 # ----------------------------------------------------------------------
-# Where a fault slides stably: regions of stiffness, effective normal stress and injected pressure.
+# Stability regions of a fault: stiffness, effective normal stress and injected pressure.
 
 _GRID = 240
 
@@ -135,22 +135,22 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True, kw_only=True)
 class Plane:
-    """Stiffness against one quantity that sets the effective stress under pressure."""
+    """Stability in the plane of stiffness and a quantity that determines the effective stress."""
 
-    across: np.ndarray  # That quantity [Pa], shape (points,)
+    across: np.ndarray  # Values of this quantity [Pa], shape (points,)
     stable: np.ndarray  # Shape (stiffnesses, points)
-    critical: np.ndarray  # Critical stiffness per area [Pa/m], shape (points,); nan where there is none
-    limits: tuple[float, ...]  # Where the damping alone decides [Pa]; nan outside of the plane
-    own: float  # Where the fault is [Pa]
+    critical: np.ndarray  # Critical stiffness per area [Pa/m], shape (points,); nan where none exists
+    limits: tuple[float, ...]  # Values at which damping alone decides [Pa]; nan outside the plane
+    own: float  # Value of the fault [Pa]
 
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityRegions:
     """Stable and unstable regions of a fault; its own verdict is exact."""
 
-    verdict: StabilityVerdict  # Of the fault itself
+    verdict: StabilityVerdict  # Verdict on the fault itself
     stiffness: np.ndarray  # Stiffnesses per area of both planes [Pa/m]
-    own: float  # That of the fault [Pa/m]
+    own: float  # Stiffness per area of the fault [Pa/m]
     # Critical stiffness per area at the fault's effective stress [Pa/m]; not positive or nan where there is none
     critical: float
     nucleation_length: float | None  # [m]; None without a critical stiffness
@@ -198,9 +198,9 @@ def stability_regions(fault: Fault, *, pressure: float, loading_rate: float | No
 
 
 def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[list[Function], Function, list[float]]:
-    """What bounds the regions, from the symbolic conditions.
+    """Boundaries of the regions, from the symbolic conditions.
 
-    The conditions as functions of effective stress [Pa] and stiffness per area [Pa/m], the critical stiffness as
+    The conditions as functions of effective stress [Pa] and stiffness per area [Pa/m], the critical stiffness as a
     function of effective stress, and the effective stresses at which a condition without stiffness is zero.
     """
     law = fault.friction
@@ -226,7 +226,7 @@ def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[list[Function]
 
 
 # ----------------------------------------------------------------------
-# Whether a fault is sampled fast enough for how fast it runs away.
+# Whether the sampling of a fault is fast enough for its instability.
 
 LARGEST_PRODUCT = 0.2
 """Of T_s and the unstable pole: five samples while an error grows e-fold, so that what one sample has not seen grows by
@@ -235,28 +235,28 @@ at most 22 % until the next one."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SamplingAdequacy:
-    """Sampling time of a fault beside its instability."""
+    """Sampling time of a fault compared with its fastest unstable pole."""
 
     step: float  # T_s [s]
-    pole: float  # Modulus of the fastest pole that grows [1/s]; 0 where none does
+    pole: float  # Modulus of the fastest unstable pole [1/s]; 0 if there is none
     # Whether `pole` is the fastest over the uncertainty box, at any pressure that equilibrium along the reference may
-    # need there; if not, that of the nominal fault at its operating point: at rest, or with one state in slow sliding
-    # along its task, whose mean rate sets it
+    # need there; if not, it is that of the nominal fault at its operating point: at rest, or for friction with one
+    # state in slow sliding at the mean rate of the task
     over_box: bool
 
     @property
     def pole_times_step(self) -> float:
-        """T_s times the pole [-]: logarithm of the growth of an error between two samples."""
+        """T_s times the pole [-]: logarithm of the growth factor of an error between two samples."""
         return self.pole * self.step
 
     @property
     def adequate(self) -> bool:
-        """Whether that is at most 1/5."""
+        """Whether `pole_times_step` is at most 1/5."""
         return self.pole_times_step <= LARGEST_PRODUCT
 
     @property
     def adequate_step(self) -> float | None:
-        """Largest adequate T_s [s]; None where any is."""
+        """Largest adequate T_s [s]; None if every T_s is adequate."""
         return LARGEST_PRODUCT / self.pole if self.pole else None
 
     def to_dict(self) -> dict[str, Any]:
@@ -276,8 +276,8 @@ class SamplingAdequacy:
 def sampling_adequacy(fault: Fault) -> SamplingAdequacy:
     """Compare a fault's sampling time with its fastest unstable pole.
 
-    The rule is one of thumb, necessary in spirit: a sampled law answers what happens between two samples only after it
-    has grown by e^{pT_s}. It is no proof; what a given law bears is certified by its largest step.
+    This is a rule of thumb, roughly a necessary condition: a sampled law responds to an event between two samples only
+    after its effect has grown by e^{pT_s}. It is no proof; the largest step of a given law is certified separately.
     """
     try:
         poles, over_box = _box_poles(fault), True
@@ -289,12 +289,12 @@ def sampling_adequacy(fault: Fault) -> SamplingAdequacy:
 
 
 def _box_poles(fault: Fault) -> list[complex]:
-    """Poles [1/s] of λ² + wλ − s at the corners: real ones grow with s and fall with w, of others |λ|² = −s.
+    """Poles [1/s] of λ² + wλ − s at the corners: real ones increase with s and decrease with w; for others |λ|² = −s.
 
     Raises
     ------
     ParameterError
-        When no finite range of s is found, or friction has a state.
+        When s has no finite range, or friction has a state.
     """
     fault.require_memoryless("the range of unstable poles")
     task = uncertain_plant(fault)
@@ -307,17 +307,17 @@ def _box_poles(fault: Fault) -> list[complex]:
 
 
 # ----------------------------------------------------------------------
-# What a fault is, in numbers and in sentences.
+# Facts about a fault, in numbers and in sentences.
 
-SHEAR_SPEEDS = 500.0, 6000.0  # of soft sediments and of the mantle, m/s
-IN_A_LABORATORY = 10.0  # m; below it what slides need not be rock
+SHEAR_SPEEDS = 500.0, 6000.0  # shear-wave speeds of soft sediments and of the mantle, m/s
+IN_A_LABORATORY = 10.0  # m; a shorter fault need not be rock
 
 
 def fault_dict(fault: Fault) -> dict[str, Any]:
     """Keys of ``fault --json``; SI, eigenvalues as [real, imaginary] in 1/s.
 
-    ``equilibrium_pressure`` is the range [Pa] that the task needs, and ``needs`` says whether that is withdrawal,
-    injection or both. ``assumed`` says what the file left open, ``scenario`` is all of it as a TOML file.
+    ``equilibrium_pressure`` is the range [Pa] that the task needs, and ``needs`` says whether this is withdrawal,
+    injection or both. ``assumed`` lists values that the file omits, ``scenario`` is the whole fault as a TOML file.
     """
     model, needed = derive(fault), needed_pressure(fault)
     return {
@@ -347,7 +347,7 @@ def fault_dict(fault: Fault) -> dict[str, Any]:
 
 
 def fault_sentences(fault: Fault) -> list[str]:
-    """The same for people."""
+    """The same facts as sentences."""
     model = derive(fault)
     poles = ", ".join(f"{z.real:.4g}{z.imag:+.4g}i" if z.imag else f"{z.real:.4g}" for z in model.eigenvalues)
     mean, about = mean_rate(fault.reference), fault.friction.equilibrium.poles
@@ -367,14 +367,14 @@ def fault_sentences(fault: Fault) -> list[str]:
 
 
 def beyond_rest(fault: Fault) -> str:
-    """What a target means that is more than one percent beyond the next rest slip; empty for others."""
+    """Remark on a target more than one percent beyond the next rest slip; empty for other targets."""
     if not 0 < 1.01 * fault.rest_slip < fault.reference.target_slip:
         return ""
     return f", {fault.reference.target_slip / fault.rest_slip:.3g} times the rest slip: pressure has to hold it there"
 
 
 def sampling_sentence(adequacy: SamplingAdequacy) -> str:
-    """Whether T_s is short enough for the instability, and which one would be."""
+    """Whether T_s is short enough for the instability, and the largest adequate T_s."""
     if adequacy.adequate_step is None:
         return f"T_s = {adequacy.step:.4g} s: nothing grows between two samples"
     pole = f"at most {UpperBound(adequacy.pole):.4g}" if adequacy.over_box else f"{adequacy.pole:.4g}"
@@ -389,7 +389,7 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
 
 
 def _sliding_sentence(fault: Fault) -> list[str]:
-    """That friction is extrapolated, and which T_s suits a guarantee of slow sliding, where it is a factor two off."""
+    """Extrapolation of friction, and the T_s of a guarantee of slow sliding if it differs by a factor of two."""
     beyond = list(filter(None, [beyond_rates(fault.friction, mean_rate(fault.reference))]))
     suits = sliding_step(fault.friction, fault.reference)
     if suits / 2 <= fault.sampling_time <= 2 * suits:
@@ -401,11 +401,11 @@ _of_sliding = by_equilibrium(rest=lambda fault: [], sliding=_sliding_sentence)
 
 
 def beyond_control(fault: Fault) -> list[str]:
-    """That no controller can hold a fault at its T_s, where that is proved."""
+    """Statement that no controller can hold a fault at its T_s, if this is proved."""
     try:
         task = uncertain_plant(fault)
         longest = longest_reaction(task, task.normal_stress)
-    except (ParameterError, UnsupportedError):  # friction with a state, or that nothing can be proved with
+    except (ParameterError, UnsupportedError):  # friction with a state, or friction without a proof
         return []
     if longest is None or rational(fault.sampling_time) <= longest:
         return []
@@ -417,12 +417,12 @@ def beyond_control(fault: Fault) -> list[str]:
 
 
 def _finite(value: float) -> float | None:
-    """A number, if there is one."""
+    """A number if it is finite, else None."""
     return value if isfinite(value) else None
 
 
 def _rock(fault: Fault) -> list[str]:
-    """Speed of shear waves, by which a wrong unit shows, the stress, friction as it was read, and its box."""
+    """Shear-wave speed, which reveals a wrong unit, the stress, friction as it was read, and its box."""
     speed, law = (fault.shear_modulus / fault.density) ** 0.5, fault.friction
     usual = fault.length < IN_A_LABORATORY or SHEAR_SPEEDS[0] <= speed <= SHEAR_SPEEDS[1]
     unlikely = "" if usual else " (UNLIKELY for rock: check density and shear modulus)"
@@ -435,7 +435,7 @@ def _rock(fault: Fault) -> list[str]:
 
 
 def box_sentence(fault: Fault) -> str:
-    """Friction without a state and parameters for which a guarantee holds; numbers rounded inward."""
+    """Friction laws without a state and parameters that a guarantee covers; numbers are rounded inward."""
     law = fault.friction
     low, high = UpperBound(rational(law.bounds[0])), LowerBound(rational(law.bounds[1]))
     slopes = [f"{LowerBound(rational(law.slip_slope)):.4g} per m of slip"] * (law.slip_slope > 0)
@@ -452,7 +452,7 @@ box_sentences = by_equilibrium(rest=lambda fault: [box_sentence(fault)], sliding
 
 
 def _event(fault: Fault) -> list[str]:
-    """What an earthquake of the fault is, as far as it is known without simulating one, and the task."""
+    """Earthquake of the fault, as far as it is known without a simulation, and the task."""
     task = f"target slip {fault.reference.target_slip:.4g} m in {lasting(fault.reference.operation_time, 6)}"
     return _earthquake(fault, task)
 

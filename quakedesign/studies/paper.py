@@ -23,7 +23,7 @@ from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.studies.comparison import Compared, Entry
 
 # ----------------------------------------------------------------------
-# The numbers behind the bars: every metric of every run, and the five of the paper over those of the e-LQR.
+# Numbers of the bar charts: every metric of every run, and the five of the paper relative to the e-LQR.
 
 BARS = {
     "mise_slip": "MISE of the slip",
@@ -39,7 +39,7 @@ _MADE = ("scheme", "step", "method", "plant")
 
 
 def baseline(comparison: Compared) -> Entry | None:
-    """Entry that numbers are divided by: the published e-LQR, the designed one where there is no other."""
+    """Reference entry of the ratios: the published e-LQR, else the designed one."""
     able = [
         e
         for origin in ("published", "designed")
@@ -50,7 +50,7 @@ def baseline(comparison: Compared) -> Entry | None:
 
 
 def relative(run: Trajectory | None, basis: Trajectory | None) -> dict[str, float | None]:
-    """Metrics of the bars over those of another run [-]; None where one of the two has none or the other is zero."""
+    """Metrics of the bars over those of another run [-]; None if a value is missing or the divisor is zero."""
     ratios: dict[str, float | None] = {}
     for name in BARS:
         own, other = (getattr(r.metrics, name) if r else None for r in (run, basis))
@@ -59,7 +59,7 @@ def relative(run: Trajectory | None, basis: Trajectory | None) -> dict[str, floa
 
 
 def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> list[dict[str, Any]]:
-    """One row a run: what it is, its metrics in SI units, the five ratios, and how it was made.
+    """One row a run: its identification, metrics in SI units, the five ratios, and settings.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _outcome(run: Trajectory) -> dict[str, Any]:
 
 
 def printed(comparison: Compared) -> list[dict[str, Any]]:
-    """Numbers that the paper prints about these runs beside ours, their ratio, our plant, and why they differ."""
+    """Printed numbers of the paper and ours for these runs, their ratio, our plant, and the reason of differences."""
     data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
     runs: dict[str, Trajectory | None] = {"uncontrolled": comparison.uncontrolled}
     runs |= {f"{e.origin} {e.design.name}": e.run for e in comparison.entries}
@@ -102,11 +102,11 @@ def printed(comparison: Compared) -> list[dict[str, Any]]:
 
 
 # ----------------------------------------------------------------------
-# Peak against tracking: what a design for the loop that runs gains in one by giving up the other.
+# Trade-off between certified peak and tracking error of designs for the sampled loop.
 
 ROOMS = (1.2, 1.4, 1.6, 2.2)
 """What tracking may spend of the smallest certified slip-rate error; 1.6 is that of the default."""
-_PERIODS = 32  # natural periods of a run; errors count in its second half
+_PERIODS = 32  # duration of a run in natural periods; errors are evaluated in its second half
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,10 +116,10 @@ class FrontPoint:
     Attributes
     ----------
     objective : str
-        ``peak``, or ``tracking`` with its room.
+        ``peak``, or ``tracking`` with the admitted increase of the peak.
     guarantee : TrackingProof
     run : Trajectory
-        Under the fault's own disturbance, from rest.
+        Run under the fault's own disturbance, from rest.
     """
 
     objective: str
@@ -128,7 +128,7 @@ class FrontPoint:
 
 
 def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
-    """Designs from the smallest certified peak to the best tracking, with a guarantee each.
+    """Designs from the smallest certified peak to the best tracking, each with a guarantee.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
 
 
 # ----------------------------------------------------------------------
-# What the figures of the paper need beside a comparison: the induced earthquake, and a closer look at every law.
+# Further runs for the figures of the paper: the induced earthquake, and a close-up of every law.
 
 INDUCING_SHARE = 0.1
 """Constant pressure over σ'_n of the induced earthquake: 5 MPa on the paper's fault at 50 MPa."""
@@ -168,9 +168,9 @@ class PaperRuns:
     # Without control, under a constant pressure of a tenth of the effective normal stress; None for friction with a
     # state, which has none of the short runs
     induced: Trajectory | None = None
-    # By label of the entry: its first `PERIODS` natural periods with every step kept
+    # By label of the entry: its first `PERIODS` natural periods with every step stored
     close_ups: Mapping[str, Trajectory] = field(default_factory=dict)
-    front: tuple[FrontPoint, ...] = ()  # Peak against tracking, where a law of samples was designed
+    front: tuple[FrontPoint, ...] = ()  # Trade-off between peak and tracking, if a sampled law was designed
 
 
 def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] | None = None) -> PaperRuns:
@@ -179,7 +179,7 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     Parameters
     ----------
     progress : callable, optional
-        Called with what is being done and the fraction done [-].
+        Called with the current activity and the fraction done [-].
     """
     return _runs(comparison.fault, comparison, progress or (lambda _what, _done: None))
 
@@ -214,7 +214,7 @@ _runs = by_equilibrium(rest=_short_runs, sliding=lambda fault, comparison, tell:
 
 
 def friction_curve(fault: Fault, largest: float, points: int = 400) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Slips [m] up to the largest, the friction coefficient at rest there, and how the spring unloads from the first.
+    """Slips [m] up to the largest, the friction coefficient at rest there, and the unloading line of the spring.
 
     Both curves [-] have shape (points,); the fault is unstable where friction falls faster than the spring unloads.
     """

@@ -1,4 +1,4 @@
-"""Performance limits of every controller, reported with the proved bounds of designed ones."""
+"""Performance limits of every controller, and proved bounds of designed ones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -40,10 +40,10 @@ from quakedesign.plant import FaultPlant, uncertain_plant
 from quakedesign.simulation.earthquake import natural_peak
 
 # ----------------------------------------------------------------------
-# Limits of every controller as values, each beside what a designed one is proved to do.
+# Limits of every controller as values, each reported with the proved bound of a designed one.
 
 _Size = float | None  # [Pa]
-_POINTS = 24  # of the curve of smallest peaks
+_POINTS = 24  # intervals on the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
 TOLD = "all controllers, linear or not, that know the fault and measure, up to the sample, {} and nothing else"
@@ -61,18 +61,18 @@ QUANTITIES = {
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Limit:
-    """One quantity, its limit for all controllers, and how far designed ones have a guarantee.
+    """One quantity, its limit for all controllers, and the best proved value of designed ones.
 
     Attributes
     ----------
     title : str
     unit : str
     impossible_beyond : LowerBound or UpperBound or None
-        A LowerBound: nothing smaller is possible; an UpperBound: nothing larger; None: no limit is known.
+        A LowerBound: no smaller value is feasible; an UpperBound: no larger one; None: no limit is known.
     proved_up_to : LowerBound or UpperBound or None
-        Of the designs that were tried, the best with a guarantee; None where none was found.
+        Best guarantee among the designs that were tried; None without one.
     holds_for : str
-        Controllers for which it is impossible.
+        Controllers to which the limit applies.
     """
 
     title: str
@@ -94,7 +94,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sensing:
-    """What controllers measure of slip and slip rate, at all times up to a sample.
+    """Measurements of slip and slip rate that controllers have, at all times up to a sample.
 
     Raises
     ------
@@ -102,7 +102,7 @@ class Sensing:
         For noise of a slip rate that is not measured, or a differentiator.
     """
 
-    # What controllers measure, with its noise; all of it is that of the designs that are proved
+    # Measured quantities and their noise; the proved designs use the whole setup
     setup: LoopSetup = IDEAL
 
     def __post_init__(self) -> None:
@@ -140,7 +140,7 @@ class Sensing:
 
     @property
     def bounds(self) -> Noise:
-        """Of `smallest_peak`."""
+        """Noise arguments of `smallest_peak`."""
         return {"slip_noise": self.slip_noise, "rate_noise": None if self._alone else self.rate_noise}
 
     @property
@@ -170,15 +170,15 @@ class Limits:
     withdrawal : Fraction
         Largest withdrawal [Pa], P of −P ≤ p.
     diffusivity : Fraction
-        [m²/s].
+        Diffusivity between well and fault [m²/s].
     slip_error : UpperBound or None
-        Within which the smallest slip-rate error is meant [m]; None for any bounded slip error.
+        Bound of the slip error for the smallest slip-rate error [m]; None for any bounded slip error.
     peak_slip_rate_error, largest_step, largest_delay, largest_diffusion_time, farthest_well, smallest_pressure : Limit
-        Each of the latter three and the delay at the fault's T_s.
+        The latter three and the delay are for the fault's T_s.
     proved : tuple of TrackingProof
-        Of the designs without delay that were found on the way, by T_s.
+        Guarantees of the designs without delay, ordered by T_s.
     sensing : Sensing
-        What controllers are told, for the slip-rate error and designs; all others may know everything.
+        Measurements of controllers, for the slip-rate error and designs; all other limits assume complete knowledge.
     """
 
     fault: Fault
@@ -199,12 +199,12 @@ class Limits:
 
     @property
     def against(self) -> str:
-        """The disturbances that are meant."""
+        """Disturbances of the limits, in words."""
         return f"any disturbance of at most {float(self.fault.disturbance_bounds[0]):.6g} m/s^2"
 
     @property
     def achieved(self) -> list[tuple[Fraction, UpperBound]]:
-        """T_s [s] and proved slip-rate error [m/s] of the designs that were found on the way, by T_s."""
+        """T_s [s] and proved slip-rate error [m/s] of the designs, ordered by T_s."""
         return sorted((g.held.step, g.claims.slip_rate_error) for g in self.proved)
 
     def named(self) -> dict[str, Limit]:
@@ -213,16 +213,16 @@ class Limits:
 
     @property
     def stick_slip_rate(self) -> LowerBound | None:
-        """Slip rate [m/s] that a fault that sticks reaches at its T_s under every controller that moves it."""
+        """Slip rate [m/s] that the stick–slip plant reaches at its T_s under every controller that moves it."""
         return smallest_stick_slip_rate(uncertain_plant(self.fault), rational(self.fault.sampling_time))
 
     @property
     def natural_peak(self) -> float | None:
-        """Slip rate [m/s] of the natural earthquake, which is simulated; None where there is none."""
+        """Slip rate [m/s] of the simulated natural earthquake; None without one."""
         return natural_peak(self.fault)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        """Plain values, SI; proved bounds are decimal texts, rounded outwards."""
         return {
             "fault": self.fault.name,
             "box": self.fault.box.name,
@@ -240,9 +240,9 @@ class Limits:
         }
 
     def smallest_peaks(self, *, measured: bool = True) -> list[tuple[Fraction, LowerBound]]:
-        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below.
+        """T_s [s] from a tenth of the fault's upward, and lower bounds of the slip-rate error [m/s] of any controller.
 
-        Of controllers that are `measured` no more than these, or that know everything.
+        If `measured`, for controllers with these measurements only, else for controllers that know everything.
         """
         task, noise = uncertain_plant(self.fault), (self.sensing if measured else Sensing()).bounds
         peaks = [(step, smallest_peak(task, step, **noise)) for step in self._steps()]
@@ -257,11 +257,11 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingLimits(Limits):
-    """Limits of a fault in slow sliding along its task, of its nominal plant linearised there."""
+    """Limits of a fault in slow sliding along its task, for its nominal plant linearised there."""
 
     push: SlidingPush
     guarantee: SlidingProof | None
-    rock: Fraction  # L²/D [s] of the well that was asked about; 0 without one
+    rock: Fraction  # L²/D [s] of the given well; 0 without one
 
     @property
     def beyond(self) -> bool:
@@ -271,7 +271,7 @@ class SlidingLimits(Limits):
 
     @property
     def against(self) -> str:
-        """The disturbances that are meant."""
+        """Disturbances of the limits, in words."""
         return f"any shear stress of at most {UpperBound(self.push.amplitude).quantity('Pa')}"
 
     @property
@@ -290,21 +290,21 @@ class SlidingLimits(Limits):
         return None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; what is proved as decimal texts, rounded outwards."""
+        """Plain values, SI; proved bounds are decimal texts, rounded outwards."""
         return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
 
     def smallest_peaks(self, *, measured: bool = True) -> list[tuple[Fraction, LowerBound]]:
-        """T_s [s] from a tenth of the fault's on, and the slip-rate error [m/s] that no controller goes below."""
+        """T_s [s] from a tenth of the fault's upward, and lower bounds of the slip-rate error [m/s]."""
         return [(step, self.push.smallest_rate_error(step)) for step in self._steps()]
 
 
 def above_the_reference(proof: SlidingProof) -> UpperBound:
-    """Proved bound of the slip rate, less V [m/s]."""
+    """Proved bound of the slip rate minus V [m/s]."""
     return UpperBound(proof.peak_slip_rate - proof.task.rate)
 
 
 # ----------------------------------------------------------------------
-# What no controller can do with a fault, beside what a designed one is proved to do.
+# Performance limits of a fault, with proved bounds of a designed controller.
 
 
 def limits(
@@ -320,29 +320,29 @@ def limits(
 ) -> Limits:
     """Performance limits of every controller for a disturbance of the class ``amplitude``.
 
-    With friction that has a state: in slow sliding along its task, of the nominal plant linearised there.
+    For friction with a state: in slow sliding along its task, for the nominal plant linearised there.
 
-    There are none of the class ``rate``: every proof pushes the fault with a disturbance that jumps.
+    There are none for the class ``rate``: every proof uses a disturbance that jumps.
 
     Parameters
     ----------
     fault : Fault
     setup : LoopSetup
-        T_s in place of the fault's; what controllers measure, with its noise, and the loop with which designs are
-        proved. In slow sliding T_s, a lag or a diffusion path alone; the path of a well near the fault without both.
+        T_s in place of the fault's; measurements of the controllers with their noise, and the loop of the proved
+        designs. In slow sliding only T_s, a lag or a diffusion path; by default the path of a well near the fault.
     pressure : float, optional
-        Largest withdrawal [Pa]; the effective normal stress unless given. In slow sliding: largest pressure beside what
-        the reference needs, in both directions.
+        Largest withdrawal [Pa]; by default the effective normal stress. In slow sliding: largest pressure relative to
+        that of the reference, in both directions.
     diffusivity : float
-        Of the rock between well and fault [m²/s].
+        Diffusivity of the rock between well and fault [m²/s].
     stress : float, optional
-        Of friction with a state: bound of the shear stress disturbance [Pa]; the largest that a design stands unless
-        given.
+        For friction with a state: bound of the shear stress disturbance [Pa]; by default the largest that a design
+        withstands.
     spread : float, str or Fraction
-        Of friction with a state: by how much of their values a, b and D_c may be off [-] for a design that is proved;
-        what is impossible is so for the nominal ones.
+        For friction with a state: relative uncertainty of a, b and D_c [-] in the proof of a design; the limits are
+        those of the nominal values.
     prove : bool
-        Whether to look for designs with a guarantee, which takes a minute.
+        Whether to search for designs with a guarantee, which takes a minute.
     **entered : float, str or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
@@ -353,9 +353,9 @@ def limits(
     Raises
     ------
     ParameterError
-        For a negative pressure, a diffusivity that is not positive, a stress without friction that has a state, no
-        stress where no design stands any, noise or more of a setup with it, negative noise, or noise of a slip rate
-        that is not measured.
+        For a negative pressure, a diffusivity that is not positive, a stress for friction without a state, a missing
+        stress if no design withstands any, a setup of slow sliding with noise or more than lag and diffusion, negative
+        noise, or noise of an unmeasured slip rate.
     """
     off = rational(spread, "spread")
     fault, setup = setup.with_given(**entered).at_step(fault)
@@ -403,7 +403,7 @@ def _limits_at_rest(
 def _impossible(
     push: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
 ) -> dict[str, Bound | None]:
-    """What no controller can do, by name; nothing where no limit is known."""
+    """Performance limits of every controller by name; None where no limit is known."""
     reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
     return {
         "peak_slip_rate_error": peak,
@@ -418,7 +418,7 @@ def _impossible(
 def _limits(
     impossible: Mapping[str, Bound | None], proved: Mapping[str, Bound | None], knowing: str, plant: str = ""
 ) -> dict[str, Limit]:
-    """Limits by name, of a plant that is not the fault itself if one is named."""
+    """Limits by name; `plant` names a plant other than the fault itself."""
     return {
         name: Limit(
             title=title,
@@ -457,10 +457,10 @@ def _pressure_and_diffusivity(fault: Fault, pressure: float | None, diffusivity:
 def _sliding_limits(
     fault: Fault, pressure: _Size, diffusivity: float, stress: _Size, plain: Sensing, off: Fraction, prove: bool
 ) -> Limits:
-    """Beside what is proved of a design behind a path, or behind that of a near well; of none without a path.
+    """Limits and proved bounds of a design with the given path, or by default with that of a near well.
 
-    Unless a stress is told, it is that which the design stands, or that with a near well where none is found behind the
-    path; behind a path that is impossible under the latter no design is looked for.
+    By default the stress is the largest that the design withstands, or the design with a near well if none is found for
+    the path. If the path is infeasible under the latter stress, no design is searched for it.
     """
     _require_plain(fault, plain)
     setup = plain.setup if prove else None
@@ -512,7 +512,7 @@ _of_plant = by_equilibrium(rest=_limits_at_rest, sliding=_sliding_limits)
 def _proved_steps(
     task: FaultPlant, step: Fraction, sensing: Sensing
 ) -> tuple[tuple[TrackingProof, ...], TrackingProof | None]:
-    """Guarantees at growing T_s up to nearly the longest, and that at the fault's own, if there is one."""
+    """Guarantees at increasing T_s up to nearly the longest, and that at the fault's own T_s, if there is one."""
     own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **sensing.wanted)
     longest = longest_step(task, **sensing.wanted)
     if own is not None and own.proved:
@@ -526,7 +526,7 @@ def _proved_steps(
 
 
 def _best_at(least_peak: TrackingProof, sensing: Sensing) -> TrackingProof:
-    """Of a design for the smallest slip-rate error and one that tracks, that with the smaller one that is proved."""
+    """The better of the designs for peak and for tracking: the one with the smaller proved slip-rate error."""
     tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **sensing.wanted)
     proofs = [least_peak, *([tracking] if tracking.proved else [])]
     return min(proofs, key=lambda g: g.claims.slip_rate_error)

@@ -17,8 +17,8 @@ from quakedesign.synthesis import Design
 
 PUBLISHED_SCHEMES = ("continuous", "explicit", "compensated")
 DECADES = 3
-PERIODS = 650  # of the longest T_s that the runs for the orders take
-SHARE = 1 / 16  # of the task that a run for the sensitivity to noise takes
+PERIODS = 650  # duration of the runs for the orders, in the longest T_s
+SHARE = 1 / 16  # duration of a run for the sensitivity to noise, as a share of the task
 UNCERTAIN = "ten-percent"
 Tell = Callable[[str, float], None]
 
@@ -27,13 +27,13 @@ Tell = Callable[[str, float], None]
 class SchemeRow:
     """One law under one scheme."""
 
-    label: str  # Law, and whether it is the published one, or its λ
-    origin: str  # Of the gains: ``"designed"``, ``"given"``, ``"published"``
+    label: str  # Law, with its λ or the note that it is published
+    origin: str  # Origin of the gains: ``"designed"``, ``"given"``, ``"published"``
     controller: Controller
     scheme: str
     run: Trajectory
-    # |h'| on the trajectory, for a sliding mode that did not diverge; nothing is certified of gains that come without a
-    # certificate
+    # |h'| on the trajectory, for a sliding mode that did not diverge; gains without a certificate have no certified
+    # bound
     premise: Premise | None
 
     def to_dict(self) -> dict[str, Any]:
@@ -60,13 +60,13 @@ class SamplingReport:
     """Report of the effect of sampling on a law."""
 
     fault: Fault
-    # The law under every scheme, then the published ones: as in the paper, held, and with the compensated scheme
+    # The law under every scheme, then the published ones: as in the paper, with zero-order hold, and compensated
     rows: tuple[SchemeRow, ...]
     # ``orders`` (of a sliding mode without feed-forward), ``slip_noise``, ``rate_noise``, ``input_gain``
     studies: dict[str, Study]
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able facts, SI; exact quantities are texts, null stands for what diverged or does not apply."""
+        """JSON-able facts, SI; exact quantities are texts, null means diverged or not applicable."""
         entries = {name: study.to_dict() for name, study in self.studies.items()}
         if "orders" in entries:
             entries["orders"]["exponents"] = self.studies["orders"].orders()
@@ -87,25 +87,25 @@ def sampling_report(
     duration: float | None = None,
     progress: Tell | None = None,
 ) -> SamplingReport:
-    """Run a law under every scheme, the published laws as they are, and measure orders and sensitivities.
+    """Run a law under every scheme and the published laws, and measure orders and sensitivities.
 
     Parameters
     ----------
     law : Controller or Design
-        Of a design the certified bound on |h'| is known.
+        A design also supplies the certified bound on |h'|.
     scales : sequence of str
-        Further λ, exact, with which the base gains of a sliding mode are run; its certificate holds for every λ.
+        Further exact λ for runs of the base gains of a sliding mode; its certificate holds for every λ.
     schemes : sequence of str
-        Those that sample.
+        Sampled schemes.
     duration : float, optional
-        Of the runs [s]; the operation time unless given. Sensitivities to noise take a sixteenth of it, orders 650 T_s.
+        Duration of runs [s]; the operation time by default. Noise sensitivities take a sixteenth of it, orders 650 T_s.
     progress : callable, optional
-        Called with what is being done and the fraction done [-].
+        Called with the current activity and the fraction done [-].
 
     Raises
     ------
     ParameterError
-        For a scale of a law that has none.
+        For a scale if the law has none.
     """
     tell = progress or (lambda _what, _done: None)
     design = law if isinstance(law, Design) else None
@@ -168,7 +168,7 @@ def _studies(
 
 
 def orders(fault: Fault, law: Controller, schemes: Sequence[str] = SCHEMES) -> Study:
-    """Errors over three decades of T_s below that of the fault, in runs of 650 of its T_s, from half of them on."""
+    """Errors over three decades of T_s up to that of the fault, in the second half of runs of 650 of its T_s."""
     longest = fault.sampling_time
     steps = [longest * 10 ** (-k / 2) for k in range(2 * DECADES + 1)]
     return accuracy(

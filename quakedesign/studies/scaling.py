@@ -1,4 +1,4 @@
-"""Gains scaled from one fault to another, as by the command ``scale``."""
+"""Gains scaled from one fault to another, for the command ``scale``."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -45,10 +45,10 @@ def scale_answer(
     *,
     clock: str | None = None,
 ) -> dict[str, Any]:
-    """Gains of a controller of one fault carried to another, with scale factors and what keeps the faults apart.
+    """Gains of a controller scaled from one fault to another, with scale factors and differences of the faults.
 
-    Published gains keep their divisor μ0N̂0, as in the paper; given ones are meant with the source's own μ_res·N̂_min
-    and come out for the target's own.
+    Published gains have the divisor μ0N̂0, as in the paper; given gains have the divisor μ_res·N̂_min of the source,
+    and the results that of the target.
 
     Parameters
     ----------
@@ -58,17 +58,17 @@ def scale_answer(
     gains : str or sequence of str
         ``"published"``, or the gains in order (λ = 1).
     clock : str, optional
-        What fixes the scale of time, as in `similarity`.
+        Source of the time scale, as in `similarity`.
 
     Returns
     -------
     dict
-        JSON. Rational numbers are exact texts, irrational ones decimals with 12 significant digits.
+        JSON-able. Rational numbers are exact texts, irrational ones decimals with 12 significant digits.
 
     Raises
     ------
     UnknownNameError, ParameterError
-        For an unknown controller or fault, published gains that do not exist, or wrong gains.
+        For an unknown controller or fault, missing published gains, or invalid gains.
     """
     start, end = (f if isinstance(f, Fault) else load_fault(f) for f in (source, target))
     names = (gains,) if isinstance(gains, str) else tuple(gains)
@@ -124,7 +124,7 @@ def _group(comparison: GroupComparison) -> dict[str, Any]:
 
 
 def _published(target: Fault, carried: CarriedGains) -> dict[str, Any] | None:
-    """Printed gains of the target, where they exist for the same λ and divisor."""
+    """Printed gains of the target, if they exist for the same λ and divisor."""
     printed = published_controllers(target.name).get(carried.law.name)
     if printed is None or any(
         getattr(printed, option, None) != getattr(carried.law, option, None) for option in ("scale", "divisor")
@@ -141,7 +141,7 @@ def _published(target: Fault, carried: CarriedGains) -> dict[str, Any] | None:
 
 
 def _unrounded(source: Fault, target: Fault, law: Controller, scales: Scales) -> dict[str, Any] | None:
-    """The same from the gains that the paper rounded for print (ERRATA 25), where they are known."""
+    """Scaled gains from the unrounded gains of the paper (ERRATA 25), if these are known."""
     values = UNROUNDED.get((source.name, law.name))
     if values is None:
         return None

@@ -39,13 +39,13 @@ from quakedesign.synthesis.guarantee import BLOCK_LAWS
 from quakedesign.text import PREFIXES, counted, lasting, plain, power_of, quantity
 
 _NONE = UpperBound(0)
-_FORESHOCK = 0.1  # of the largest slip: events of less are no cycles of their own
-_FINENESS = 1e-3  # substep times natural frequency of a run without control
+_FORESHOCK = 0.1  # share of the largest slip below which an event is no separate cycle
+_FINENESS = 1e-3  # product of substep and natural frequency in a run without control
 _NO_RUN = "nothing is simulated, as no law is proved"
 
 
 def chain_lines(chain: BlockChain) -> list[str]:
-    """What a file of several blocks says, within 80 columns."""
+    """Facts about a file of several blocks as lines of at most 80 characters."""
     lines = [
         f"{chain.name}: {len(chain.blocks)} blocks, {counted(len(chain.wells), 'well')} (box {chain.fault.box.name}, "
         f"task {chain.fault.reference.target_slip:g} m in {chain.fault.reference.operation_time:g} s)",
@@ -70,7 +70,7 @@ def chain_lines(chain: BlockChain) -> list[str]:
 
 
 def chain_dict(chain: BlockChain) -> dict[str, Any]:
-    """The same as plain values, SI."""
+    """The same facts as plain values, SI."""
     blocks = [
         {"length": b.length, "effective_normal_stress": b.effective_normal_stress, "friction": b.friction.name}
         for b in chain.blocks
@@ -87,17 +87,17 @@ def chain_dict(chain: BlockChain) -> dict[str, Any]:
 
 
 def farthest_balance(chain: BlockChain, proof: PlantProof) -> UpperBound | None:
-    """How far from the reference a block may be at balance [m], under fewer wells than blocks; else None."""
+    """Largest distance of a block's equilibrium from the reference [m] with fewer wells than blocks; else None."""
     N, task = len(chain.blocks), uncertain_plant(chain.fault)
     if len(chain.wells) == N:
         return None
-    moves = [size for _, size in proof.part.disturbances[N:]]  # behind the forces on the blocks
+    moves = [size for _, size in proof.part.disturbances[N:]]  # they follow the forces on the blocks
     return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip)
 
 
 @lru_cache(maxsize=8)
 def _growth(chain: BlockChain) -> float | None:
-    """Largest pole without control [1/s], 0 where no mode is unstable; None where floating point cannot tell."""
+    """Largest pole without control [1/s], 0 if no mode is unstable; None if floating point cannot decide."""
     try:
         return max((mode.pole for mode in chain_limits(chain).modes), default=0.0)
     except ParameterError:
@@ -108,7 +108,7 @@ def _growth(chain: BlockChain) -> float | None:
 def natural_peak(chain: BlockChain) -> float | None:
     """Largest slip rate of blocks without control [m/s], released as by `natural_earthquake`.
 
-    None where no mode is unstable, for friction with a state, and for friction that heals, which no run of blocks has.
+    None if no mode is unstable, for friction with a state, and for healing friction, which runs of blocks do not model.
     """
     beyond = chain.ages or any(block.friction.rest_excess for block in chain.blocks)
     pole = None if beyond else _growth(chain)
@@ -127,7 +127,7 @@ def natural_peak(chain: BlockChain) -> float | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChainRun:
-    """What is proved of a designed law, and a run with it; no run where nothing is proved."""
+    """Guarantee of a designed law, and a run with it; no run without a guarantee."""
 
     chain: BlockChain
     controller: str
@@ -140,7 +140,7 @@ class ChainRun:
         return self.run is not None and not self.run.reversed and not self.run.opened
 
     def row(self) -> list[str]:
-        """Largest values of all blocks for a table: law, proved slip rate and slip, those of the run, pressures."""
+        """Table row, largest values of all blocks: law, proved slip rate and slip, those of the run, pressures."""
         if self.run is None:
             return [self.controller, "none", *[""] * 5]
         outputs, N = self.proof.claims.outputs, len(self.chain.blocks)
@@ -149,7 +149,7 @@ class ChainRun:
 
     @property
     def summary(self) -> str:
-        """What is guaranteed, beside the natural earthquake."""
+        """The guarantee, relative to the natural earthquake."""
         N, peak = len(self.chain.blocks), natural_peak(self.chain)
         rate, slip = max(self.proved_slip_rates), max(self.proof.claims.outputs[:N])
         share = ""
@@ -168,13 +168,13 @@ class ChainRun:
 
     @property
     def proved_slip_rates(self) -> list[UpperBound]:
-        """Bounds of the slip rates themselves [m/s], that of the reference included."""
+        """Bounds of the slip rates themselves [m/s], including the reference rate."""
         first = uncertain_plant(self.chain.fault).reference_rates[0]
         return [UpperBound(first + error) for error in self.proof.claims.outputs[len(self.chain.blocks) :]]
 
     @property
     def proved_pressures(self) -> list[tuple[LowerBound, UpperBound]] | None:
-        """Bounds of the pressures themselves [Pa]; None for wells fewer than blocks, and where pressure diffuses."""
+        """Bounds of the pressures themselves [Pa]; None for fewer wells than blocks, and with diffusion."""
         chain = self.chain
         square = chain.diffusivity is None and len(chain.wells) == len(chain.blocks)
         if not square or (inverse := inverse_of(chain.shares)) is None:
@@ -198,12 +198,12 @@ class ChainRun:
         }
 
     def screen(self, conditions: Sequence[str]) -> list[str]:
-        """Lines of at most 80 characters: the answer, a table of blocks and wells, and what the proof depends on."""
+        """Lines of at most 80 characters: the result, a table of blocks and wells, and the conditions of the proof."""
         wrapped = [wrap(line, 80, subsequent_indent="  ", break_on_hyphens=False) for line in conditions]
         return [*wrap(self.summary, 80), "", *self.lines(), "", *(line for lines in wrapped for line in lines)]
 
     def lines(self) -> list[str]:
-        """Lines of at most 80 characters: blocks and wells, what is proved beside what a run shows."""
+        """Lines of at most 80 characters: blocks and wells, with proved and simulated values."""
         chain, run, N = self.chain, self.run, len(self.chain.blocks)
         if not self.proof.proved:
             return [_NO_RUN]
@@ -245,13 +245,13 @@ class ChainRun:
         return parts
 
     def to_dict(self) -> dict[str, Any]:
-        """Figures of the run, SI."""
+        """Values of the run, SI."""
         assert self.run is not None
         return self.run.to_dict()
 
 
 def table_row(law: str, rate: Fraction, slip: Fraction, worst: Sequence[float], pressure: np.ndarray) -> list[str]:
-    """Proved slip rate [m/s] and slip [m], the largest of a run, and the ends of its pressures [Pa], as texts."""
+    """Proved slip rate [m/s] and slip [m], largest values of a run, and range of its pressures [Pa], as texts."""
     proved = [UpperBound(v).quantity(unit) for v, unit in ((rate, "m/s"), (slip, "m"))]
     run = [*zip(worst, ("m/s", "m"), strict=True), (pressure.min(), "Pa"), (pressure.max(), "Pa")]
     return [law, *proved, *(quantity(float(v), unit) for v, unit in run)]
@@ -260,7 +260,7 @@ def table_row(law: str, rate: Fraction, slip: Fraction, worst: Sequence[float], 
 def chain_law(
     chain: BlockChain, controller: str = BLOCK_LAWS[0], certificate: str | Path | None = None, **sliding: Any
 ) -> Any:
-    """Proof about a law for several blocks: designed, or that of a certificate, which is checked anew.
+    """Guarantee of a law for several blocks: of a new design, or of a certificate, which is re-checked.
 
     Parameters
     ----------
@@ -269,12 +269,12 @@ def chain_law(
         ``centralised`` or ``decentralised``.
     certificate : str or Path, optional
     **sliding
-        Lag and stress for a design of blocks in slow sliding.
+        Lag and stress of a design for blocks in slow sliding.
 
     Raises
     ------
     ParameterError, CertificateError
-        For a file that does not hold, or is about another plant.
+        For a certificate that is invalid, or about another plant.
     """
     if certificate is None:
         return guarantee(chain, controller, **sliding).proof
@@ -317,22 +317,22 @@ def run_of_chain(
     controller : str
         ``centralised`` or ``decentralised``.
     duration : float, optional
-        [s]; the operation time unless given.
+        Duration of the run [s]; by default the operation time.
     certificate : str or Path, optional
-        File of a guarantee of this fault, whose law is run instead.
+        File of a guarantee of this fault, whose law is run instead of a new design.
 
     Raises
     ------
     ParameterError, CertificateError
     """
-    whole_periods(chain, rational(chain.fault.sampling_time), duration)  # is refused before the long search
+    whole_periods(chain, rational(chain.fault.sampling_time), duration)  # reject before the long search
     proof = chain_law(chain, controller, certificate)
     run = simulate_blocks(chain, proof.law, duration=duration) if proof.proved else None
     return ChainRun(chain=chain, controller=controller, proof=proof, run=run)
 
 
 # ----------------------------------------------------------------------
-# Blocks with rate-and-state friction: cycles without control, and runs of a law that is proved.
+# Blocks with rate-and-state friction: cycles without control, and runs of a proved law.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -356,7 +356,7 @@ class SlidingChainRun:
         return self.run is not None
 
     def row(self) -> list[str]:
-        """As of `ChainRun`; slip rates themselves, and pressures beside the plan."""
+        """As in `ChainRun`; slip rates themselves, and pressures relative to the plan."""
         if self.run is None or self.proof is None or not self.proof.proved:
             return [self.controller, "none", *[""] * 5]
         rate = SlidingReference(task=self.chain.fault.reference).first_rate * exponential(self.log_rate)
@@ -374,7 +374,7 @@ class SlidingChainRun:
 
     @property
     def errors(self) -> dict[str, "np.ndarray"]:
-        """Largest slip error [m], |ln(v/V)| and |ln(θ/θ*)| of blocks, and pressure beside the plan [Pa] of wells."""
+        """Largest slip error [m], |ln(v/V)| and |ln(θ/θ*)| of blocks, and well pressure relative to the plan [Pa]."""
         assert self.run is not None
         run, V = self.run, float(SlidingReference(task=self.chain.fault.reference).first_rate)
         steady = np.array([float(block.friction.steady_state(V)[0]) for block in self.chain.blocks])
@@ -387,7 +387,7 @@ class SlidingChainRun:
 
     @property
     def within(self) -> bool:
-        """Whether all errors of a run under a law are within what is proved of their blocks and wells."""
+        """Whether all errors of a controlled run are within the proved bounds of their blocks and wells."""
         assert self.proof is not None
         assert self.proof.proved
         N, claims, errors = len(self.chain.blocks), self.proof.claims, self.errors
@@ -396,15 +396,15 @@ class SlidingChainRun:
         return bool((np.concatenate(values) <= np.array(proved, dtype=float)).all())
 
     def screen(self, conditions: Sequence[str]) -> list[str]:
-        """What the proof depends on, and the run."""
+        """Conditions of the proof, and the run."""
         return [*conditions, "", *self.lines()]
 
     def proved_values(self) -> dict[str, Any]:
-        """Nothing beyond the guarantee: its bounds are those of the blocks."""
+        """Empty: the bounds of the blocks are those of the guarantee."""
         return {}
 
     def lines(self) -> list[str]:
-        """For people."""
+        """The run as lines of text."""
         if self.run is None:
             return [_NO_RUN]
         end = lasting(float(self.run.times[-1]))
@@ -478,21 +478,21 @@ def run_sliding_chain(
     inertia: bool = False,
     tell: Callable[[float], None] = lambda _: None,
 ) -> SlidingChainRun:
-    """Run blocks with rate-and-state friction without control, or under a law that is proved.
+    """Run blocks with rate-and-state friction without control, or under a proved law.
 
     Parameters
     ----------
     chain : BlockChain
     controller, certificate
-        As of `chain_law`.
+        As in `chain_law`.
     sliding : mapping, optional
-        Lag and stress of a law that is designed. Without it and a certificate there is no control.
+        Lag and stress of a new design. Without it and a certificate there is no control.
     stress : float, optional
-        Amplitude of a sine of shear on every block, shifted by its share of a turn [Pa]; what is covered unless given.
+        Amplitude of sinusoidal shear stress on every block, with equally spaced phases [Pa]; by default the proved one.
     stress_period : float
-        Its period [s].
+        Period of this stress [s].
     loading_rate, duration, inertia
-        As of `natural_cycles`, or of `simulate_held_blocks` with a law.
+        As in `natural_cycles`, or `simulate_held_blocks` with a law.
 
     Raises
     ------

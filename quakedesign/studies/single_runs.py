@@ -73,14 +73,14 @@ from quakedesign.symbolic import derive
 from quakedesign.synthesis import Design, design, guarantee
 
 # ----------------------------------------------------------------------
-# Runs of a fault whose friction has a state: free, as it is by nature, or held in slow sliding.
+# Runs of a fault whose friction has a state: without control, or in slow sliding under control.
 
 _RTOL = 1e-8
-_NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia, method: of cycles, in this order
-_MOMENT = 1e-3  # of the state's age at first, over which any solver goes on
+_NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia and method of cycles, tried in this order
+_MOMENT = 1e-3  # duration, relative to the initial age of the state, over which every solver succeeds
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
-_SWINGS = 4  # of the stress at least, in a run that is shown
-_SHOWN = 500  # D_c/V of a slow task that are run: the loop settles within some tens
+_SWINGS = 4  # smallest number of stress periods in a shown run
+_SHOWN = 500  # duration of the run of a slow task in D_c/V: the loop settles within some tens
 
 
 def run_state(
@@ -95,27 +95,27 @@ def run_state(
     plant: str = "smooth",
     method: str = "radau",
 ) -> tuple[StateTrajectory, dict[str, Any]]:
-    """Run a fault whose friction has a state under loading from afar and a prescribed pressure; with its JSON.
+    """Run a fault whose friction has a state under far-field loading and a prescribed pressure; with its JSON.
 
     Parameters
     ----------
     start : str
-        ``steady`` (sliding at the loading rate), ``locked`` (held since then for the time `hold`) or ``late`` (when a
-        `share` of the time between two events has passed).
+        ``steady`` (sliding at the loading rate), ``locked`` (then held with the far end at rest for the time `hold`) or
+        ``late`` (when a `share` of the time between two events has passed).
     hold : float, optional
-        [s].
+        Duration of the hold [s].
     share : float, optional
-        [-], of 0 to 1; 0.9 unless given.
+        Share of the recurrence time [-], 0 to 1; 0.9 by default.
     pressure : PressureCourse, optional
         None: no pressure.
     loading_rate : float, optional
-        v_∞ [m/s]; the reference rate of the law unless given.
+        v_∞ [m/s]; by default the reference rate of the law.
     duration : float, optional
-        [s]; the operation time of the task unless given.
+        Duration of the run [s]; by default the operation time of the task.
     plant : str
         ``smooth`` (with inertia) or ``quasi-dynamic`` (without).
     method : str
-        As of `simulate_state`.
+        As in `simulate_state`.
     """
     _require_runnable(fault, plant)
     rate = fault.friction.operating_rate if loading_rate is None else loading_rate
@@ -151,8 +151,8 @@ def run_state(
 def natural_run(fault: Fault) -> StateTrajectory:
     """Natural behaviour at the reference rate of the friction law, with inertia: cycle or creep.
 
-    Where one method cannot go on another one is taken, and without inertia if there is none: the run says which. Where
-    none can it says why, in `failed`.
+    If a method fails, another one is used, at last without inertia; the provenance of the run names it. If all fail,
+    `failed` gives the reason.
     """
     began, rate = perf_counter(), fault.friction.operating_rate
     start = disturbed(fault, rate)
@@ -169,15 +169,15 @@ def natural_run(fault: Fault) -> StateTrajectory:
 
 
 def _natural_cycle(run: StateTrajectory, plant: str, **figures: Any) -> StateTrajectory:
-    """A run with the settings that those with a controller name, and with other figures in its metrics."""
+    """A run with the provenance entries of controlled runs, and with other values in its metrics."""
     settings = {"scheme": "continuous", "step": None, "plant": plant, "controller": "none"}
     return replace(run, provenance={**run.provenance, **settings}, metrics=replace(run.metrics, **figures))
 
 
 def shown_time(fault: Fault, *, whole: bool = False) -> float:
-    """How much of a task [s] is run of a design for slow sliding: 500 D_c/V, in which the loop settles many times over.
+    """Duration [s] of the run of a design for slow sliding: 500 D_c/V, many times the settling time of the loop.
 
-    All of a shorter task, of one whose rate swells on the way, and of a `whole` one.
+    The whole task if it is shorter, if its rate has a ramp, or if `whole`.
     """
     task = fault.reference
     ageing = float(min(fault.friction.steady_state(task.target_slip / task.operation_time)))
@@ -187,9 +187,9 @@ def shown_time(fault: Fault, *, whole: bool = False) -> float:
 def designed_run(
     design: Design, natural_peak: float | None, progress: Callable[[float], None], *, whole: bool = False
 ) -> SlidingRun:
-    """The law of a design for slow sliding over its `shown_time`, under the stress that it is designed for as a sine.
+    """The law of a design for slow sliding over its `shown_time`, under a sine of the stress of the design.
 
-    Its period is that of the tide, or a quarter of a run that is shorter than four of them.
+    The period of the sine is that of the tide, or a quarter of a run that is shorter than four tides.
     """
     result = design.sliding
     if result is None or result.held is None:
@@ -229,22 +229,22 @@ def run_sliding(
     Parameters
     ----------
     fault : Fault
-        Its friction has one state.
+        Fault whose friction has one state.
     step : float, optional
-        [s]; the sampling time of the fault unless given.
+        Sampling time [s]; by default that of the fault.
     lag : float
-        Time constant of pump and pipe [s], which the law does not know.
+        Time constant of pump and pipe [s]; the law is designed without it.
     diffusion : float
-        L²/D of the rock between well and fault [s].
+        L²/D of the diffusion path between well and fault [s].
     stages, transducer : sequence of SampledStage, Transducer
-        As of `simulate_sliding`; the law does not know them.
+        As in `simulate_sliding`; the law is designed without them.
     stress, stress_period : float
-        Of a sine of shear stress [Pa], [s].
+        Amplitude [Pa] and period [s] of a sinusoidal shear stress.
     duration, plant, method
-        As of `run_state`.
+        As in `run_state`.
     claim : SlidingProof, optional
-        Its law runs, with its T_s, delay, lag, rock and planned pressure in place of those above, which are not to be
-        given.
+        Guarantee whose law runs, with its T_s, delay, lag, diffusion path and planned pressure instead of those above,
+        which must be omitted.
     """
     _require_runnable(fault, plant)
     sampling_step, path = rational(fault.sampling_time if step is None else step), rational(diffusion)
@@ -325,10 +325,10 @@ def _start(
 
 
 # ----------------------------------------------------------------------
-# A law that is told estimates: the sensor, and whether its differentiator can follow.
+# Output feedback: the sensor, and the premise of its differentiator.
 
 WINDOW = 4000
-DEVIATIONS = 4.0  # of normal noise that count as its bound
+DEVIATIONS = 4.0  # standard deviations of normal noise that count as its bound
 
 
 def sensor(
@@ -352,22 +352,22 @@ def sensor(
     bound : float or None
         λ_d [m/s^(n_d + 1)] of a differentiator; None for none.
     filter_order : int
-        n_f of it.
+        n_f of the differentiator.
     order : int
-        n_d of it.
+        n_d of the differentiator.
     bandwidth : float
-        Of the transducer [Hz].
+        Bandwidth of the transducer [Hz].
     averaging : int
-        Number of the latest readings whose mean the differentiator gets.
+        Number of the latest readings whose mean is the input of the differentiator.
     quantum : float
-        Steps in which the transducer reads [m]; 0 for none.
+        Resolution of the transducer [m]; 0 for no rounding.
     inner_steps : int
-        Of the differentiator for every reading.
+        Steps of the differentiator per reading.
 
     Raises
     ------
     ParameterError
-        For noise of a slip rate that is not measured, or for what belongs to a differentiator without one.
+        For noise of an unmeasured slip rate, or settings of a differentiator without one.
     """
     if bound is None:
         entered = {
@@ -399,9 +399,9 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
     """Premise: λ_d exceeds the bound of slip and law, jointly with the sampling period (ERRATA 21).
 
     The largest |x1''| comes from a run with exact states over 4000 sampling periods. The condition is sufficient for
-    the differentiator to follow, not necessary for the loop to work. Where that run diverges, nothing is certified.
-    With n_d of 2 or more a bound of the next derivative is needed, which no held pressure has: the requirement is
-    infinite.
+    the differentiator to converge, not necessary for the loop to work. If this run diverges, nothing is certified.
+    With n_d of 2 or more a bound of the next derivative is needed, which does not exist with zero-order hold: the
+    requirement is infinite.
     """
     differentiator = seen.differentiator
     noise = max((DEVIATIONS * s.deviation for s in seen.stages if isinstance(s, Transducer)), default=0.0)
@@ -435,7 +435,7 @@ def _note(order: int, reached: float, condition: JointCondition) -> str:
 def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: float) -> tuple[float, float | None]:
     """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states over 4000 periods, on both plants.
 
-    The second entry is the time [s] of the first divergence, after which nothing counts, or None.
+    The second entry is the time [s] of the first divergence, up to which values count, or None.
     """
     window = min(WINDOW * step, fault.reference.operation_time)
     setting: dict[str, Any] = {"scheme": scheme, "step": step, "duration": window, "samples": WINDOW}
@@ -446,37 +446,37 @@ def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: fl
 
 
 # ----------------------------------------------------------------------
-# One run of one controller, as the command line asks for it.
+# One run of one controller, for the command line.
 
 PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Controller with its certified claim, without a solver."""
+    """Controller with its certified claim; building it needs no solver."""
 
     controller: Controller
-    # Certified bound on |h'| [m/s³]; None for gains that come without a certificate, and for a linear law
+    # Certified bound on |h'| [m/s³]; None for gains without a certificate, and for a linear law
     lipschitz: Fraction | None = None
-    # What is proved of the law, where it comes from a certificate file
+    # Guarantee of a law from a certificate file
     claim: FaultProof | None = None
 
     def noise(self, seed: int) -> Measurement:
-        """Bounds of the measurement errors in the guarantee of the controller; none without one."""
+        """Measurement errors within the bounds of the controller's guarantee; no noise without a guarantee."""
         held = self.claim.held if self.claim else None
         off = {name: float(bound) for name, bound in held.noise.items()} if held else {}
         return Measurement(**off, seed=seed, bounded=True) if off else EXACT
 
 
 def certified_choice(fault: Fault, path: str | Path) -> Choice:
-    """Law of a file of `guarantee`, which must be about the fault and hold; its proof is checked anew.
+    """Law of a `guarantee` file, which must be valid and about the fault; its proof is re-checked.
 
     Raises
     ------
     CertificateError
-        When the file cannot be read, is about something else, or does not hold.
+        When the file cannot be read, is about another subject, or is invalid.
     UnsupportedError
-        For a sliding mode whose gains cannot be read off its implicit step.
+        For a sliding mode whose gains do not follow from its implicit step.
     """
     claim: Any = load_guarantee(path)
     if claim.kind == UNCERTAIN_PLANT:
@@ -498,7 +498,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         controller: Controller = recovered(claim).limited
     else:
         controller = claim.controller
-        if type(controller) is SampledController:  # the file does not tell a designed e-LQR from a law of a user
+        if type(controller) is SampledController:  # the file does not tell a designed e-LQR from a user-defined law
             object.__setattr__(controller, "title", "law of the certificate")
     if claim.check() is not Verdict.PROVED:
         raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
@@ -506,7 +506,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
 
 
 def _apart(fault: Fault, claim: Any) -> list[str]:
-    """What of a fault a certificate does not cover; the planned pressure of slow sliding is that of the certificate."""
+    """Differences of a fault that a certificate does not cover, except the planned pressure of slow sliding."""
     task: Any = plant_like(claim.task, fault)
     if claim.covers_healing:
         task, uncovered = claim.beside_healing(task, rational(fault.friction.rest_excess))
@@ -519,12 +519,12 @@ def _apart(fault: Fault, claim: Any) -> list[str]:
 
 
 def optional_choice(fault: Fault, name: str, gains: tuple[str, ...], **more: Any) -> Choice | None:
-    """A `choice`, which see, or None for the name ``none``.
+    """Controller as in `choice`, or None for the name ``none``.
 
     Raises
     ------
     UnknownNameError, ParameterError
-        Also for gains, a scale or a feed-forward of no controller.
+        As in `choice`; also for gains, a scale or a feed-forward without a controller.
     """
     if name != "none":
         return choice(fault, name, gains, **more)
@@ -545,8 +545,8 @@ def choice(
 ) -> Choice:
     """Controller from a law's name and ``("published",)``, ``("designed",)``, ``("continuous",)`` or exact gains.
 
-    Designed ones run as they are guaranteed, with their own scheme and T_s; those designed in continuous time, as in
-    the paper, run with any.
+    Designed gains run as guaranteed, with their own scheme and T_s; gains designed in continuous time, as in the
+    paper, run with any scheme and T_s.
 
     Parameters
     ----------
@@ -555,9 +555,9 @@ def choice(
     feedforward : str
         ``none``, ``nominal`` or ``centred``; for a sliding mode.
     step : float, optional
-        T_s [s] of a design; the fault's unless given.
+        T_s [s] of a design; by default the fault's.
     path : mapping of str to float, optional
-        Delay, lag and diffusion [s] for which a law is designed as it runs, as `answer` does; none unless given.
+        Delay, lag and diffusion [s] of the loop for which a law is designed; none by default.
     """
     law, base = _with_gains(fault, name, gains, step, path or {})
     if law.divisor is None:
@@ -580,7 +580,7 @@ def choice(
 def _with_gains(
     fault: Fault, name: str, gains: tuple[str, ...], step: float | None, path: Mapping[str, float]
 ) -> tuple[Controller, Fraction | None]:
-    """Law, and the bound on |h'| that is certified for λ = 1."""
+    """Law, and its certified bound on |h'| for λ = 1."""
     law = control_law(name)
     if len(gains) == 1 and gains[0].isalpha():
         require_known(gains[0], (*PUBLISHED, *DESIGNED, *CONTINUOUS), "gains in a word", UnknownNameError)
@@ -605,12 +605,12 @@ def _with_gains(
 
 
 def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Controller:
-    """Law that is designed for a delay, a lag and rock, as it runs at the fault's T_s.
+    """Law designed for a delay, a lag and a diffusion path, sampled with the fault's T_s.
 
     Raises
     ------
     ParameterError
-        Where none has a proof, or the delay is more than a run takes.
+        If no design has a proof, or the delay exceeds that of an `Actuator`.
     """
     setup = IDEAL.with_given(**path)
     Actuator.meant_for(Sampling(step=rational(fault.sampling_time), **setup.path))
@@ -644,20 +644,20 @@ def run_single(
     Parameters
     ----------
     law : Controller, Choice or None
-        Of a choice it is known what is certified. None with a duration: the fault under its own disturbance. None
-        without: the natural earthquake.
+        A choice also supplies certified bounds. None with a duration: the fault under its own disturbance. None without
+        a duration: the natural earthquake.
     tell : callable
-        Progress.
+        Called with the progress.
     duration : float, optional
-        [s]; the operation time unless given.
+        Duration of the run [s]; by default the operation time.
     noise : Measurement or Sensor
-        What the law is told.
+        Measurement of the law.
     actuator : Actuator
-        What lies between law and fault.
+        Stages between law and fault.
     tuning : mapping of str to float, optional
         Settings of the scheme itself, such as ``weight`` and ``authority`` of ``compensated``.
     initial : mapping of str to float, optional
-        ``initial_slip`` [m] and ``initial_slip_rate`` [m/s], where the run does not start from rest.
+        ``initial_slip`` [m] and ``initial_slip_rate`` [m/s], if the run does not start from rest.
     **settings
         ``step, scheme, method, plant, substeps`` of `quakedesign.simulation.simulate`.
 
@@ -665,7 +665,7 @@ def run_single(
     -------
     Trajectory
     list of Premise
-        `on_trajectory` of a sliding mode, certified or not, and `differentiator`.
+        `on_trajectory` of a sliding mode, with or without a certificate, and `differentiator`.
     """
     given: dict[str, Any] = {"measurement": noise} if noise.noisy else {}
     given |= {"actuator": actuator} if actuator.stages else {}
@@ -687,7 +687,7 @@ def run_single(
 
 
 def _premises(fault: Fault, chosen: Choice, run: Trajectory, seen: Sensor, scheme: str) -> list[Premise]:
-    """Premises that a run decides, or a differentiator needs."""
+    """Premises that a run decides, and those of a differentiator."""
     law, bound = chosen.controller, chosen.lipschitz
     premises = [trajectory_premise(law, None if bound is None else float(bound), run)]
     if isinstance(seen, OutputFeedback):
@@ -696,7 +696,7 @@ def _premises(fault: Fault, chosen: Choice, run: Trajectory, seen: Sensor, schem
 
 
 def _natural(fault: Fault, settings: dict[str, Any], given: dict[str, Any]) -> Trajectory:
-    """Natural earthquake, to which nothing but the plant can be told."""
+    """Natural earthquake, which has no setting other than the plant."""
     usual = {"step": None, "scheme": "continuous", "method": "dormand-prince", "substeps": 1}
     others = [name for name, value in settings.items() if name != "plant" and value != usual[name]]
     others += list(given)

@@ -62,7 +62,7 @@ class TrialSampling:
         return self.law.for_authority(tuple(gains), self.divisor).scaled(self.scale)
 
     def error(self, gains: Sequence[Fraction]) -> float | None:
-        """Metric of a run from rest on the plant without stick, to which the certificates apply; None if it diverges."""
+        """Metric of a run from rest on the plant without stick, that of the certificates; None if it diverges."""
         run = simulate(
             self.fault,
             self.controller(gains),

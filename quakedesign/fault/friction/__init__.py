@@ -11,9 +11,9 @@ __all__ = ["FrictionLaw", "friction_law", "friction_laws"]
 
 @cache
 def friction_laws() -> dict[str, type[FrictionLaw]]:
-    """Every friction law of the package, by name; a module of this folder without a law is an error.
+    """Every friction law of the package by name; a module of this folder without a law is an error.
 
-    An abstract class, from which other laws derive, counts as the law of its module but is not listed.
+    An abstract base class counts as the law of its module but is not listed.
     """
     return discovered(__name__, FrictionLaw, shared=("base", "weakening"))
 
@@ -25,7 +25,7 @@ def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) 
     Parameters
     ----------
     in_file : bool
-        Whether the name is from a file, which may name laws of the package only, unless code is allowed.
+        Whether the name comes from a file, which may name only laws of the package unless code is allowed.
     allow_code : bool
         Whether a file may name user-defined code.
 

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 class FrictionLaw(ABC):
     """One friction coefficient μ(slip, slip rate, state …), written once with the parameters as attributes.
 
-    A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (as pint reads it), ``symbol``
-    (LaTeX) and ``example`` (for templates); a field without a symbol is an option, not a quantity. The same method is
-    used for numbers, exact rationals and symbols: `symbolic` and `exact` return copies of the law with these.
+    A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (for pint), ``symbol``
+    (LaTeX) and ``example`` (for templates); a field without a symbol is an option, not a quantity. The same methods
+    serve numbers, exact rationals and symbols: `exact` and `symbolic` return copies of the law with such parameters.
 
     A law without state defines `coefficient`, `extended` and the bounds. A law with state also names its variables
     in `state_names` (with `state_units`), and defines `state_rates`, `steady_state`, `operating_rate` and
@@ -43,19 +43,19 @@ class FrictionLaw(ABC):
 
     @abstractmethod
     def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
-        """Friction coefficient [-] continued to all slips, rates and states, so that the bounds hold everywhere."""
+        """Friction coefficient [-] extended to all slips, rates and states, so that the bounds hold everywhere."""
 
     def state_rates(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "tuple[sp.Expr, ...]":
-        """Time derivative of every state variable, each in its unit per second; none for a law without state."""
+        """Time derivative of every state variable in its unit per second; empty for a law without state."""
         return ()
 
     @property
     def stress_exponents(self) -> tuple[float, ...]:
-        """∂ln(state)/∂ln(effective normal stress) [-] of every state variable while the stress changes suddenly."""
+        """∂ln(state)/∂ln(effective normal stress) [-] of every state variable at a sudden change of the stress."""
         return (0,) * len(self.state_names)
 
     def steady_state(self, rate: "sp.Expr") -> "tuple[sp.Expr, ...]":
-        """Steady state of sliding at a constant rate [m/s]; none for a law without state."""
+        """Steady state of sliding at a constant rate [m/s]; empty for a law without state."""
         return ()
 
     def steady_coefficient(self, rate: "sp.Expr") -> "sp.Expr":
@@ -64,7 +64,7 @@ class FrictionLaw(ABC):
 
     @property
     def rest_excess(self) -> float:
-        """Friction at rest minus friction in slip [-]: `healing` of laws that have it."""
+        """Friction at rest minus friction in slip [-]: `healing`, for laws with this parameter."""
         return float(getattr(self, "healing", 0.0))
 
     @property
@@ -74,7 +74,7 @@ class FrictionLaw(ABC):
 
     @property
     def working_rates(self) -> tuple[float, float]:
-        """Slip rates [m/s] between which the bounds hold for `coefficient` itself; all of them by default."""
+        """Slip rates [m/s] between which the bounds hold for `coefficient` itself; all rates by default."""
         return -math.inf, math.inf
 
     @property
@@ -85,7 +85,7 @@ class FrictionLaw(ABC):
     @property
     @abstractmethod
     def slip_slope(self) -> float:
-        """Largest chord slope |Δμ/Δslip| [1/m]; with state, along a motion in which the state evolves too."""
+        """Largest chord slope |Δμ/Δslip| [1/m]; with state, along a motion with evolving state."""
 
     @property
     @abstractmethod
@@ -93,7 +93,7 @@ class FrictionLaw(ABC):
         """Largest chord slope |Δμ/Δrate| [s/m] at a fixed state."""
 
     def require(self, **given: object) -> None:
-        """Reject what is given, not None, and does not apply to the equilibrium of a fault with this friction."""
+        """Reject a value other than None that does not apply to the equilibrium of a fault with this friction."""
         for name, message in self.equilibrium.refused.items():
             if (value := given.get(name)) is not None:
                 raise ParameterError(message.format(value=value, law=self.name, states=", ".join(self.state_names)))
@@ -106,15 +106,15 @@ class FrictionLaw(ABC):
 
     @classmethod
     def quantities(cls) -> "dict[str, Field[float]]":
-        """Every field that is a quantity with unit and symbol, by name."""
+        """Fields that are quantities with unit and symbol, by name."""
         return {f.name: f for f in fields(cls) if "symbol" in f.metadata}  # type: ignore[arg-type]
 
     def _options(self) -> dict[str, Any]:
-        """Every other field."""
+        """Values of all other fields, by name."""
         return {f.name: getattr(self, f.name) for f in fields(self) if "symbol" not in f.metadata}  # type: ignore[arg-type]
 
     def symbols(self) -> "dict[str, sp.Symbol]":
-        """Positive symbol of every quantity, by field name."""
+        """Positive symbols of the quantities, by field name."""
         import sympy as sp
 
         return {name: sp.Symbol(f.metadata["symbol"], positive=True) for name, f in self.quantities().items()}
@@ -131,6 +131,6 @@ class FrictionLaw(ABC):
         return self._holding(self._options() | exact)
 
     def values(self) -> "dict[sp.Symbol, sp.Rational]":
-        """Exact value of every quantity's symbol."""
+        """Exact values of the quantities, by symbol."""
         exact = self.exact()
         return {symbol: getattr(exact, name) for name, symbol in self.symbols().items()}

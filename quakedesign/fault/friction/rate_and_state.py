@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# What the rate-and-state laws share: parameters, working range, and bounds on it.
+# Common base of the rate-and-state laws: parameters, working range, and bounds on it.
 
 _DIGITS = 40
 _ROUNDING = Fraction(1, 10**30)
@@ -30,9 +30,9 @@ _ROUNDING = Fraction(1, 10**30)
 class RateAndState(FrictionLaw):
     """μ depends on the slip rate v and on one state θ [s], the age of the contacts.
 
-    Friction rises with v and with θ, so on the working range v_s ≤ v ≤ v_f, d_c/v_f ≤ θ ≤ d_c/v_s its extremes are
-    at two corners. As long as v stays between v_s and v_f, θ cannot leave its interval: both evolution laws point
-    inward at its ends. Outside of the range the bounds say nothing about `coefficient` (ERRATA 13).
+    Friction increases with v and θ, so on the working range v_s ≤ v ≤ v_f, d_c/v_f ≤ θ ≤ d_c/v_s its extremes are at
+    two corners. As long as v stays between v_s and v_f, θ cannot leave its interval: both evolution laws point
+    inward at its ends. Outside the range the bounds do not apply to `coefficient` (ERRATA 13).
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ class RateAndState(FrictionLaw):
     Raises
     ------
     ParameterError
-        When a parameter is outside its range, or a state is missing where the law is evaluated.
+        When a parameter is outside its range, or the law is evaluated without a state.
     """
 
     domain: ClassVar[str] = "slowest_rate <= rate <= fastest_rate, theta between the steady states of the two"
@@ -86,7 +86,7 @@ class RateAndState(FrictionLaw):
 
     @abstractmethod
     def friction(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
-        """Friction coefficient [-] at a rate [m/s] and a state [s]; rises with both."""
+        """Friction coefficient [-] at a rate [m/s] and a state [s]; increases with both."""
 
     @abstractmethod
     def ageing(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
@@ -102,7 +102,7 @@ class RateAndState(FrictionLaw):
         return self.friction(rate, self._theta(state))
 
     def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
-        """Friction coefficient [-] with rate and state held at the ends of the working range beyond it."""
+        """Friction coefficient [-] with rate and state clipped to the working range."""
         import sympy as sp
 
         def clip(value: "sp.Expr", low: "sp.Expr", high: "sp.Expr") -> "sp.Expr":
@@ -164,7 +164,7 @@ class RateAndState(FrictionLaw):
 
 
 def outward(value: "sp.Expr", *, up: bool) -> float:
-    """Float that is not below (`up`) or not above an exact SymPy number."""
+    """Float not below (`up`) or not above an exact SymPy number."""
     import sympy as sp
 
     if value.is_Rational:
@@ -254,7 +254,7 @@ class RateAndStateSlip(RateAndState):
 
 
 # ----------------------------------------------------------------------
-# Rate-and-state friction that stays finite at zero slip rate.
+# Regularised rate-and-state friction, finite at zero slip rate.
 
 EVOLUTIONS = {"aging": (aging_rate, aging_slope), "slip": (slip_rate, slip_law_slope)}
 
@@ -263,8 +263,8 @@ EVOLUTIONS = {"aging": (aging_rate, aging_slope), "slip": (slip_rate, slip_law_s
 class RegularisedRateAndState(RateAndState):
     """μ = a arsinh(v/(2v_0) · exp((μ_0 + b log(v_0 θ/d_c))/a)): thermally activated contacts in both directions.
 
-    Odd in v, so μ(0) = 0 and no positive lower bound of friction exists but on a working range (ERRATA 13). The
-    slope ∂μ/∂v is below that of the logarithmic law everywhere, as is ∂μ/∂θ.
+    Odd in v, so μ(0) = 0, and a positive lower bound of friction exists only on a working range (ERRATA 13). The
+    slopes ∂μ/∂v and ∂μ/∂θ are everywhere below those of the logarithmic law.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ class RegularisedRateAndState(RateAndState):
     Raises
     ------
     ParameterError
-        As `RateAndState`, and for another evolution.
+        As `RateAndState`, and for an unknown evolution.
     """
 
     name: ClassVar[str] = "regularised-rate-and-state"

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# What friction laws share that fall from a static to a residual coefficient.
+# Common base of friction laws that fall from a static to a residual coefficient.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,7 +81,7 @@ class SlipWeakening(Weakening):
         require_all(lambda: Weakening.__post_init__(self), lambda: require_positive(critical_slip=self.critical_slip))
 
     def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
-        """Friction coefficient [-], held at its static value for slip < 0 (ERRATA 12)."""
+        """Friction coefficient [-], constant at its static value for slip < 0 (ERRATA 12)."""
         import sympy as sp
 
         return self.coefficient(sp.Max(slip, 0), rate)
@@ -138,7 +138,7 @@ class LinearSlipWeakening(SlipWeakening):
 class SlipRateWeakening(Weakening):
     """μ(rate) = residual + drop/(1 + rate/critical_rate) for rate ≥ 0, even in the rate when extended.
 
-    The coefficient is that of motion forward; whether friction opposes motion is the plant's matter (ERRATA 14).
+    The coefficient is for forward motion; the plant gives friction its sign (ERRATA 14).
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class SlipRateWeakening(Weakening):
         return self.residual + self.drop / (1 + rate / self.critical_rate)
 
     def extended(self, slip: "sp.Expr", rate: "sp.Expr", *state: "sp.Expr") -> "sp.Expr":
-        """Friction coefficient [-] of the size of the rate."""
+        """Friction coefficient [-] at the absolute value of the rate."""
         import sympy as sp
 
         return self.coefficient(slip, sp.Abs(rate))

@@ -1,4 +1,4 @@
-"""Actuator stages between the commanded pressure and the pressure in the fault, one stage a file."""
+"""Actuator stages between the commanded pressure and the pressure in the fault, discovered in this folder."""
 
 from functools import cache
 
@@ -26,6 +26,6 @@ __all__ = [
 
 @cache
 def stages() -> dict[str, type[Stage]]:
-    """Every stage of the package, by name, along the signal."""
+    """Every stage of the package by name, in the order of the signal."""
     every = discovered(__name__, Stage, shared=("base", "chain"))
     return dict(sorted(every.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].place)))

@@ -14,13 +14,13 @@ class Option:
     Attributes
     ----------
     name : str
-        As an identifier of Python.
+        A Python identifier.
     unit : str
-        SI; empty for a whole number.
+        SI unit; empty for a whole number.
     help : str
-        A sentence.
+        Help text, one sentence.
     default : float or None
-        What it is unless given; None where it is left out.
+        Default value; None if the option may be omitted.
     """
 
     name: str
@@ -32,19 +32,19 @@ class Option:
 class Stage(ABC):
     """One element of a chain that carries a pressure [Pa] from the controller to the fault.
 
-    Its numbers and its memory are entries of the vector that the compiled loop carries along, so that one machine
-    code serves all of them; the methods work on CasADi SX and on floats.
+    Its numbers and its memory are entries of the state vector of the compiled loop, so that one machine code serves
+    all their values; the methods work on CasADi SX and on floats.
 
     Attributes
     ----------
     name : str
     limits : bool
-        Whether an output that differs from the input means that the law asked for more than there is, so that its
-        integral states must not wind up.
+        Whether an output that differs from the input means that the commanded pressure exceeds a limit, so that the
+        integral states of the law must not wind up.
     options : tuple of Option
-        Of the command line; a stage is there where the first is not its default. None: only Python has the stage.
+        Command-line options; the first, if not at its default, adds the stage. Empty: a stage for Python only.
     place : int
-        Where the command line puts it, along the signal: behind what acts as it does and has a smaller one.
+        Rank in the signal order on the command line, among the sampled or among the dynamic stages.
     """
 
     name: ClassVar[str]
@@ -54,12 +54,12 @@ class Stage(ABC):
 
     @classmethod
     def asked(cls, step: float, **values: Any) -> Self:
-        """Stage from the values of its `options`, for a sampling period [s]; those are its fields unless overridden."""
+        """Stage from the values of its `options`, for a sampling period [s]; by default these values are its fields."""
         return cls(**values)
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """Parameters in SI units, as the other methods expect them."""
+        """Parameters in SI units, as arguments of the other methods."""
         return ()
 
     @property
@@ -74,14 +74,14 @@ class SampledStage(Stage):
     Attributes
     ----------
     part : float
-        Share of a sampling period, below 1, after which what leaves it at a sample acts; until then the last one does.
+        Share of a sampling period, below 1, after which the output of a sample acts; until then the previous one acts.
     """
 
     part: float = 0.0
 
     @abstractmethod
     def apply(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Entries]:
-        """Pressure [Pa] that leaves the stage over one sample of length `step` [s], and the memory afterwards."""
+        """Output pressure [Pa] of the stage over one sample of length `step` [s], and the memory afterwards."""
 
 
 class FlowStage(Stage):

@@ -14,7 +14,7 @@ from quakedesign.loop.sensing.measurement import Entries
 if TYPE_CHECKING:
     from quakedesign.laws import Sampling
 
-LONGEST = 2.5  # of a substep times the fastest rate: below the limits 2.78 and 3.3 of the Runge–Kutta methods
+LONGEST = 2.5  # limit of substep times fastest rate, below the limits 2.78 and 3.3 of the Runge–Kutta methods
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -24,13 +24,13 @@ class Actuator:
     Attributes
     ----------
     stages : tuple of Stage
-        In the order of the signal; those that act once per sample first, since what they leave is then held. None:
-        the fault has at once what the law asks for.
+        In the order of the signal; sampled stages come first, because a zero-order hold follows them. Without stages
+        the commanded pressure acts in the fault at once.
 
     Raises
     ------
     ParameterError
-        For anything but stages, or another order.
+        For an entry that is no stage, or another order.
     """
 
     stages: tuple[Stage, ...] = ()
@@ -64,7 +64,7 @@ class Actuator:
         return cls(stages=tuple(kinds[name].asked(step, **{name: time}) for name, time in times.items()))
 
     def completed(self, other: "Actuator") -> "Actuator":
-        """Actuator extended by the stages of another one whose kind it lacks."""
+        """Actuator extended by those stages of another one whose kinds it does not have."""
         names = {stage.name for stage in self.stages}
         more = (stage for stage in other.stages if stage.name not in names)
         along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.place))
@@ -100,7 +100,7 @@ class Actuator:
         return [stage for stage in self.flowing if stage.stores]
 
     def substeps(self, step: float) -> int:
-        """Least number of substeps of a step [s] that resolves every stage."""
+        """Smallest number of substeps of a step [s] that resolves every stage."""
         return max((math.ceil(step * stage.fastest / LONGEST) for stage in self.flowing), default=1)
 
     def require_resolved(self, substep: float) -> None:
@@ -125,7 +125,7 @@ class Actuator:
         return pressure, excess, memories
 
     def flow(self, numbers: Entries, memory: Entries, applied: Any) -> tuple[Entries, Any, dict[str, Any]]:
-        """Rates of the flowing stages, pressure [Pa] in the fault, and signals of `FLOWS`, under a pressure held."""
+        """Rates of dynamic stages, pressure [Pa] in the fault, and signals of `FLOWS`, at a held input pressure."""
         rates: Entries = []
         signals: dict[str, Any] = {}
         for stage, own, past in zip(self.flowing, *_split(self.flowing, numbers, memory), strict=True):
@@ -139,6 +139,6 @@ DIRECT = Actuator()
 
 
 def _split(stages: tuple[Stage, ...], numbers: Entries, memory: Entries) -> tuple[list[Entries], list[Entries]]:
-    """Entries of every stage."""
+    """Numbers and memory of every stage."""
     own, past = iter(numbers), iter(memory)
     return [[next(own) for _ in s.numbers] for s in stages], [[next(past) for _ in s.start] for s in stages]

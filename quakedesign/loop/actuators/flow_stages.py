@@ -62,7 +62,7 @@ class Lag(FlowStage):
 
 
 # ----------------------------------------------------------------------
-# Flow through the rock between well and fault.
+# Pressure diffusion between well and fault.
 
 MOST_CELLS = 200
 
@@ -78,9 +78,9 @@ class Diffusion(FlowStage):
 
     The model has N cells of equal width with their pressures in the middle (finite volumes). Its transfer functions
     are 1/cosh(Nφ) and S·tanh(Nφ)/(N sinh φ) with sinh(φ/2) = √(sτ)/(2N): rational functions of degree N, both exact
-    for slow changes, and the volume is that of the cells. Over all frequencies the pressure is off by at most 0.32/N²
-    of the amplitude at the well, its step response by 0.25/N², and the volume by 0.22/N of S times that amplitude
-    (0.13 %, 0.1 % and 1.3 % for 16 cells).
+    for slow changes, and the volume is that of the cells. Over all frequencies the error of the pressure is at most
+    0.32/N² of the amplitude at the well, that of its step response 0.25/N², and that of the volume 0.22/N of S times
+    this amplitude (0.13 %, 0.1 % and 1.3 % for 16 cells).
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Diffusion(FlowStage):
         D [m²/s], positive.
     storage : float or None
         S [m³/Pa], positive: fluid volume stored in the whole layer per pressure, its volume times its specific storage.
-        Without it pressures are the same, but volume and flow rate are not known.
+        Without it the pressures are the same, but volume and flow rate are not computed.
     cells : int
         N, 1 … 200.
     """
@@ -126,7 +126,7 @@ class Diffusion(FlowStage):
 
     @classmethod
     def of_time(cls, time: float, *, storage: float | None = None, cells: int = 16) -> Self:
-        """Layer with given τ = L²/D [s]; its length of 1 m is arbitrary."""
+        """Layer with a given τ = L²/D [s]; its length of 1 m is arbitrary."""
         require_positive(time=time)
         return cls(length=1.0, diffusivity=1.0 / time, storage=storage, cells=cells)
 
@@ -142,7 +142,7 @@ class Diffusion(FlowStage):
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """N²/τ [1/s], and S/N [m³/Pa] where it is known."""
+        """N²/τ [1/s], and S/N [m³/Pa] if the storage is given."""
         share = () if self.storage is None else (self.storage / self.cells,)
         return (self.cells**2 / self.time, *share)
 
@@ -172,7 +172,7 @@ class Diffusion(FlowStage):
         return memory[-1]
 
     def flows(self, numbers: Entries, memory: Entries, pressure: Any) -> dict[str, Any]:
-        """Injected volume [m³] and flow rate [m³/s] at the well, where the storage is known."""
+        """Injected volume [m³] and flow rate [m³/s] at the well, if the storage is given."""
         if not self.stores:
             return {}
         share = numbers[1]

@@ -10,10 +10,10 @@ from quakedesign.loop.actuators.base import Option, SampledStage
 from quakedesign.loop.sensing.measurement import Entries, Measurement, generator, uniform
 
 # ----------------------------------------------------------------------
-# Time that the computation takes.
+# Computation time as a delay.
 
 MOST_SAMPLES = 100
-_SAME = 1e-9  # of a sampling period
+_SAME = 1e-9  # tolerance, relative to a sampling period
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -25,12 +25,12 @@ class Delay(SampledStage):
     samples : int
         0 … 100.
     jitter : int
-        Largest number of further samples, drawn anew at every sample, each equally likely, 0 … 100. What has acted
-        once is not followed by anything older.
+        Largest additional delay in samples, drawn uniformly at every sample, 0 … 100. No older pressure acts after a
+        newer one.
     seed : int
-        Of the jitter, not negative.
+        Seed of the jitter, not negative.
     part : float
-        Share of a sampling period by which it acts later still, at least 0 and below 1.
+        Additional delay as a share of a sampling period, at least 0 and below 1.
     """
 
     name: ClassVar[str] = "delay"
@@ -76,7 +76,7 @@ class Delay(SampledStage):
         return (*queue, float(self.samples), *generator(self.seed)) if self.jitter else queue
 
     def apply(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Entries]:
-        """Pressure of the queue whose age is the delay; see `SampledStage.apply`."""
+        """Queued pressure whose age is the delay; see `SampledStage.apply`."""
         import casadi as ca
 
         longest = self.samples + self.jitter
@@ -128,7 +128,7 @@ class Quantisation(SampledStage):
 
 @checked_dataclass(frozen=True, kw_only=True)
 class RateLimit(SampledStage):
-    """Limits the change from one sample to the next, from zero at the start.
+    """Limits the change of the pressure from one sample to the next; the initial pressure is zero.
 
     Attributes
     ----------

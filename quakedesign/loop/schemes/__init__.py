@@ -11,7 +11,7 @@ from quakedesign.laws import Controller
 from quakedesign.loop.schemes.base import Scheme, Stepped
 
 # ----------------------------------------------------------------------
-# Ways to carry a law out over a step, one a file, found by looking into this folder.
+# Discretisation schemes of a control law, one a file, discovered in this folder.
 
 __all__ = ["Scheme", "Stepped", "own_way", "schemes", "simulation_scheme"]
 
@@ -29,7 +29,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
     Raises
     ------
     ParameterError
-        When there is none, or it does not have one of the settings.
+        For an unknown scheme, or one without one of the settings.
     """
     if ":" not in name:
         require_known(name, sorted(schemes()), "scheme")
@@ -53,7 +53,7 @@ def own_way(
     Raises
     ------
     ParameterError
-        When a law of samples is asked to run otherwise.
+        When another scheme or step is requested for a sampled law.
     """
     own = controller.sampling if controller else None
     if own is None:

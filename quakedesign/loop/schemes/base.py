@@ -26,13 +26,13 @@ from quakedesign.loop.discrete_law import DiscreteLaw, Lifted, Values
 from quakedesign.loop.sensing.measurement import EXACT, Measurement, Sensor, generator, uniform
 
 # ----------------------------------------------------------------------
-# What every scheme offers.
+# Interface of all schemes.
 
-Motion = Callable[..., ca.SX]  # from numbers or symbols to rates of a state, or to another column
+Motion = Callable[..., ca.SX]  # a function of numbers or symbols, to the rates of a state or another column
 
 
 class Stepped(ABC):
-    """Closed loop as a scheme needs it; the functions work on CasADi SX.
+    """Closed loop as input of a scheme; the functions work on CasADi SX.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Stepped(ABC):
     fault : Fault
     controller : Controller or None
     constant_pressure : float
-        p [Pa] where there is no controller.
+        p [Pa] without a controller.
     """
 
     sticks: ClassVar[bool] = False
@@ -53,7 +53,7 @@ class Stepped(ABC):
     @property
     @abstractmethod
     def integrals(self) -> tuple[sp.Symbol, ...]:
-        """Symbols of the law's own states."""
+        """Symbols of the law's integral states."""
 
     @property
     @abstractmethod
@@ -72,18 +72,18 @@ class Stepped(ABC):
 
     @abstractmethod
     def advance(self, method: Any, motion: Motion, state: ca.SX, step: float) -> ca.SX:
-        """State after one step of an integrator on a motion, given the plant, how much has passed [-] and the state."""
+        """State after one integrator step; a motion maps plant, elapsed share of the step [-] and state to rates."""
 
     @abstractmethod
     def advance_often(self, method: Any, motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int) -> ca.SX:
-        """State after a number of steps; the motion is given numbers too, and `passed` counts steps."""
+        """State after several steps; the motion also takes `given`, and its `passed` counts steps."""
 
 
 class Scheme(ABC):
     """One step of length T_s of a closed loop, written in CasADi SX.
 
-    The state of a run is [x1, x2, ξ, memory], where the memory belongs to the scheme: what a controller keeps from one
-    sample to the next, and numbers that are carried along so that one machine code serves all of their values.
+    The state of a run is [x1, x2, ξ, memory]. The memory belongs to the scheme: values that a controller stores from
+    one sample to the next, and parameters, stored there so that one machine code serves all their values.
     """
 
     name: ClassVar[str]
@@ -115,12 +115,12 @@ class Scheme(ABC):
 
     @property
     def settings(self) -> Json:
-        """Numbers and texts that say how the scheme was set, for the provenance of a run."""
+        """Settings of the scheme, as numbers and texts, for the provenance of a run."""
         return {}
 
 
 # ----------------------------------------------------------------------
-# What a sampled controller computes at one sample, as one CasADi Function.
+# Computation of a sampled controller at one sample, as one CasADi Function.
 
 SIGNALS = (
     discrete_law.slip,
@@ -143,7 +143,7 @@ class Decision:
     Attributes
     ----------
     pressure : SX
-        That it asks for [Pa].
+        Commanded pressure [Pa].
     integrals : list of SX
         ξ at the next sample.
     own : list of SX
@@ -161,7 +161,7 @@ class Decided(ABC):
     Attributes
     ----------
     own_size : int
-        Entries of its own memory.
+        Number of entries of the scheme's own memory.
     """
 
     own_size: ClassVar[int] = 0
@@ -169,12 +169,12 @@ class Decided(ABC):
     @staticmethod
     @abstractmethod
     def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
-        """Return the expressions that `decide` evaluates, with the numbers of the law in them."""
+        """Return the expressions that `decide` evaluates, with the numerical values of the law."""
 
     @classmethod
     @abstractmethod
     def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
-        """What the controller does, given the expressions, the values of their symbols, and its own memory."""
+        """Result of the controller from the expressions, the values of their symbols, and the scheme's own memory."""
 
 
 @dataclass(frozen=True)
@@ -185,9 +185,9 @@ class ControlStep:
     ----------
     function : casadi.Function
         (signals in the order of `SIGNALS`, integrals ξ, numbers of the law, memory of the scheme) → pressure [Pa],
-        integrals and memory at the next sample, and push, the change of the pressure [Pa] that the change of ξ makes.
+        integrals and memory at the next sample, and push, the change of the pressure [Pa] due to the change of ξ.
     numbers : tuple of float
-        Of this law; another law of the same kind has the same function.
+        Numbers of this law; another law of the same kind has the same function.
     """
 
     function: ca.Function
@@ -265,11 +265,11 @@ class AperiodicClock:
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Steps until the first sample, 0, and the state of the generator."""
+        """Steps until the first sample (0), and the state of the generator."""
         return (0.0, *generator(self.seed))
 
     def after(self, memory: list[ca.SX]) -> tuple[ca.SX, list[ca.SX]]:
-        """Whether there is a sample now, and the memory one step later."""
+        """Whether a sample is taken now, and the memory one step later."""
         wait, *state = memory
         now = wait < 1
         following, drawn = uniform(state)
@@ -286,7 +286,7 @@ MOST_SUBSTEPS = 100
 
 @dataclass(frozen=True)
 class ControlSample:
-    """Values at one sample (SX): the pressures held before and from it, and the memory afterwards."""
+    """All values of one sample (SX): the held pressures before and after it, and the memory afterwards."""
 
     before: ca.SX
     applied: ca.SX
@@ -304,19 +304,19 @@ class ControlSample:
 class Sampled(Scheme, Decided):
     """A controller that measures every T_s and holds its pressure in between (zero-order hold).
 
-    The entries of the memory are: the law's numbers, those of actuator and measurement, the scheme's own memory, the
-    pressure that was held last, and the memories of the actuator, of the noise generator and of aperiodic sampling.
+    The entries of the memory are: the numbers of law, actuator and measurement, the scheme's own memory, the last
+    held pressure, and the memories of the actuator, the noise generator and the aperiodic sampling.
 
     Attributes
     ----------
     substeps : int
         Steps of the integrator per sample, 1 … 100.
     measurement : Measurement or Sensor
-        A sensor measures the true slip alone, once per sample of its own period.
+        A sensor reads only the true slip, once per sample of its own period.
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
     clock : AperiodicClock or None
-        Sampling instants, in steps; None: periodic, at every step.
+        Aperiodic sampling; None: a sample at every step.
     """
 
     substeps: int = 1
@@ -338,7 +338,7 @@ class Sampled(Scheme, Decided):
 
     @property
     def starts(self) -> tuple[float, ...]:
-        """The scheme's own memory at the start, `own_size` entries."""
+        """Initial values of the scheme's own memory, `own_size` entries."""
         return ()
 
     def nominal(self, loop: Stepped) -> float:
@@ -346,7 +346,7 @@ class Sampled(Scheme, Decided):
         return loop.fault.authority_range[0]
 
     def memory(self, loop: Stepped, step: float) -> dict[str, float]:
-        """See `Scheme.memory`; refuses a sensor that was made for another step."""
+        """See `Scheme.memory`; rejects a sensor that was made for another step."""
         self.actuator.require_resolved(step / self.substeps)
         self.measurement.require_step(step)
         parts = self._parts(loop)
@@ -359,7 +359,7 @@ class Sampled(Scheme, Decided):
         return pressure
 
     def push(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
-        """Which way ξ moves the pressure at a sample (SX): ξ stays where a limit keeps the pressure from that."""
+        """Pressure change [Pa] (SX) due to the change of ξ at a sample; ξ stays constant where a limit prevents it."""
         return self._sample(loop, counter, state, step).push
 
     def outputs(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> dict[str, ca.SX]:
@@ -390,7 +390,7 @@ class Sampled(Scheme, Decided):
         sample = self._sample(loop, counter, state, step)
         moving = ca.vertcat(state[:2], *sample.flow)
         for applied, begin, share in self._sections(sample):
-            # With one entry more than the section before: repetitions are told apart by their numbers of arguments.
+            # One entry more than in the section before: repetitions are distinguished by their numbers of arguments.
             given = ca.vertcat(counter, applied, *sample.numbers, *([begin] if begin else []))
             times = math.ceil(share * self.substeps)
             motion = self._motion(step, begin, share, times)
@@ -402,12 +402,12 @@ class Sampled(Scheme, Decided):
         return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
 
     def _sections(self, sample: ControlSample) -> tuple[tuple[ca.SX, float, float], ...]:
-        """Pressures that are held between two samples, from which share of the period, and for which."""
+        """Pressures held between two samples, each with its beginning and duration as shares of the period."""
         late = self.actuator.part
         return ((sample.before, 0, late), (sample.applied, late, 1 - late)) if late else ((sample.applied, 0, 1),)
 
     def _motion(self, step: float, begin: float, share: float, times: int) -> Motion:
-        """Rates of plant and actuator under a pressure held, as `Stepped.advance_often` takes them."""
+        """Rates of plant and actuator at a held pressure, as an argument of `Stepped.advance_often`."""
 
         def motion(plant: Motion, passed: ca.SX, now: ca.SX, given: ca.SX) -> ca.SX:
             counter, applied, *numbers = ca.vertsplit(given)
@@ -418,7 +418,7 @@ class Sampled(Scheme, Decided):
         return motion
 
     def _parts(self, loop: Stepped) -> dict[str, tuple[float, ...]]:
-        """Values of the memory at the start."""
+        """Initial values of the memory, by part."""
         sampled, flowing = self.actuator.sampled, self.actuator.flowing
         return {
             "law": self.control_step(loop).numbers,
@@ -435,11 +435,11 @@ class Sampled(Scheme, Decided):
         }
 
     def control_step(self, loop: Stepped) -> ControlStep:
-        """What the controller of a loop computes at one sample."""
+        """Sampled-step function of the controller of a loop."""
         return control_step(type(self), DiscreteLaw.of(loop.controller, loop.constant_pressure))
 
     def _sample(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ControlSample:
-        """Measure, decide, and pass the decision on to the actuator; ξ does not wind up where a stage limits."""
+        """Measure, evaluate the law, pass its pressure to the actuator; ξ does not wind up where a stage limits."""
         count = len(loop.integrals)
         entries = iter(ca.vertsplit(state[2 + count :]))
         part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
@@ -461,7 +461,7 @@ class Sampled(Scheme, Decided):
         return self._if_now(sample, ca.vertsplit(before) if count else [], part) if self.clock else sample
 
     def _if_now(self, sample: ControlSample, integrals: list[ca.SX], part: dict[str, list[ca.SX]]) -> ControlSample:
-        """The sample, or what there was before where none is taken now."""
+        """The sample, or the previous values if none is taken now."""
         now, clock = self.clock.after(part["clock"]) if self.clock else (True, [])
 
         def chosen(new: list[ca.SX], old: list[ca.SX]) -> list[ca.SX]:
@@ -479,7 +479,7 @@ class Sampled(Scheme, Decided):
 
     @staticmethod
     def _inputs(loop: Stepped, counter: ca.SX, step: float, seen: ca.SX, ahead: int) -> Values:
-        """Values of the signals of one sample, the next expected so many steps ahead."""
+        """Values of the signals of one sample; the next sample is expected after `ahead` steps."""
         now, later = loop.reference(counter * step), loop.reference((counter + ahead) * step)
         return {
             discrete_law.slip: seen[0],

@@ -20,17 +20,17 @@ from quakedesign.loop.schemes.implicit import backward_euler, end_rate, inclusio
 _LIMIT = sp.symbols("asked slip reference width per_slip resolution least largest fastest highest last", real=True)
 _CUT = cut_off(_LIMIT[0], _LIMIT[9:], *_LIMIT[1:6], within=_LIMIT[6:9])
 _NUMBERS = ("rest_width", "rest_per_slip", "rest_resolution", "rest_least", "rest_largest", "rest_fastest")
-_WIDEST = 1e30  # Pa, of no limit
+_WIDEST = 1e30  # Pa; stands for no limit
 
 
 @dataclass(frozen=True, kw_only=True)
 class Compensated(Sampled):
     """Implicit step for e2' = B0(p + d) with d estimated from the last sample, in place of the integral states.
 
-    The estimate is d ← (1 − a)d + a[(e2 − e2⁻)/(T_sB0) − p⁻], where p⁻ is the pressure that was held, less the
-    feed-forward, and the step is that of `Implicit` with ξ = 0; the pressure is its solution minus d: `answered` and
-    `followed` of `quakedesign.loop`, which guarantees use as well. What certificates of continuous time say about the
-    law does not carry over to this scheme. Near the origin, where it ends at e1⁺ = 0, the loop is linear and stable for
+    The estimate is d ← (1 − a)d + a[(e2 − e2⁻)/(T_sB0) − p⁻], where p⁻ is the held pressure minus the feed-forward.
+    The step is that of `Implicit` with ξ = 0; the pressure is its solution minus d: `answered` and `followed` of
+    `quakedesign.loop`, which guarantees use as well. Certificates in continuous time do not cover
+    this scheme. Near the origin, where the step ends at e1⁺ = 0, the loop is linear and stable for
     4a/((a + 1)(a + 2)) < β/β0 < 4/(a + 2): since friction lets β vary by a factor of 1.425 on faults of the paper, the
     weight 1 chatters where β0 is the smallest β. Noise of the slip rate reaches the estimate with the gain a/(T_sβ0).
 
@@ -39,15 +39,15 @@ class Compensated(Sampled):
     weight : float
         a [-], in (0, 1].
     rest_width : float, optional
-        Of `RestLimit` [Pa]; no limit by default.
+        Width of `RestLimit` [Pa]; no limit by default.
     rest_per_slip, rest_resolution : float
-        Of the same [Pa/m], [m].
+        Fields of `RestLimit` [Pa/m], [m].
     rest_least, rest_largest : float, optional
-        Of the same [Pa].
+        Fields of `RestLimit` [Pa].
     rest_fastest : float
-        Of the same [m].
+        Field of `RestLimit` [m].
     substeps, actuator, measurement, authority
-        As in `Sampled`; B0 is the geometric middle of the box by default, so that β/β0 is as far from both limits.
+        As in `Sampled`; B0 is by default the geometric mean over the box, so that β/β0 is equally far from both limits.
     """
 
     name: ClassVar[str] = "compensated"
@@ -71,7 +71,7 @@ class Compensated(Sampled):
 
     @staticmethod
     def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
-        """Pull [m/s] and feed-forward [Pa] of the law with ξ = 0 at every sample, and ∂p/∂ξ where there is one ξ."""
+        """Pull [m/s] and feed-forward [Pa] of the law with ξ = 0 at every sample, and ∂p/∂ξ of a single ξ."""
         none = dict.fromkeys(law.integrals, sp.Integer(0))
         pull, feed_forward, *_ = backward_euler(law)
         slope = slope_of(law.pressure, law.integrals[0]) if len(law.integrals) == 1 else sp.Integer(0)
@@ -79,7 +79,7 @@ class Compensated(Sampled):
 
     @property
     def starts(self) -> tuple[float, ...]:
-        """See `Sampled.starts`: whether a sample has been taken, e2⁻, the feed-forward then, d, weight and limit."""
+        """See `Sampled.starts`: whether a sample has been taken, e2⁻, the last feed-forward, d, weight and limit."""
         width = _WIDEST if self.rest_width is None else float(self.rest_width)
         least = -_WIDEST if self.rest_least is None else float(self.rest_least)
         largest = _WIDEST if self.rest_largest is None else float(self.rest_largest)
@@ -87,7 +87,7 @@ class Compensated(Sampled):
         return 0.0, 0.0, 0.0, 0.0, float(self.weight), *limit, 0.0, 0.0
 
     def nominal(self, loop: Stepped) -> float:
-        """See `Sampled.nominal`: here √(smallest · largest)."""
+        """See `Sampled.nominal`: √(smallest · largest) here."""
         return math.sqrt(math.prod(loop.fault.authority_range))
 
     @property
@@ -98,7 +98,7 @@ class Compensated(Sampled):
 
     @classmethod
     def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
-        """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
+        """See `Decided.decide`; a single ξ gets the value equivalent to the estimate, several stay at zero."""
         begun, before, ahead_before, estimate, weight, *limit = own
         pull, feed_forward, slope = expressions
         gain, rate_error = values[discrete_law.step] * values[discrete_law.authority], values[discrete_law.rate_error]

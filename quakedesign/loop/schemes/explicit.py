@@ -15,7 +15,7 @@ from quakedesign.loop.schemes.base import Decision, Motion, Sampled, Scheme, Ste
 class Explicit(Sampled):
     """Evaluates the law at the measured state and moves ξ by one forward Euler step.
 
-    A sliding mode chatters then with |e1| ~ T_s³, |e2| ~ T_s², |e3| ~ T_s (Levant 1993, Int. J. Control 58, 1247).
+    A sliding mode then chatters with |e1| ~ T_s³, |e2| ~ T_s², |e3| ~ T_s (Levant 1993, Int. J. Control 58, 1247).
     """
 
     name: ClassVar[str] = "explicit"
@@ -36,17 +36,17 @@ class Explicit(Sampled):
 class Continuous(Scheme):
     """Evaluates the law in every Runge–Kutta stage and integrates ξ with the plant, as the paper's runs do.
 
-    It hides what a sampled controller would do (ERRATA 22).
+    It hides the effects of sampling (ERRATA 22).
     """
 
     name: ClassVar[str] = "continuous"
 
     def pressure(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
-        """Pressure [Pa] commanded by the law now."""
+        """Pressure [Pa] that the law commands at this instant."""
         return loop.law(state[:2], state[2:], loop.reference(counter * step))[0]
 
     def advance(self, loop: Stepped, method: Any, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
-        """State after one step of the integrator on plant and law together."""
+        """State after one integrator step of plant and law together."""
 
         def motion(plant: Motion, passed: ca.SX, now: ca.SX) -> ca.SX:
             return self._motion(loop, plant, (counter + passed) * step, now)

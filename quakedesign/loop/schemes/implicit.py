@@ -27,18 +27,16 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 #
 #     0 ∈ F(w) = w − e2 − T_s·B0·p(e1 + T_s·w, w, ξ⁺(w)),
 #
-# where every ⌈·⌋⁰ is the set-valued sign. If p never rises with w (`direction` shows it from the structure of the
+# where every ⌈·⌋⁰ is the set-valued sign. If p never increases with w (`direction` shows it from the structure of the
 # expression: sums and non-negative multiples of odd increasing powers of increasing arguments), then F(w) − w is
 # monotone, F is strongly monotone, and there is exactly one solution.
 #
-# - At a jump of a sign, where its argument vanishes, the two ends of F tell on which side the solution lies, or that
-#   it
-#   is there; in that case the selection from [−1, 1] follows from a linear equation. Thereby all signs are known.
-# - With the signs fixed, w = g(w) with g continuous and not rising. The solution lies between 0 and g(0): for g(0) ≥
-#   0
-#   is 0 − g(0) ≤ 0 and g(0) − g(g(0)) ≥ 0, as g(g(0)) ≤ g(0); likewise with the signs reversed. Cutting this bracket
-#   to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; three points at once keep a processor busier than one does. Where the
-#   solution lies at a jump, that is left out: a loop that is held there by its signs spends most of its time on it.
+# - At a jump of a sign, where its argument vanishes, the two one-sided values of F show on which side the solution
+#   lies, or that it lies at the jump; then a linear equation gives the selection from [−1, 1]. So all signs are known.
+# - With the signs fixed, w = g(w) with g continuous and non-increasing. The solution lies between 0 and g(0): for
+#   g(0) ≥ 0, 0 − g(0) ≤ 0 and g(0) − g(g(0)) ≥ 0, as g(g(0)) ≤ g(0); likewise with the signs reversed. Reducing this
+#   bracket to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; evaluating three points at once uses a processor better than one.
+#   At a jump this search is skipped: a loop that its signs hold there would spend most of its time on it.
 
 ROUNDS = 27
 AT_ONCE = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
@@ -48,7 +46,7 @@ InclusionValues = dict[sp.Symbol, ca.SX]
 
 
 def direction(expression: sp.Expr) -> int | None:
-    """1, 0 or −1 where an expression never falls, never changes or never rises with the end of the step; else None."""
+    """1, 0 or −1 if an expression never falls, never changes or never rises with the end of the step; else None."""
     if not expression.free_symbols & {end_slip, end_rate}:
         return 0
     if expression in (end_slip, end_rate):
@@ -79,9 +77,9 @@ class Inclusion:
     Attributes
     ----------
     free : Expr
-        e2 [m/s]; whatever does not change with the end of the step.
+        e2 [m/s], the part that does not depend on the end of the step.
     pull : Expr
-        T_s·B0·p [m/s], which never rises with the end of the step.
+        T_s·B0·p [m/s], which never increases with the end of the step.
     slip_error, step : Symbol
         e1 [m], T_s [s].
 
@@ -107,13 +105,13 @@ class Inclusion:
 
     @cached_property
     def arguments(self) -> tuple[sp.Expr, ...]:
-        """Arguments of the signs, each rising with the end of the step."""
+        """Arguments of the signs, each increasing with the end of the step."""
         signs = (atom for atom in self.pull.atoms(SignedPower) if atom.args[1] == 0)
         return tuple(sorted({_rising(atom.args[0])[0] for atom in signs}, key=sp.default_sort_key))
 
     @cached_property
     def signs(self) -> tuple[sp.Symbol, ...]:
-        """Symbol of every sign's selection from [−1, 1]."""
+        """Symbols of the selections of the signs from [−1, 1]."""
         return tuple(sp.Symbol(f"sign_{i}", real=True) for i in range(len(self.arguments)))
 
     def selected(self, expression: sp.Expr) -> sp.Expr:
@@ -144,7 +142,7 @@ class Inclusion:
         return inputs | reduce(lambda other, case: _choose(case[0], case[1], other), reversed(there), smooth)
 
     def _jump(self, argument: sp.Expr, inputs: InclusionValues) -> InclusionValues:
-        """Ends of the step at which an argument vanishes."""
+        """End of the step at which an argument vanishes."""
         if argument == end_slip:
             return {end_slip: 0.0 * inputs[self.slip_error], end_rate: -inputs[self.slip_error] / inputs[self.step]}
         if argument == end_rate:
@@ -155,7 +153,7 @@ class Inclusion:
         return self._ends(inputs, self._quarter(-argument, inputs, -bound))
 
     def _linear(self, argument: sp.Expr) -> sp.Expr:
-        """Slope that an argument has at least: that of its linear part."""
+        """Lower bound of the slope of an argument: the slope of its linear part."""
         part = argument.subs(end_slip, self.slip_error + self.step * end_rate)
         slope = sp.expand_mul(part).coeff(end_rate)
         if argument not in (end_slip, end_rate) and not slope.is_positive:
@@ -166,7 +164,7 @@ class Inclusion:
         return slope
 
     def _signs(self, jumps: list[InclusionValues], number: int, own: ca.SX | float) -> InclusionValues:
-        """Selections at a jump; those whose jumps coincide with it go along."""
+        """Selections at a jump; signs with a coincident jump get the same selection."""
         here = jumps[number][end_rate]
         ways = [ca.sign(here - point[end_rate]) for point in jumps]
         signs = [own if i == number else ca.if_else(way == 0, own, way) for i, way in enumerate(ways)]
@@ -179,7 +177,7 @@ class Inclusion:
         return to_casadi([excess], inputs | jumps[number] | self._signs(jumps, number, side))[0]
 
     def _smooth(self, inputs: InclusionValues, needed: ca.SX) -> InclusionValues:
-        """Solution with all signs fixed; where it is not needed, any number."""
+        """Solution with all signs fixed; any number where it is not needed."""
         target = self.free + self.selected(self.pull)
         moved = (end_slip, self.slip_error + self.step * end_rate)
         straight = sp.Poly(sp.expand(target.subs(*moved)), end_rate) if _is_straight(target) else None
@@ -194,7 +192,7 @@ class Inclusion:
         return self._quarter(target - end_rate, inputs, self._value(target, inputs, 0.0))
 
     def _quarter(self, falling: sp.Expr, inputs: InclusionValues, width: ca.SX) -> ca.SX:
-        """Zero of a falling function of the end of the step, between 0 and `width`."""
+        """Zero of a decreasing function of the end of the step, between 0 and `width`."""
         test, inputs = _sign_only(falling), self._used(falling, inputs)
         before = ca.SX.sym("before", 2 + len(inputs))
         low, length, *values = ca.vertsplit(before)
@@ -208,7 +206,7 @@ class Inclusion:
         return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
 
     def _used(self, expression: sp.Expr, inputs: InclusionValues) -> InclusionValues:
-        """Symbols on which the value of an expression depends; all arguments of a call count."""
+        """Inputs on which an expression depends, only these: a call counts every argument as a dependency."""
         names = expression.free_symbols | {self.slip_error, self.step}
         return {symbol: value for symbol, value in inputs.items() if symbol in names}
 
@@ -231,12 +229,12 @@ def _where(needed: ca.SX, inputs: InclusionValues, solution: Callable[[Inclusion
 
 
 def where_needed(function: ca.Function) -> ca.Function:
-    """CasADi Function (needed, vector) → value of another where it is needed, else 0: a call runs one of two branches.
+    """CasADi Function (needed, vector) → value of `function` if needed, else 0: a call runs only one of two branches.
 
     Parameters
     ----------
     function : casadi.Function
-        Of scalar operations, one vector in and one out; its name is ``solved``.
+        Function of scalar operations, one vector in and one out, named ``solved``.
     """
     vector, needed = ca.SX.sym("given", function.size1_in(0)), ca.MX.sym("needed")
     left_out = ca.Function("left_out", [vector], [ca.SX.zeros(function.size1_out(0))])
@@ -246,7 +244,7 @@ def where_needed(function: ca.Function) -> ca.Function:
 
 
 def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
-    """Argument, or its negative, that rises with the end of the step, freed of its scale; and the sign taken out."""
+    """Argument, or its negative, that increases with the end of the step, without its scale; and the sign taken out."""
     way = direction(argument)
     if not way:
         raise ParameterError(
@@ -258,7 +256,7 @@ def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
 
 
 def _is_straight(expression: sp.Expr) -> bool:
-    """Whether an expression is a polynomial of degree 1 at most in the end of the step."""
+    """Whether an expression is a polynomial of degree at most 1 in the end of the step."""
     return all(
         not atom.free_symbols & {end_slip, end_rate} for atom in expression.atoms(SignedPower, AbsolutePower)
     ) and bool(expression.is_polynomial(end_slip, end_rate))
@@ -275,7 +273,7 @@ def _sign_only(expression: sp.Expr) -> sp.Expr:
 
 
 # ----------------------------------------------------------------------
-# A law at the end of the step, for the double integrator that the controller has in mind.
+# A law at the end of the step, for the double integrator that the controller assumes.
 
 ERRORS = {discrete_law.slip_error: end_slip, discrete_law.rate_error: end_rate}
 AHEAD = {
@@ -287,10 +285,10 @@ AHEAD = {
 def backward_euler(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
     """Pull [m/s], feed-forward [Pa] and ξ⁺ in `end_slip`, `end_rate` and the symbols of `discrete_law`.
 
-    The pull is T_s·B0·p without the feed-forward, which is what the law asks for at zero errors and integral states: it
-    answers to forces of the plant that the double integrator does not have. Slip and slip rate themselves are taken at
-    the end of the step if the pressure then never rises with them, at its start otherwise. Every ξ' has the ξ before it
-    at the end, and the others at the start of the step.
+    The pull is T_s·B0·p without the feed-forward, the pressure at zero errors and integral states: it balances forces
+    of the plant that the double integrator lacks. Slip and slip rate themselves are taken at the end of the step if
+    the pressure then never increases with them, otherwise at its start. Each ξ' uses the preceding ξ at the end of the
+    step, and the others at its start.
     """
     pressure, ends = _at_end(law, ERRORS | AHEAD)
     if direction(pressure) != -1:
@@ -319,7 +317,7 @@ class Implicit(Sampled):
 
     The equation and its solution are those of `inclusion`. There is no chatter: once the solution lies at the jump
     e1⁺ = 0 the pressure is −(e2 + e1/T_s)/(T_s·B0), and a disturbance d [m/s²], which the double integrator does not
-    know, leaves e1 ≈ T_s²d and e2 ≈ T_s²d'. Acary and Brogliato (2010), Syst. Control Lett. 59, 284; Brogliato,
+    model, leaves e1 ≈ T_s²d and e2 ≈ T_s²d'. Acary and Brogliato (2010), Syst. Control Lett. 59, 284; Brogliato,
     Polyakov and Efimov (2020), IEEE Trans. Autom. Control 65, 3707.
     """
 

@@ -38,7 +38,7 @@ class StickSlip(Sampled):
     slip_weight : float
         b [-], in [0, 1].
     rest_slip : float
-        By how much measured slips of a fault at rest may be apart [m], not negative; 0 for exact ones.
+        Largest difference between measured slips of a fault at rest [m], not negative; 0 without noise.
     substeps, actuator, measurement, authority
         As in `Sampled`; B0 is the largest input gain of the box by default.
     """
@@ -70,7 +70,7 @@ class StickSlip(Sampled):
         return float(self.weight), float(self.slip_weight), float(self.rest_slip), *(0.0,) * len(_STATES)
 
     def nominal(self, loop: Stepped) -> float:
-        """See `Sampled.nominal`: here the largest."""
+        """See `Sampled.nominal`: the largest input gain here."""
         return loop.fault.authority_range[1]
 
     @property
@@ -81,7 +81,7 @@ class StickSlip(Sampled):
 
     @classmethod
     def decide(cls, expressions: tuple[sp.Expr, ...], law: DiscreteLaw, values: Values, own: list[ca.SX]) -> Decision:
-        """See `Decided.decide`; one ξ is set to what would stand for the estimate, several are left at zero."""
+        """See `Decided.decide`; a single ξ gets the value equivalent to the estimate, several stay at zero."""
         weight, slip_weight, rest_slip, *states = own
         pull, feed_forward, slope = expressions
         gain, step = values[discrete_law.step] * values[discrete_law.authority], values[discrete_law.step]

@@ -1,4 +1,4 @@
-"""Measurement of the slip for a law: transducer, averaging, differentiator."""
+"""Measurement chain from the true slip to the input of a law: transducer, averaging, differentiator."""
 
 from quakedesign.arguments import attach
 

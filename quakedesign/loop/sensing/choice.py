@@ -24,26 +24,26 @@ from quakedesign.symbolic import plant
 from quakedesign.symbolic.casadi_printer import to_numpy
 
 # ----------------------------------------------------------------------
-# How far the estimates of a differentiator are off, measured against adverse signals.
+# Errors of the estimates of a differentiator, measured with adverse signals.
 #
-# What is proved of the implicit one, from rest, is in `quakedesign.loop.sensing.differentiator`.
+# Proved properties of the implicit one, from rest, are in `quakedesign.loop.sensing.differentiator`.
 
 SAMPLES = 1000
 SETTLED = 400
-STRETCH = 10.0  # δ/T where the noise decides
+STRETCH = 10.0  # δ/T where the noise dominates
 HALF_PERIODS = (1, 2, 3, 5, 8, 13, 30, 100, SAMPLES)
 
 
 def error_scale(differentiator: Differentiator, noise: float) -> float:
-    """δ = max(T, (ε/λ_d)^(1/(n_d+1))) [s], which sets the accuracy, for readings off by ε [m] at most."""
+    """δ = max(T, (ε/λ_d)^(1/(n_d+1))) [s], which sets the accuracy, for measurement errors of at most ε [m]."""
     return float(max(differentiator.step, (noise / differentiator.bound) ** (1 / (differentiator.order + 1))))
 
 
 def worst_errors(differentiator: Differentiator, noise: float = 0.0) -> tuple[float, ...]:
-    """Errors of the estimates of slip [m], slip rate [m/s] … in the settled differentiator, c_i·λ_d·δ^(n_d+1−i).
+    """Errors of the estimates of slip [m], slip rate [m/s] … of the settled differentiator, c_i·λ_d·δ^(n_d+1−i).
 
-    The constants c_i are the largest that were met with |x1^(n_d+1)| = λ_d against a number of adverse signals, and so
-    are lower bounds of the worst ones.
+    The constants c_i are the largest measured with a number of adverse signals with |x1^(n_d+1)| = λ_d, and so are
+    lower bounds of the worst case.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def constants(unit: Differentiator, noisy: bool) -> tuple[float, ...]:
 
 
 def _errors(unit: Differentiator, scale: float) -> "np.ndarray":
-    """Largest settled errors; with a scale above 1 under the noise that has it."""
+    """Largest settled errors; a scale above 1 sets the noise."""
     random = np.random.default_rng(0)
     noise = scale ** (unit.order + 1) if scale > 1 else 0.0
     acceleration, sign = (part.ravel() for part in np.meshgrid(*[np.arange(_kinds(unit))] * 2))
@@ -97,7 +97,7 @@ def _kinds(unit: Differentiator) -> int:
 
 
 def _signs(sample: int, errors: "np.ndarray", random: np.random.Generator) -> "np.ndarray":
-    """One row an adversary: square waves, for and against every error, and chance; one column a run."""
+    """One row an adverse signal: square waves, signs of every error and their opposites, random; one column a run."""
     columns = errors.shape[1]
     waves = [np.full(columns, 1.0 if sample // half % 2 else -1.0) for half in HALF_PERIODS]
     chasing = [way * np.where(error > 0, 1.0, -1.0) for error in errors for way in (1, -1)]
@@ -105,7 +105,7 @@ def _signs(sample: int, errors: "np.ndarray", random: np.random.Generator) -> "n
 
 
 def _moved(derivatives: "np.ndarray", highest: "np.ndarray") -> "np.ndarray":
-    """Derivatives one time unit later, with a constant next one."""
+    """Derivatives one time unit later, with a constant next derivative."""
     whole = [*derivatives, highest]
     after = []
     for i in range(len(derivatives)):
@@ -124,7 +124,7 @@ def _function(unit: Differentiator) -> ca.Function:
 
 
 # ----------------------------------------------------------------------
-# Whether λ_d and the sampling period go together with a law.
+# Joint condition on λ_d, the sampling period and a law.
 #
 # A differentiator of order n_d = 1 needs |x1''| < λ_d, while the errors ε1, ε2 of its estimates, which grow with λ_d,
 # act through the law on x1'' itself. With A the largest |x1''| of the loop with exact states and B the largest input
@@ -132,14 +132,14 @@ def _function(unit: Differentiator) -> ca.Function:
 #
 #     A + B·max |p(e1 + ε1, e2 + ε2) − p(e1, e2)| < λ_d
 #
-# is self-consistent. For signed powers up to 1 the difference is largest astride the origin, at e = −ε/2. The left-
+# is self-consistent. For signed powers up to 1 the difference is largest across the origin, at e = −ε/2. The left-
 # hand side grows with λ_d as ε does for a linear law, so that the sampling period decides, and more slowly for a
-# sliding mode, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and there is
-# none where the pressure is held: x1'' jumps at every sample. The implicit discretisation needs none from rest, and
-# what it then tells a linear law is proved (`quakedesign.loop.sensing.differentiator`).
+# sliding mode, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and with
+# zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs none from rest, and its
+# estimates are then proved for a linear law (`quakedesign.loop.sensing.differentiator`).
 #
-# The condition is what the differentiator asks for: no proof that the loop with estimates is stable, and loops may do
-# without it. It leaves out what lies between slip and differentiator; a mean of N readings lags by (N − 1)T/2 more.
+# The condition is a premise of the differentiator. It does not prove that the loop with estimates is stable, and loops
+# may work without it. It neglects the stages before the differentiator; a mean of N readings lags by (N − 1)T/2 more.
 
 LARGEST_BOUND = 1e12
 _HALVINGS = 60
@@ -153,11 +153,11 @@ class JointCondition:
     ----------
     name : str
     required : float
-        What λ_d must exceed [m/s²], λ_d being what is `certified`; infinite for n_d ≥ 2 [m/s^(n_d+1)].
+        Value [m/s²] that λ_d, the `certified` value, must exceed; infinite for n_d ≥ 2 [m/s^(n_d+1)].
     certified : float
         λ_d.
     ratio : float
-        required/certified, violated from 1 on.
+        required/certified; the premise is violated from 1 on.
     holds : bool
     slip_error, rate_error : float
         Errors of the estimates [m], [m/s].
@@ -172,7 +172,7 @@ class JointCondition:
     rate_error: float
 
     def to_dict(self) -> Json:
-        """JSON-able facts; null stands for infinite."""
+        """JSON-able facts; null means infinite."""
         return {k: None if v == math.inf else v for k, v in asdict(self).items()}
 
 
@@ -189,7 +189,7 @@ def joint_condition(
     acceleration : float
         A, largest |x1''| of the loop with exact states [m/s²].
     noise : float
-        ε, bound of the error of a reading [m]; for normal noise some four standard deviations.
+        ε, bound of the error of a reading [m]; for normal noise about four standard deviations.
 
     Raises
     ------
@@ -215,9 +215,9 @@ def joint_condition(
 def smallest_bound(
     fault: Fault, controller: Controller, differentiator: Differentiator, *, acceleration: float, noise: float = 0.0
 ) -> float | None:
-    """Smallest λ_d [m/s²] with which the condition holds for a differentiator, whose own λ_d is ignored.
+    """Smallest λ_d [m/s²] for which the condition holds; the differentiator's own λ_d is ignored.
 
-    None where there is none up to 1e12: the sampling period is too long for the law. For the parameters see
+    None if no λ_d up to 1e12 satisfies it: the sampling period is too long for the law. For the parameters see
     `joint_condition`.
 
     Raises
@@ -245,7 +245,7 @@ def smallest_bound(
 
 
 def pressure_swing(controller: Controller, slip_error: float, rate_error: float) -> float:
-    """Largest difference [Pa] of a law's pressures astride its origin, at ±(ε1, ε2)/2 and ±(ε1, −ε2)/2."""
+    """Largest pressure difference [Pa] of a law across the origin, between ±(ε1, ε2)/2 and between ±(ε1, −ε2)/2."""
     return max(
         abs(_pressure(controller, a / 2, b / 2) - _pressure(controller, -a / 2, -b / 2))
         for a, b in ((slip_error, rate_error), (slip_error, -rate_error))

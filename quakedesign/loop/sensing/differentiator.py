@@ -34,21 +34,17 @@ from quakedesign.loop.sensing.measurement import Entries, Sensor, SlipStage
 #
 # - ``euler``: forward Euler.
 # - ``homogeneous``: forward Euler with the further Taylor terms T²/2·z_(i+2) + … of every z_i; without them z_i
-#   settles
-#   at x^(i) + T/2·x^(i+1), 0 < i < n_d, which is off by the order of T whatever n_d. Livne and Levant (2014),
-#   Automatica
-#   50, 2040; Levant and Livne (2020), European Journal of Control 55, 33.
-# - ``implicit``: backward Euler with the latest reading. All y_j⁺ follow from s⁺, and for s⁺ they leave
-#   s⁺ + Σ_j T^j λ̃_(N−j) λ_d^(j/N) ⌈s⁺⌋^((N−j)/N) ∋ b with a known b. The left-hand side rises, so the solution is
+#   settles at x^(i) + T/2·x^(i+1), 0 < i < n_d, an error of the order of T for every n_d. Livne and Levant (2014),
+#   Automatica 50, 2040; Levant and Livne (2020), European Journal of Control 55, 33.
+# - ``implicit``: backward Euler with the latest reading. All y_j⁺ follow from s⁺. Eliminating them leaves
+#   s⁺ + Σ_j T^j λ̃_(N−j) λ_d^(j/N) ⌈s⁺⌋^((N−j)/N) ∋ b with a known b. The left-hand side increases, so the solution is
 #   unique and has the sign of b. With |s⁺| = λ_d·(qT)^N it is the root q ≥ 0 of the polynomial
 #   q^N + Σ_j λ̃_(N−j) q^(N−j) = |b|/(λ_d·T^N) if the right-hand side exceeds λ̃_0, and s⁺ = 0 otherwise. The
-#   polynomial is
-#   convex and rises for q > 0, so that Newton's method falls monotonically from any bound above the root.
-#   Mojallizadeh,
-#   Brogliato and Acary (2021), Int. J. Robust Nonlinear Control 31, 7679.
+#   polynomial is convex and increasing for q > 0, so that Newton's method decreases monotonically from any bound above
+#   the root. Mojallizadeh, Brogliato and Acary (2021), Int. J. Robust Nonlinear Control 31, 7679.
 #
-# In the implicit sliding mode z_i = ∇^i x/T^i, which lags: the i-th derivative is (−ln(1 − ∇))^i x/T^i, and the terms
-# of that up to ∇^nd x are a combination of z_i … z_nd. `lag_free` has its coefficients i!/j!·|S1(j, i)|; with them the
+# In the implicit sliding mode z_i = ∇^i x/T^i, which lags: the i-th derivative is (−ln(1 − ∇))^i x/T^i, whose terms up
+# to ∇^nd x are a combination of z_i … z_nd. `lag_free` has its coefficients i!/j!·|S1(j, i)|; with them the
 # estimates have the accuracy T^(nd+1−i) of the continuous differentiator. For n_f = 0 this is the proper implicit
 # discretisation of Seeber (2024), arXiv:2404.02770.
 
@@ -102,7 +98,7 @@ def _solve(target: ca.SX, table: Sequence[float]) -> tuple[ca.SX, ca.SX]:
     """q of the polynomial, and the selection of |⌈s⁺⌋⁰| from [0, 1]."""
     size, (jump, *rest) = len(table), table
     excess = ca.fmax(target - jump, 0)
-    rising = [*rest, 1.0]  # of q, q² … q^N
+    rising = [*rest, 1.0]  # coefficients of q, q² … q^N
     root = _root(excess, size)
     for power, weight in enumerate(rest, start=1):
         root = ca.fmin(root, _root(excess / weight, power))
@@ -117,7 +113,7 @@ def _solve(target: ca.SX, table: Sequence[float]) -> tuple[ca.SX, ca.SX]:
 
 
 def _root(value: ca.SX, degree: int) -> ca.SX:
-    """Root of a number that is not negative; square roots are correctly rounded."""
+    """Root of a non-negative number; square roots are correctly rounded."""
     return value if degree == 1 else ca.sqrt(value) if degree == 2 else value ** (1.0 / degree)
 
 
@@ -181,10 +177,10 @@ DISCRETISATIONS = ("euler", "homogeneous", "implicit")
 class Differentiator:
     """Estimates slip and its first n_d derivatives exactly once |x1^(n_d+1)| ≤ L_d < λ_d, and filters with order n_f.
 
-    With a reading off by ε at most, sampled every T, the estimate of derivative i is off by a multiple of
-    λ_d·δ^(n_d+1−i), δ = max(T, (ε/λ_d)^(1/(n_d+1))); ``euler`` has this for n_d = 1 only. Levant and Livne (2020),
-    European Journal of Control 55, 33. The paper takes n_d = n_f = 2, for which a sliding mode has no λ_d; n_d = 1 has
-    (ERRATA 21). See `quakedesign.loop.sensing.differentiator` for the equations.
+    With measurement errors of at most ε and sampling period T, the error of the estimate of derivative i is a multiple
+    of λ_d·δ^(n_d+1−i), δ = max(T, (ε/λ_d)^(1/(n_d+1))); for ``euler`` with n_d = 1 only. Levant and Livne (2020),
+    European Journal of Control 55, 33. The paper takes n_d = n_f = 2, for which no λ_d works in a sliding mode; for
+    n_d = 1 one does (ERRATA 21). See `quakedesign.loop.sensing.differentiator` for the equations.
 
     Attributes
     ----------
@@ -199,7 +195,7 @@ class Differentiator:
     discretisation : str
         ``"euler"``, ``"homogeneous"`` (both estimate from earlier readings), or ``"implicit"`` (with the latest too).
     inner_steps : int
-        n, at least 1: so many steps of T/n per reading, which is held in between.
+        n, at least 1: number of steps of T/n per reading, with the reading held constant.
     """
 
     bound: float
@@ -243,7 +239,7 @@ class Differentiator:
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """T/n, the N gains of such a step, and for an implicit one λ_d·(T/n)^N."""
+        """T/n, the N gains of an inner step, and λ_d·(T/n)^N for an implicit one."""
         size, step, bound = self.size, self.step / self.inner_steps, self.bound
         places = range(1, size + 1)
         if self.discretisation == "implicit":
@@ -288,15 +284,15 @@ def _without_lag(derivatives: Entries, step: ca.SX) -> Entries:
 
 
 # ----------------------------------------------------------------------
-# A law that is told estimates: p(x̂1, x̂2).
+# Output feedback: a law of estimates, p(x̂1, x̂2).
 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class OutputFeedback(Sensor):
-    """Slip through a row of stages into a differentiator, which estimates slip and slip rate.
+    """Slip through a chain of stages into a differentiator, which estimates slip and slip rate.
 
-    Nothing guarantees that a loop which is stable with exact states is stable with estimates (no separation
-    principle); `joint_condition` says when the differentiator can follow.
+    A loop that is stable with exact states may be unstable with estimates (no separation principle);
+    `joint_condition` is a sufficient condition for the differentiator to converge.
 
     Attributes
     ----------
@@ -307,7 +303,7 @@ class OutputFeedback(Sensor):
     Raises
     ------
     ParameterError
-        For anything but stages, or hardware behind software.
+        For an entry that is no stage, or hardware after software.
     """
 
     differentiator: Differentiator
@@ -362,30 +358,29 @@ def _next(entries: Iterator[ca.SX], count: int) -> Entries:
 
 
 # ----------------------------------------------------------------------
-# What the implicit differentiator is, from rest, with a bound λ_d that is large enough: differences of readings.
+# The implicit differentiator from rest, with a sufficiently large bound λ_d, is a filter of backward differences.
 #
-# With y = (w_1 … w_nf, z_0 … z_nd) as in `quakedesign.loop.sensing.differentiator`, let before a reading x be w = 0,
-# z_0 = x1 the reading before, and z_i = ∇ⁱx1/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is −T^nf·∇^(nd+1)x,
-# and where |∇^(nd+1)x| ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from z_i⁺ = z_i +
-# T·z_(i+1)⁺, z_(i+1)⁺ = ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the differentiator is this
-# filter for all t and any n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and a law
-# with its estimates is a law of the slip alone, whose guarantee counts all of its errors.
+# With y = (w_1 … w_nf, z_0 … z_nd) as in the first chapter, let w = 0 before a reading x, let
+# z_0 = x1 be the previous reading, and z_i = ∇ⁱx1/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is
+# −T^nf·∇^(nd+1)x, and if |∇^(nd+1)x| ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from
+# z_i⁺ = z_i + T·z_(i+1)⁺, z_(i+1)⁺ = ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the differentiator
+# is this filter for all t and any n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and
+# a law with its estimates is a law of the slip alone, whose guarantee includes all errors of the estimates.
 #
-# With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: x1‴, which does not exist where the pressure
-# is held, need not be bounded. ∇²x1 is the integral of x1″ with a triangle over two periods, so that c is the area of
-# ∇^(nd−1) of triangles, in size: straight lines between binomials of either sign, c = 1 for n_d = 1 and 3/2 for n_d =
-# 2.
+# With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: no bound of x1‴ is needed, which does not
+# exist with zero-order hold. ∇²x1 is the integral of x1″ weighted by a triangle over two periods, so that c is the area
+# of |∇^(nd−1) of triangles|: straight lines between binomials of either sign, c = 1 for n_d = 1, 3/2 for n_d = 2.
 
 ORDER = 2  # n_d as printed
 
 
 def names_before(order: int = ORDER) -> tuple[str, ...]:
-    """States that hold the readings before."""
+    """Names of the states that store previous readings."""
     return tuple(f"reading_{i}" for i in range(1, order + 1))
 
 
 def rate_shares(order: int = ORDER) -> tuple[Fraction, ...]:
-    """Shares of the reading now, of the one before, and so on in T times the measured slip rate."""
+    """Weights of the latest reading, the previous one, and so on in T times the estimated slip rate."""
     return tuple(
         sum((Fraction((-1) ** back * comb(j, back), j) for j in range(1, order + 1)), Fraction(0))
         for back in range(order + 1)
@@ -393,7 +388,7 @@ def rate_shares(order: int = ORDER) -> tuple[Fraction, ...]:
 
 
 def by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> LinearLaw:
-    """Law of the slip alone, equal to a law of slip and slip rate with differences of slips every T_s [s] as rate."""
+    """Law of the slip alone: a law of slip and slip rate with the rate estimated by differences every T_s [s]."""
     now, *before = (share / step for share in rate_shares(order))
     zero, names = Fraction(0), names_before(order)
 
@@ -418,7 +413,7 @@ def by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> Linear
 
 
 def least_bound(acceleration: Fraction, noise: Fraction, step: Fraction, order: int = ORDER) -> Fraction:
-    """λ_d [m/s^(n_d+1)] from which on it is, for |x1″| [m/s²] and readings within noise [m], every T_s [s]."""
+    """Smallest λ_d [m/s^(n_d+1)] for this filter, for a bound of |x1″| [m/s²], noise within a bound [m] and T_s [s]."""
     least = min(Fraction(str(table[0])) for table in TABLES)
     corners = [0, *(comb(order - 1, j) for j in range(order)), 0]
     area = sum((Fraction(p**2 + q**2, 2 * (p + q)) for p, q in pairwise(corners)), Fraction(0))

@@ -15,34 +15,34 @@ Entries = list["ca.SX"]
 """Numbers or memory of an element of the loop, in the vector that the compiled loop carries along."""
 
 # ----------------------------------------------------------------------
-# What every sensor, and every element of one, offers.
+# Interface of sensors and of their elements.
 
-_SAME = 1e-12  # relative difference of two sampling periods that are meant to be one
+_SAME = 1e-12  # largest relative difference of two sampling periods that count as equal
 
 
 class Sensor(ABC):
-    """From the true slip and slip rate to those that a law is told, once per sample.
+    """Map from the true slip and slip rate to the measured ones, once per sample.
 
-    Its numbers and its memory are entries of the vector that the compiled loop carries along; `measure` works on CasADi
-    SX. Unless it says otherwise it is one that estimates both from the slip.
+    Its numbers and its memory are entries of the state vector of the compiled loop; `measure` works on CasADi SX. By
+    default a sensor estimates both from the slip.
 
     Attributes
     ----------
     of_slip_alone : bool
-        Whether it does without the slip rate.
+        Whether it needs no slip rate.
     """
 
     of_slip_alone: ClassVar[bool] = True
 
     @property
     def noisy(self) -> bool:
-        """Whether the measurement differs from true slip and slip rate."""
+        """Whether measured slip or slip rate differ from the true ones."""
         return True
 
     @property
     @abstractmethod
     def step(self) -> float | None:
-        """Sampling period [s] that it was made for; None for any."""
+        """Sampling period [s] of the sensor; None for any."""
 
     @property
     @abstractmethod
@@ -56,20 +56,20 @@ class Sensor(ABC):
 
     @abstractmethod
     def measure(self, numbers: Entries, memory: Entries, x: "ca.SX") -> tuple["ca.SX", Entries]:
-        """Measured slip [m] and slip rate [m/s], and the memory afterwards, at the true state x."""
+        """Measured slip [m] and slip rate [m/s] at the true state x, and the memory afterwards."""
 
     @property
     @abstractmethod
     def software(self) -> "Sensor":
-        """The part that runs on the controller, without what the hardware does to the signal."""
+        """The part that runs on the controller, without the stages in hardware."""
 
     @property
     def size(self) -> int:
-        """Number of entries of the memory; the state of the noise generator, seeded, is among them."""
+        """Number of entries of the memory, including the state of the seeded noise generator."""
         return len(self.start)
 
     def require_step(self, step: float) -> None:
-        """Refuse a sampling period [s] other than the sensor's."""
+        """Reject a sampling period [s] other than the sensor's."""
         if self.step is not None and abs(step - self.step) > _SAME * self.step:
             raise ParameterError(
                 f"the sampling period must be that of the sensor, {self.step:.6g} s. Received {step:.6g} s. "
@@ -93,7 +93,7 @@ class SlipStage(ABC):
     Attributes
     ----------
     hardware : bool
-        Whether it belongs to the instrument, not to the program of the controller.
+        Whether it is part of the instrument, not of the controller program.
     """
 
     hardware: ClassVar[bool]
@@ -109,14 +109,14 @@ class SlipStage(ABC):
 
     @abstractmethod
     def pass_on(self, numbers: Entries, memory: Entries, slip: "ca.SX") -> tuple["ca.SX", Entries]:
-        """Slip [m] (SX) that leaves the element, and the memory afterwards."""
+        """Slip [m] (SX) at the output of the element, and the memory afterwards."""
 
 
 # ----------------------------------------------------------------------
-# What a controller sees of the fault.
+# Measured slip and slip rate.
 
 # Multiplicative congruential generators of L'Ecuyer (1988), Commun. ACM 31, 742, combined as there: every product is a
-# whole number below 2^53, so that floating point carries them out exactly, in machine code as elsewhere.
+# whole number below 2^53, so that floating-point arithmetic is exact, in machine code and in Python.
 _FACTORS = (40014, 40692)
 _MODULI = (2147483563, 2147483399)
 
@@ -128,11 +128,11 @@ class Measurement(Sensor):
     Attributes
     ----------
     slip_noise, rate_noise : float
-        Standard deviations of normal noise, or bounds of noise that is anything within them [m], [m/s], not negative.
+        Standard deviations of normal noise, or bounds of uniform noise [m], [m/s], not negative.
     seed : int
-        Of the noise, not negative.
+        Seed of the noise, not negative.
     bounded : bool
-        Whether the noise is uniform within bounds, as a guarantee has them, instead of normal.
+        Whether the noise is uniform within bounds, such as those of a guarantee, instead of normal.
     """
 
     of_slip_alone: ClassVar[bool] = False
@@ -153,11 +153,11 @@ class Measurement(Sensor):
 
     @property
     def step(self) -> None:
-        """Any."""
+        """None: any sampling period."""
 
     @property
     def software(self) -> "Measurement":
-        """None: all of its noise is that of instruments."""
+        """None: all noise is that of the instruments."""
         return EXACT
 
     @property
@@ -187,7 +187,7 @@ EXACT = Measurement()
 
 
 def generator(seed: int) -> tuple[float, ...]:
-    """State of a generator of random numbers, from a seed."""
+    """State of a random-number generator from a seed."""
     import numpy as np
 
     words = np.random.SeedSequence(seed).generate_state(len(_MODULI))
@@ -195,7 +195,7 @@ def generator(seed: int) -> tuple[float, ...]:
 
 
 def _normal(memory: Entries) -> tuple[Entries, "ca.SX"]:
-    """State of the generator after two steps, and a number of the standard normal distribution."""
+    """State of the generator after two steps, and a standard normal number."""
     import casadi as ca
 
     memory, radius = uniform(memory)
@@ -215,20 +215,20 @@ def uniform(memory: Entries) -> tuple[Entries, "ca.SX"]:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Transducer(SlipStage):
-    """Slip behind a low-pass filter of first order, plus independent normal noise at every sample, then rounded.
+    """Slip after a first-order low-pass filter, plus independent normal noise at every sample, then rounded.
 
-    The filter is followed exactly for a slip that is held over the sample, y ← y + (1 − e^(−2πf_bT_s))(x − y).
+    The filter is exact for a slip that is constant over the sample, y ← y + (1 − e^(−2πf_bT_s))(x − y).
 
     Attributes
     ----------
     deviation : float
         Standard deviation of the noise [m]; 0 for none.
     bandwidth : float
-        f_b, at which the amplitude falls to 1/√2 [Hz]; infinite for a transducer that follows at once.
+        f_b, at which the amplitude falls to 1/√2 [Hz]; infinite for a transducer without lag.
     quantum : float
-        q, of which a reading is the nearest multiple, halves upward [m]; 0 for a reading as it is.
+        Resolution q [m]: a reading is rounded to the nearest multiple of it, halves upward; 0 for no rounding.
     seed : int
-        Of the noise, not negative.
+        Seed of the noise, not negative.
     """
 
     hardware: ClassVar[bool] = True
@@ -246,11 +246,11 @@ class Transducer(SlipStage):
 
     @property
     def start(self) -> tuple[float, ...]:
-        """Filtered slip [m], if filtered, and the generator of the noise, if there is any."""
+        """Filtered slip [m], if filtered, and the state of the noise generator, if noisy."""
         return ((0.0,) if self._filtered else ()) + self._noise.start
 
     def numbers(self, step: float) -> tuple[float, ...]:
-        """Share of the difference that the filter closes in one sample [-]; deviations and quantum [m]."""
+        """Filter factor 1 − e^(−2πf_bT_s) [-]; standard deviation and quantum [m]."""
         share = (-math.expm1(-2 * math.pi * self.bandwidth * step),) if self._filtered else ()
         return (*share, *self._noise.numbers, *((float(self.quantum),) if self.quantum else ()))
 
@@ -278,7 +278,7 @@ class Transducer(SlipStage):
 
 
 # ----------------------------------------------------------------------
-# Mean of the last readings.
+# Mean of the latest readings.
 
 MOST_SAMPLES = 1000
 
@@ -313,6 +313,6 @@ class Averaging(SlipStage):
         return ()
 
     def pass_on(self, numbers: Entries, memory: Entries, slip: "ca.SX") -> tuple["ca.SX", Entries]:
-        """See `SlipStage.pass_on`. A running sum would be cheaper, and would gather rounding errors for hours."""
+        """See `SlipStage.pass_on`. A running sum would be cheaper, but would accumulate rounding errors over hours."""
         readings = [*memory, slip]
         return sum(readings[1:], start=readings[0]) / self.samples, readings[1:]

@@ -139,7 +139,7 @@ def test_the_command_says_from_where(capsys, monkeypatch):
     assert (code, found["verdict"]) == (0, "proved")
     assert (found["initial_slip"], found["initial_slip_rate"]) == ("1/100000", "1/25000")
     assert found["sentence"].startswith(
-        "on the plant without stick, from every initial state within 1e-05 m and 4e-05 m/s of rest, with zero-order hold over "
+        "on the plant without stick, from every initial state within 1e-05 m and 4e-05 m/s of rest, with zero-order "
     )
 
 
