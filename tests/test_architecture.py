@@ -453,7 +453,7 @@ BUDGETS = {
     "symbolic": 3135,
     "sos": 6326,
     "laws": 3105,
-    "loop": 4181,
+    "loop": 4169,
     "plant": 1445,
     "guarantees": 13243,
     "lyapunov": 6956,
