@@ -11,7 +11,7 @@ from quakedesign.linear.linear_problem import FeedbackLoop, Vertex, characterist
 
 
 def slip_limit(loop: FeedbackLoop, rate: Fraction) -> tuple[Fraction, Fraction] | None:
-    """Smallest constant s [1/s²] that destabilises the loop for some constant β, and that β; None if β alone does.
+    """Smallest constant s [1/s²] that destabilises the loop for some constant β, and that β; None if β suffices.
 
     For a constant β the loop is stable if and only if s is below βbk1 − βbk3/(w + βbk2) − (w + βbk2)k4/k3, which is
     convex in β; the value is exact at the β returned, an end of the range or a rational next to the least point.
@@ -107,13 +107,13 @@ def frequency_properties(loop: FeedbackLoop, corner: Vertex) -> FrequencyFacts:
 
 
 def _crossings(feedback: Sequence[float], plant: Sequence[float]) -> dict[str, list[float]]:
-    """All factors on the gain, phases [deg] and scaled delays at which −1 is crossed; none without feedback."""
+    """Gain factors, phases [deg] and scaled delays at which the loop crosses −1; none without feedback."""
     import control
 
     if not any(feedback):
         return {"gain": [], "phase": [], "delay": []}
     above, below = list(feedback), list(plant)
-    while not above[-1] and not below[-1]:  # a gain of an integral is zero: its pole at 0 is not seen
+    while not above[-1] and not below[-1]:  # the gain of an integral is zero: its pole at 0 cancels
         above, below = above[:-1], below[:-1]
     gain, phase, _, _, at_gain, _ = control.stability_margins(control.tf(above, below), returnall=True)
     phases = np.atleast_1d(phase)

@@ -98,9 +98,8 @@ def worst_tracking(claim: TrackingProof | ContinuousProof, *, sticks: bool = Fal
     friction prevents backward slip, and the reference has its largest rate or 1/20 of it. Further trajectories then
     switch after random times, or rest until the reference has made up the proved slip error, then accelerate
     (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact solution, also
-    outside its sector. With jitter each event is as early or as late as possible; with aperiodic sampling each interval
-    is as short or as long as possible. Pressures step at once, and an averaged measurement is that at the midpoint of
-    its interval.
+    outside its sector. With jitter each event is earliest or latest; with aperiodic sampling each interval is shortest
+    or longest. Pressures step at once, and an averaged measurement is that at the midpoint of its interval.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)
