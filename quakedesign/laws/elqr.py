@@ -49,7 +49,7 @@ class ExtendedLQR(Controller):
     # p is limited to them; the excess of p beyond a limit drives the integrals back (back-calculation, Åström and
     # Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
     limits: PressureLimits | None = None
-    offset: Fraction = Fraction(0)  # p for Kx_a = 0 [Pa]: a start without a jump is an offset, since ξ starts at 0
+    offset: Fraction = Fraction(0)  # p for Kx_a = 0 [Pa]: an initial pressure, since ξ = 0 initially
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -198,7 +198,7 @@ class SampledController(Controller):
 
     @property
     def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]
-        """One for every state; the law's own."""
+        """A hyphen for every state of the law, then the units of the limit."""
         return ("-",) * len(self.law.states) + (RestLimit.UNITS if self.rest_limit else ())
 
     def pressure(self, signals: Signals) -> sp.Expr:
@@ -258,7 +258,7 @@ def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Exp
 # Implicit step with an estimate of the disturbance in place of integral states; simulated and proved.
 #
 # Both functions take floats, SymPy and CasADi expressions. The estimate d follows the change of the slip rate over the
-# last period beyond T_s·B0·p, and the pressure drives the slip rate to w, the solution of the implicit step, minus d.
+# last period beyond T_s·B0·p. The pressure is −d plus that which drives the slip rate to the solution w.
 
 _STATES = ("rate_error_before", "push_before", "disturbance")
 

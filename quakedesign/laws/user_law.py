@@ -71,7 +71,7 @@ class SampledLaw(SampledController):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "title", self.label)  # in place of those of the class, as there may be several
+        object.__setattr__(self, "title", self.label)  # replaces that of the class, as instances differ
         object.__setattr__(self, "name", re.sub(r"[^A-Za-z0-9_-]+", "-", self.label).strip("-") or type(self).name)
 
     @classmethod
@@ -396,7 +396,7 @@ def _of_json(content: bytes, path: str | Path) -> dict[str, Any]:
 
 
 def _of_npz(content: bytes, path: str | Path) -> dict[str, Any]:
-    """Arrays of a file, as lists; without pickles, and no larger unpacked than files may be."""
+    """Arrays of a file as lists; rejects pickles, and arrays above the size limit of files."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as folder:
             if sum(entry.file_size for entry in folder.infolist()) > _LARGEST:

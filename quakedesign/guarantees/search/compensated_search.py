@@ -504,7 +504,7 @@ def sorted_terms(terms: tuple[Power, ...]) -> tuple[Power, ...]:
 
 
 def _with_gains(pull: tuple[Power, ...], step: Fraction, authority: Fraction) -> Iterator[SlidingMode]:
-    """Laws that may have an implicit step, with λ = 1 and the divisor B0."""
+    """Candidate laws with a given implicit step, for λ = 1 and the divisor B0."""
     terms: dict[Any, Power] = {term.exponent: term for term in pull}
     root, jump = terms.get(Fraction(1, 3)), terms.get(Fraction(0))
     if root is not None and jump is not None and len(terms) == len(pull) and not isinstance(root.argument, str):
@@ -549,7 +549,7 @@ def _deadbeat(
 def _deadbeat_search(
     task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup
 ) -> list[str]:
-    """The same, as texts."""
+    """Result of `_deadbeat` as texts."""
     seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)

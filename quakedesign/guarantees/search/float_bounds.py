@@ -132,7 +132,7 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
 class _FloatMatrix(np.ndarray):
     """Matrix of floats with the operators and methods of `flint.arb_mat` that the algorithm of `norms` needs."""
 
-    __array_priority__ = 1.0  # so that what is concatenated is one
+    __array_priority__ = 1.0  # for the type of concatenations
 
     @classmethod
     def of(cls, rows: Iterable[Iterable[Fraction]]) -> Any:
@@ -157,7 +157,7 @@ def floats(values: np.ndarray) -> Any:
 
 
 def _slowest(period: Any) -> SlowestMode:
-    """A complex pair, or two modes with nearly equal decay, are not separated but summed until they decay.
+    """Slowest mode; a complex pair, or two modes with nearly equal decay, are summed until they decay instead.
 
     The same applies if all modes decay within a few periods.
     """

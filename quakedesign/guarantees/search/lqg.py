@@ -33,7 +33,7 @@ from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_ra
 # ----------------------------------------------------------------------
 # Laws for a fault with a lag or a diffusion path: gains of a discrete Riccati equation on fault and path.
 
-THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
+THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # parameters of good laws
 BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
 _MOST_STATES = 20  # of a loop
 _WITHOUT_PATH = 6  # e1, e2, π2, d, valve, its last step or the well, of a law without a model of the lag
@@ -115,7 +115,7 @@ def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int)
     size = 2 + lagging + modes
     shares = np.array([float(layer.share(i)) for i in range(modes)])
     rates = np.array([float(layer.rate(i)) for i in range(modes)])
-    flow = np.zeros((size + 1, size + 1))  # the last one is the valve's pressure
+    flow = np.zeros((size + 1, size + 1))  # the last entry is the valve pressure
     well = 2 if lagging else size
     flow[0, 1] = 1
     flow[1, :2] = float(model.slip), -float(model.rate)
@@ -143,7 +143,7 @@ def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int)
 # ----------------------------------------------------------------------
 # Laws with a few dimensionless parameters for one model, T_s and delay, for searches.
 
-_STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
+_STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a of good laws
 _NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
 _GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same for a delayed slip rate
 _OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above the noise level

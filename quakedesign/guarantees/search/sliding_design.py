@@ -395,9 +395,9 @@ class WellReach:
     Attributes
     ----------
     share : Fraction
-        Of the path [-]; 0 where no law was found.
+        Share of the path [-]; 0 if no law was found.
     held : SampledLoop or None
-        The law there.
+        Law for this share.
     numbers : array or None
         Its parameters, near which a search may begin.
     log_rate : Fraction
@@ -411,7 +411,7 @@ class WellReach:
 
 
 def suitable(task: SlidingPlant, step: Fraction) -> Fraction:
-    """T_s [s] if it is within twice D_c/(20 V), or else that."""
+    """T_s [s] if within a factor of 2 of D_c/(20 V), else D_c/(20 V) with two digits."""
     suits = task.ranges["critical_slip"][0] / task.rate / int(AGEINGS)
     return step if suits / _SUITABLE <= step <= _SUITABLE * suits else two_digits(suits)
 
@@ -461,7 +461,7 @@ def _followed_well(
     before: WellReach,
     rates: tuple[Fraction, ...],
 ) -> WellReach:
-    """A law for a share of the path, near the one before, or that one where none is found."""
+    """Law for a share of the path, near the previous one, or the previous one if the search fails."""
     for log_rate in rates:
         held, numbers = searched_sliding(
             task, step, log_rate, shortened(setup, share), near=before.numbers, enough=_ENOUGH, most=_LAWS

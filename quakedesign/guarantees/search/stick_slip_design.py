@@ -98,7 +98,7 @@ def tuned(
     *,
     implicit: bool = False,
 ) -> SampledStickSlip:
-    """Deadbeat feedback for the middle of the damping, with the shares of a tuning.
+    """Deadbeat feedback for the midpoint of the damping, with the shares of a tuning.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ class _Reach:
         return np.stack(runs, axis=2).reshape(len(states), -1, 3)
 
     def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
-        """Ends of the rest map."""
+        """States after the rest map."""
         stop = np.min(
             [float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.plant)], axis=0
         )
@@ -238,7 +238,7 @@ class _Reach:
                 yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True), interval)[possible]
 
     def _sliding(self, start: "_Start", period: Period) -> Iterator[np.ndarray]:
-        """Ends of the sliding map; only the final slip rate is known to be at least 0."""
+        """States after the sliding map; only the final slip rate is constrained to be at least 0."""
         step, amplitude = float(period.interval), float(self.task.amplitude)
         of_slip, of_rate = period.impulses
         times = step - np.linspace(0, step, len(of_slip))
@@ -320,7 +320,7 @@ def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarra
 
 
 # ----------------------------------------------------------------------
-# A polytope around them.
+# Polytope that contains these states.
 
 
 def _rows(periods: list[Period], facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
@@ -423,7 +423,7 @@ class _Images:
 
 @dataclass
 class _Growing:
-    """A polytope {n·z ≤ h} that grows until it holds its images."""
+    """A polytope {n·z ≤ h} that grows until it contains its images."""
 
     task: FaultPlant
     held: SampledStickSlip
@@ -698,7 +698,7 @@ class _Growing:
 
 
 # ----------------------------------------------------------------------
-# From a fault to gains with a proof.
+# Gains with a proof for a fault.
 
 
 def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda what, done: None) -> StickSlipProof | NoProof:

@@ -520,7 +520,7 @@ class _CourseSearch:
         mask = np.zeros(state.shape, dtype=bool)
         if self.back is not None:
             mask[:, 1] = stuck = state[:, 1] < -self.back
-            above = np.maximum(before[:, 1] + self.back, 0)  # slip rate before; it falls to zero, then the fault sticks
+            above = np.maximum(before[:, 1] + self.back, 0)  # slip rate before; it falls to zero, then rest
             moving = above / np.where(stuck, above - state[:, 1] - self.back, 1)
             state[stuck, 0] = (before[:, 0] - length * self.back + length * moving * above / 2)[stuck]
             state[stuck, 1] = -self.back[stuck]
