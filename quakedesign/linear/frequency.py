@@ -11,7 +11,7 @@ from quakedesign.linear.linear_problem import FeedbackLoop, Vertex, characterist
 
 
 def slip_limit(loop: FeedbackLoop, rate: Fraction) -> tuple[Fraction, Fraction] | None:
-    """Smallest constant s [1/s²] that destabilises the loop for some constant β, and that β; None if β suffices.
+    """Smallest constant s [1/s²] that destabilises the loop for some constant β, and that β; None if β alone does.
 
     For a constant β the loop is stable if and only if s is below βbk1 − βbk3/(w + βbk2) − (w + βbk2)k4/k3, which is
     convex in β; the value is exact at the β returned, an end of the range or a rational next to the least point.

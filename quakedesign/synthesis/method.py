@@ -136,7 +136,7 @@ class GainProblem(Generic[Designed]):
     ) -> Designed:
         """Gains with their results; premises of the sampled loop come first.
 
-        The verdict is that on the certificate; for a sampled law that on the sampled loop.
+        The default verdict is that on the certificate, or for a sampled law that on the sampled loop.
         """
         own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
         verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
