@@ -5,9 +5,9 @@ p,
 
     mVe^y·y′ = s − ŝ,    ŝ = N(ay + bz) + HV(e^y − 1) + Kx − μ*q,    x′ = V(f − ω),    z′ = −ρ(f + g),
 
-f = e^y − 1, g = 1 − e^{−z}, ρ = V/D. The first line is the force balance minus that of steady sliding, Nμ* + HV + Kr;
-the last equation is the ageing law. The slip law has z′ = −ρe^y(y + z) instead. All variables are initially 0; a, b, D,
-μ* and σ′ are constants. The slip error is relative to a reference r with r′ = V(1 + ω), |ω| ≤ W < 1 with any time
+f = e^y − 1, g = 1 − e^{−z}, ρ = V/D. The first equation is the force balance minus that of steady sliding, Nμ* + HV +
+Kr; the last equation is the ageing law. The slip law has z′ = −ρe^y(y + z) instead. All variables are initially 0; a,
+b, D, μ* and σ′ are constants. The slip error is relative to a reference r with r′ = V(1 + ω), |ω| ≤ W < 1 with any time
 history, r = Vt for W = 0. r rises from 0 to the distance, and p* = Kr/μ*, so that |p*′| ≤ KV(1 + W)/μ*. Rate and state
 remain relative to V and D/V: V does not follow r′.
 

@@ -14,8 +14,8 @@ is one of the plant without stick under an admissible disturbance, with y ≥ 0.
 block before the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0
 and ξ ≥ 0 at its end, or the *rest* map with a slip D until the last stop.
 
-**Sliding map.** With S0 the middle and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
-linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Before, ξ(t) ≤ (t·y + t²/2·(H −
+**Sliding map.** With S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
+linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
 bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
 **Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, integration by parts gives D = f(0)y + ∫f·(G + φ)dt up to the
@@ -37,7 +37,7 @@ chord. m1 is at most |n3·s|ψ/b larger, which adds |n3·s|ψ/b times ξ ≥ 0. 
 chords by as much as the bβU in that ξ takes off. Where U < 0 replace m1 by the chord of β·m1, over β: all terms with U
 are convex in β. So |n3·s|ψ/b counts with y and H alone.
 
-**Sliding mode.** Its target rate is r′ + w, w the solution of its implicit step. That step is shown to be deadbeat, w =
+**Sliding mode.** The target rate is r′ + w, w the solution of the implicit step. That step is shown to be deadbeat, w =
 −e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
 1/T, whose states stay in the polytope.
 
