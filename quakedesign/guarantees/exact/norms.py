@@ -698,7 +698,7 @@ def _but(column: Any, place: int) -> Any:
 # |x − y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is
 # added to the outputs of the pieces within `early`.
 #
-# **Direct feedthrough.** Direct terms of an input of size 1 add to the gain, for every weight.
+# **Direct feedthrough.** The direct effect of an input of size 1 on an output is added to the gain, for every weight.
 
 _MOST_SUMS = 5 * 10**7  # products for one input: half the limit of the standalone checker
 _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # enlargement of a solution of y + Dx = x
