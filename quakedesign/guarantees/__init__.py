@@ -4,8 +4,8 @@ Reading order: the plant with its ranges (`plant.fault_plant`); its loop with a 
 `exact.sampled_loop`); L1 norms of the nominal loop (`exact.norms`); the theorem (`exact.small_gain`); claims, their
 check and the statement (`exact.tracking_proof`). The stick–slip plant has an invariant polytope instead
 (`exact.stick_slip_set`, `exact.stick_slip_proof`), slow sliding another theorem (`exact.sliding_small_gain`,
-`exact.sliding_proof`). `search` proposes laws and sets; `result` and `*_result` hold what `quakedesign.guarantee`
-returns.
+`exact.sliding_proof`). `search` proposes laws and sets; `result` and `*_result` define the results of
+`quakedesign.guarantee`.
 """
 
 from quakedesign.arguments import attach

@@ -41,9 +41,9 @@ from quakedesign.text import quantity
 
 Tell = Callable[[str, float], None]
 """Of what is being done, and the fraction done [-]."""
-_TRIFLE = Fraction(1)  # stress [Pa] to try where the estimate is 0: a search may find another law
-_SEARCHED = 0.8  # of the work, when a law of a search is proved
-_SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # of an estimate that may be too large
+_TRIFLE = Fraction(1)  # stress [Pa] to try if the estimate is 0: a search may find another law
+_SEARCHED = 0.8  # fraction of the work at which the proof of a designed law begins
+_SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # shares of an estimate that may be too large
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,11 +65,11 @@ class SlidingGuarantee(Guarantee):
 
     @cached_property
     def worst(self) -> WorstCase | None:
-        """Worst case found (lower bound); some tenths of a second for every corner of the box."""
+        """Worst case found (lower bound); takes some tenths of a second for every corner of the box."""
         return worst_sliding(self.proof) if self.proof.proved else None
 
     def lines(self) -> list[str]:
-        """For people."""
+        """Text for users."""
         if self.worst is None:
             return [self.proof.sentence()]
         seen = f"slip error {quantity(self.worst.slip_error, 'm')}, slip rate {exp(self.worst.log_rate or 0):.4g} V"
@@ -105,9 +105,9 @@ def guarantee_sliding(
     spread : Fraction
         Relative uncertainty of a, b and D_c [-].
     tell : callable, optional
-        Called with what is being done and the fraction done [-].
+        Called with the name of the current step and the fraction done [-].
     setup : ExactSetup
-        With a lag or a diffusion path. All pressures of a proof are within the limits of its pump.
+        With a lag or a diffusion path. All proved pressures lie within the limits of its pump.
     """
     box = fault.box
     if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
@@ -241,7 +241,7 @@ def _designed(
     prove: Prove,
     near: np.ndarray | None = None,
 ) -> SlidingGuarantee:
-    """Guarantee of a designed law with |ln(v/V)| ≤ `log_rate`; `near` is a further start."""
+    """Guarantee of a designed law with |ln(v/V)| ≤ `log_rate`; `near` is a further initial law."""
     design = designed_sliding(task, step, log_rate=log_rate, near=near, setup=setup)
     if isinstance(design, NoProof):
         return SlidingGuarantee(proof=design, task=task, held=None)
@@ -250,7 +250,7 @@ def _designed(
 
 
 def _within_pump(pump: Pump | None, proof: SlidingProof | NoProof) -> SlidingProof | NoProof:
-    """A guarantee whose pressures at the valve the pump can hold."""
+    """A guarantee if its valve pressures lie within the pump limits."""
     if pump is None or not proof.proved:
         return proof
     too_much = pump.exceeded(*proof.valve_pressures)

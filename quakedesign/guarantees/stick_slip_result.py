@@ -23,16 +23,16 @@ from quakedesign.text import quantity
 
 @dataclass(frozen=True, kw_only=True)
 class StickSlipGuarantee(Guarantee):
-    """Guarantee of one loop on the stick–slip plant, or why there is none.
+    """Guarantee of one loop on the stick–slip plant, or the reason why there is none.
 
     Attributes
     ----------
     fault : Fault
     proof : StickSlipProof or NoProof
     worst : WorstCase or None
-        Largest values that a search reaches on the same loop: lower bounds of the worst case; None without a guarantee.
+        Worst case found on the same loop (lower bound by falsification); None without a guarantee.
     compensation : Compensation or None
-        Of a sliding mode: its gains, scale and settings in the scheme ``stick-slip``.
+        For a sliding mode: its gains, scale and settings in the scheme ``stick-slip``.
     """
 
     fault: Fault
@@ -45,7 +45,7 @@ class StickSlipGuarantee(Guarantee):
         """Performance limit of the slip rate [m/s] at this T_s; None without a guarantee."""
         if not self.proof.proved:
             return None
-        task = replace(self.proof.task, amplitude=self.proof.disturbance)  # which healing does not enlarge
+        task = replace(self.proof.task, amplitude=self.proof.disturbance)  # healing does not increase this limit
         return smallest_stick_slip_rate(task, self.proof.held.longest)
 
     def limit_lines(self) -> list[str]:
@@ -59,7 +59,7 @@ class StickSlipGuarantee(Guarantee):
         ]
 
     def lines(self) -> list[str]:
-        """For people: the sentence first, then the worst case found and the performance limit."""
+        """Text for users: the sentence first, then the worst case found and the performance limit."""
         if not self.proof.proved:
             return [self.proof.sentence(), "the plant without stick may have a guarantee: use --plant printed"]
         healing = self.proof.covered_healing()
@@ -110,15 +110,15 @@ def guarantee_stick_slip(
     Parameters
     ----------
     fault : Fault
-        Its friction depends on slip and slip rate alone.
+        With friction of slip and slip rate alone.
     setup : LoopSetup
-        Only its sampling time, its longest interval and noise of the slip may be given.
+        With at most the sampling time, the longest interval and the noise of the slip.
     objective : str
         ``tracking`` or ``peak``.
     sliding : SlidingMode, optional
-        Whose base gains count; an e-LQR is designed unless given.
+        Gives the base gains; an e-LQR is designed unless given.
     progress : callable, optional
-        Called with what the search does, and the fraction done [-].
+        Called with the name of the current step and the fraction done [-].
 
     Raises
     ------

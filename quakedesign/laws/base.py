@@ -58,8 +58,8 @@ class Sampling:
     settings : tuple of (str, Fraction)
         Numbers of the scheme by name, in its own units.
     delay, lag, diffusion : Fraction
-        From measurement to valve, time constant of the pump and L²/D of the rock [s] for which it is meant: between law
-        and fault in every run, and in `loop_transfer`, by default.
+        Delay from measurement to valve, time constant of the pump and L²/D of the diffusion path [s] of the design; the
+        default path in every run and in `loop_transfer`.
     longest : Fraction
         Longest sampling interval [s] of aperiodic sampling in `simulate`, T_s the shortest; 0 for periodic sampling.
     """
@@ -74,7 +74,7 @@ class Sampling:
 
     @property
     def path(self) -> dict[str, Any]:
-        """Delay, lag and L²/D [s] between law and fault."""
+        """Delay, lag and L²/D [s] of the path from law to fault."""
         return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
 
     def __str__(self) -> str:
@@ -214,7 +214,7 @@ class Law(ABC):
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
         """Suggest a Filippov equilibrium away from the origin, as ``parameters``, ``point`` and ``weights``.
 
-        The suggestion is to be checked in exact arithmetic; None if the law has none.
+        None if the law has none. The suggestion requires a check in exact arithmetic.
         """
         return None
 
@@ -270,7 +270,7 @@ class Controller(Law):
         return float(self.sampling.step) if self.sampling else None
 
     def other_step(self, fault: Fault) -> str:
-        """Note that a sampled law has another T_s than the fault; empty if both are equal."""
+        """Note that T_s of a sampled law differs from that of the fault; empty if both are equal."""
         if self.sampling_time in (None, fault.sampling_time):
             return ""
         return f"NOT for the fault's T_s = {fault.sampling_time:g} s: it runs once every {self.sampling_time:.4g} s"
@@ -290,7 +290,7 @@ class Controller(Law):
 
     @property
     def scale(self) -> Fraction | None:
-        """Scale λ [-] of the loop; None for a law without."""
+        """Scale λ [-] of the loop; None for a law without a scale."""
         return None
 
     @property
@@ -309,11 +309,11 @@ class Controller(Law):
         return cls.from_values(values)
 
     def scaled(self, scale: str | float | Fraction) -> Self:
-        """Return the same base gains with another λ; raises for a law without."""
+        """Return the same base gains with another λ; raises for a law without a scale."""
         raise ParameterError(f"scale is for sliding modes. Received a scale for {self.name}. Omit the scale.")
 
     def with_divisor(self, divisor: Fraction) -> Self:
-        """Return the same gains with another divisor; raises for a law without."""
+        """Return the same gains with another divisor; raises for a law without a divisor."""
         raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Omit the divisor.")
 
     def with_feedforward(self, feedforward: FeedForward) -> Self:

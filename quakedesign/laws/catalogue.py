@@ -19,7 +19,7 @@ BARE = "custom"
 
 @cache
 def laws() -> dict[str, type[Law]]:
-    """Every law of the package by name, those included that act on other plants than a fault and are only proved."""
+    """Every law of the package by name, including laws for plants other than a fault, which are only proved."""
     classes = discovered(__package__, Law)
     return {name: law for name, law in classes.items() if name not in _OF_MATRICES}
 
@@ -41,7 +41,7 @@ def control_law(name: str | type[Controller]) -> type[Controller]:
 
 
 def model_of(subject: Subject) -> tuple[str, LoopField]:
-    """Name and closed loop of what a claim is about; a bare loop is called ``custom``.
+    """Name and closed loop of the subject of a claim; a bare loop is called ``custom``.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def published(fault_name: str) -> dict[str, Controller]:
     Returns
     -------
     dict of str to Controller
-        By name of the law; gains in the units of the law, divisor that of the laboratory fault.
+        By name of the law; gains in the units of the law, with the divisor of the laboratory fault.
     """
     data = tomllib.loads((files(__package__) / "published.toml").read_text(encoding="utf-8"))
     sets = {name: entry for name, entry in data.items() if isinstance(entry, dict)}

@@ -53,9 +53,9 @@ class DiscontinuousIntegral(SlidingMode):
     def loop_field(cls) -> LoopField:
         """Closed loop with λ = 1 in (f1, e2, e3), where f1 = κ³e1 and κ = √k_I1.
 
-        Then ν = −k_I2⌈⌈e2⌋^{3/2} + f1⌋^⅓ + ξ1 has no root inside, and κ is a factor of f1' = κk_I1e2 alone: V̇ is affine
-        in it, so that an interval around the root is enough. It is so too where k_I4 brings κ into the argument of the
-        sign, of which a cell knows no more than that it is not negative for some κ of the interval.
+        Then ν = −k_I2⌈⌈e2⌋^{3/2} + f1⌋^⅓ + ξ1 contains no root, and κ is a factor of f1' = κk_I1e2 alone: V̇ is affine
+        in κ, so that an interval around the root suffices. This remains true where k_I4 brings κ into the argument of
+        the sign, as a cell uses only that this argument is not negative for some κ of the interval.
         """
         f1, e2, e3, beta, d, root = sp.symbols("f1 e2 e3 beta d kappa", real=True)
         k1, k2, k3, k4 = sp.symbols("kI1 kI2 kI3 kI4", real=True)
@@ -77,5 +77,5 @@ class DiscontinuousIntegral(SlidingMode):
 
     @property
     def lipschitz_limit(self) -> Fraction:
-        """λk_I3: from there on h' can hold off the integral action."""
+        """λk_I3: an |h'| of at least this can cancel the integral action."""
         return self.scale * self.gains["kI3"]

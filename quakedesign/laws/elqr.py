@@ -44,12 +44,12 @@ class ExtendedLQR(Controller):
     integral_units: ClassVar[tuple[str, ...]] = ("m s", "m s^2")
 
     # ``"state"``: k1 and k2 act on x1 and x2, as printed in eq. u. ``"error"``: they act on x1 − r and x2 − r', which
-    # keeps p small and the error of tracking a ramp too (ERRATA 29). The loop about a constant reference is the same.
+    # limits p and the error of tracking a ramp (ERRATA 29). The loop about a constant reference is the same.
     feedback: str = "error"
-    # p is held inside them; the integrals are then driven back by the part that was cut off (back-calculation, Åström
-    # and Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
+    # p is limited to them; the excess of p beyond a limit drives the integrals back (back-calculation, Åström and
+    # Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
     limits: PressureLimits | None = None
-    offset: Fraction = Fraction(0)  # p for Kx_a = 0 [Pa]: a start without a jump is an offset, since ξ starts at 0
+    offset: Fraction = Fraction(0)  # p for Kx_a = 0 [Pa]: an initial pressure, since ξ = 0 initially
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -67,7 +67,7 @@ class ExtendedLQR(Controller):
         return sp.Min(sp.Max(wanted, to_sympy(self.limits.lowest)), to_sympy(self.limits.highest))
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """ξ1' = x1 − r and ξ2' = ξ1; at a limit both also follow it with the double pole −1/recovery_time."""
+        """ξ1' = x1 − r and ξ2' = ξ1; at a limit both also track it with the double pole −1/recovery_time."""
         rates = signals.slip_error, signals.integrals[0]
         if self.limits is None:
             return rates

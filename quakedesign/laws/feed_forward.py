@@ -16,8 +16,8 @@ from quakedesign.symbolic.friction_bounds import friction_bounds
 class FeedForward:
     """k̂0·x1 + η̂0·x2 + ι0·r'' [m/s²], added to ν before it is divided by μ0N̂0 (remark after eq. ps).
 
-    It adds the same to the matched perturbation h and leaves the loop in the errors as it is, so a certificate of the
-    law serves with and without it; only what h asks of the certificate changes.
+    The feed-forward adds the same terms to the matched perturbation h and does not change the loop in the errors. So a
+    certificate of the law is valid with and without it; only the required bounds of h change.
     """
 
     name: str = "none"
@@ -46,7 +46,7 @@ NONE = FeedForward()
 
 
 def _nominal(fault: Fault, _divisor: Fraction) -> FeedForward:
-    """k̂ and η̂ in the middle of the uncertainty box, and all of r'': the paper's remark."""
+    """k̂ and η̂ at the midpoint of the uncertainty box, and all of r'': the paper's remark."""
     middle = plant.plant_values(fault)
     return FeedForward(
         name="nominal",
@@ -57,10 +57,10 @@ def _nominal(fault: Fault, _divisor: Fraction) -> FeedForward:
 
 
 def _centred(fault: Fault, divisor: Fraction) -> FeedForward:
-    """Coefficients that leave the smallest largest residual of ∂h/∂x1, ∂h/∂x2 and of r'' over the uncertainty box.
+    """Coefficients that minimise the largest residuals of ∂h/∂x1, ∂h/∂x2 and of r'' over the uncertainty box.
 
-    They differ from the nominal ones since h = (…)/β with an uncertain β, and since friction that weakens with slip
-    takes from the spring; the stiffness is negative where it takes more than the spring has.
+    They differ from the nominal ones since h = (…)/β with an uncertain β, and since slip weakening reduces the
+    stiffness; the sum is negative if the weakening exceeds the spring stiffness.
     """
     friction, middle, box = friction_bounds(fault.friction), plant.plant_values(fault), fault.box
     least, most = friction.least, friction.most
@@ -87,7 +87,7 @@ def feed_forward(name: str, fault: Fault, divisor: Fraction) -> FeedForward:
     Parameters
     ----------
     name : str
-        ``none``; ``nominal``, the paper's remark; or ``centred``, which leaves the smallest residuals.
+        ``none``; ``nominal``, the paper's remark; or ``centred``, with the smallest residuals.
     divisor : Fraction
         μ0N̂0 of the law [m²/kg].
     """

@@ -17,6 +17,6 @@ class FieldTerms:
     constants: tuple[str, ...]
     uncertain: tuple[str, ...]
     domain: str
-    # The gain or constant whose positive square root a name stands for
+    # Gain or constant whose positive square root a name denotes
     roots: Mapping[str, str] = dataclasses.field(default_factory=dict)
     lifts: Mapping[str, tuple[Term, ...]] = dataclasses.field(default_factory=dict)  # Argument of every nested power

@@ -1,9 +1,9 @@
 """Gains scaled from one fault to a similar one, with exponents from the terms of the law.
 
-A law keeps its effect if every one of its terms scales as what it adds to: the pressure with λ_p, an integral state's
-rate with that state over time. Slip errors scale with λ_δ, slip-rate errors with λ_δ/λ_t. These conditions are linear
-in the exponents of the gains; they are read off the SymPy expression of the law and solved exactly, so a user's own
-law is carried like the ones of the paper (appendix, with ERRATA 19 and 20).
+A law keeps its effect if every one of its terms scales like the quantity to which it is added: the pressure with λ_p,
+the rate of an integral state with that state over time. Slip errors scale with λ_δ, slip-rate errors with λ_δ/λ_t.
+These conditions are linear in the exponents of the gains. They are derived from the SymPy expression of the law and
+solved exactly, so that user-defined laws are scaled like those of the paper (appendix, with ERRATA 19 and 20).
 """
 
 import tomllib
@@ -62,17 +62,17 @@ def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction
     Parameters
     ----------
     gains : Controller or CarriedGains
-        The latter to carry on, or back with `scales.inverse()`, without any rounding.
+        The latter for further scaling, or back with `scales.inverse()`, without rounding.
     scales : Scales
         From source to target.
     divisor : Fraction, optional
-        μ0N̂0 of the carried law [m²/kg], for laws that have one; it stays what it is unless given, as in the
-        appendix of the paper, where ν then scales as the pressure.
+        μ0N̂0 of the scaled law [m²/kg], for laws that have one; unchanged unless given, as in the appendix of the
+        paper, where ν then scales as the pressure.
 
     Raises
     ------
     ParameterError
-        For a divisor where the law has none, or a law whose terms do not fit together.
+        For a divisor of a law without one, or a law with inconsistent terms.
     """
     start = gains if isinstance(gains, CarriedGains) else exact(gains)
     law, output = start.law, scales.of("Pa")
@@ -89,7 +89,7 @@ def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction
 
 
 def exact(controller: Controller) -> CarriedGains:
-    """Gains of a controller before they are carried anywhere."""
+    """Exact gains of a controller before any scaling."""
     return CarriedGains(
         law=controller,
         gains={name: radical(gain) for name, gain in controller.gains.items()},
@@ -107,7 +107,7 @@ def law_dimensions(controller: Controller) -> LawDimensions:
     Raises
     ------
     ParameterError
-        When the terms of the law do not fit together, or leave the dimension of a gain open.
+        When the terms of the law are inconsistent, or do not determine the dimension of a gain.
     """
     symbols = {name: sp.Symbol(name, positive=True) for name in controller.gain_units}
     integrals = {name: sp.Symbol(name, real=True) for name in _integral_names(controller)}

@@ -1,8 +1,8 @@
 """Implicit step of a sampled law: w solves w = e2 − q(e1 + T_s·w, w), with q odd and non-decreasing.
 
-q is a sum of signed powers with factors that are not negative, of the slip error and the slip-rate error at the end of
-the step or of such sums again, so that it is monotone by construction; ⌈x⌋⁰ is the set-valued sign. F(w) = w − e2 + q
-is then strongly monotone and has one root, which falls with e1 and rises with e2.
+q is a sum of signed powers with non-negative factors, whose arguments are the slip error or the slip-rate error at the
+end of the step, or such sums again. So q is monotone by construction; ⌈x⌋⁰ is the set-valued sign. F(w) = w − e2 + q is
+strongly monotone and has one root, which decreases with e1 and increases with e2.
 """
 
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ class Power:
     Attributes
     ----------
     factor : (Fraction, Fraction)
-        Ends of a range that holds c ≥ 0; equal for a rational one.
+        Ends of a range that contains c ≥ 0; equal for a rational c.
     exponent : Fraction
         a ≥ 0, numerator and denominator at most 6.
     argument : str or tuple of Power
@@ -52,7 +52,7 @@ class Power:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ImplicitRoot:
-    """Implicit step: the sum q, and a sector bound of its root for the claimed errors.
+    """Implicit step: the sum q, and a sector bound of its solution for the claimed errors.
 
     Attributes
     ----------
@@ -85,12 +85,12 @@ class ImplicitRoot:
 
     @property
     def half_range(self) -> Fraction:
-        """Of the slope."""
+        """Half the range of the slope."""
         return (self.slopes[1] - self.slopes[0]) / 2
 
 
 def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
-    """q in floats or arrays of them, middle of the factors, ⌈0⌋⁰ = 0."""
+    """q in floats or arrays of them, with the midpoints of the factors and ⌈0⌋⁰ = 0."""
     signals, total = {"slip": slip, "rate": rate}, 0.0
     for term in terms:
         nested = term.argument
@@ -101,7 +101,7 @@ def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
 
 
 def root_of(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
-    """w in floats or arrays of them, by halving down to rounding; exact where the sign of the end slip holds it."""
+    """w in floats or arrays of them, by bisection down to rounding; exact where the sign holds the end slip at 0."""
     deadbeat = -slip / step
     after, before = (deadbeat - rate + pulled(terms, way * _TINY, deadbeat) for way in (1, -1))
     first = -rate + pulled(terms, slip, 0 * rate)

@@ -26,7 +26,7 @@ _SUMS = ("field", "lifts")
 
 
 def field_of(subject: "Subject") -> tuple[str, FieldTerms]:
-    """Name and closed loop of what a claim is about; a bare loop is called ``custom``.
+    """Name and closed loop of the subject of a claim; a bare loop is called ``custom``.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def is_law(name: str) -> bool:
 
 
 def derived_again() -> str:
-    """Content of the file, derived now."""
+    """Content of the file, derived anew."""
     lines = (f"{json.dumps(n)}: {json.dumps(_plain(law.loop_field().terms))}" for n, law in laws.laws().items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
 

@@ -19,7 +19,7 @@ from quakedesign.symbolic.term_expressions import to_terms, without_nesting
 from quakedesign.symbolic.terms import Term
 
 # ----------------------------------------------------------------------
-# What a closed loop must be like so that a certificate is about the loop that its author wrote.
+# Conditions on a closed loop that ensure that a certificate describes the intended loop.
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 _MOST_STATES, _HEAVIEST = 6, 12  # as in proofs/FORMAT.md
@@ -32,8 +32,8 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
     Raises
     ------
     ParameterError
-        For an unknown domain; none or more than 6 states; one that is declared of one sign; weights that are not
-        integers from 1 to 12 on `cells` or 1 on `reals`.
+        For an unknown domain; none or more than 6 states; a state declared with a sign; weights that are not integers
+        from 1 to 12 on `cells` or 1 on `reals`.
     """
     if domain not in ("cells", "reals"):
         raise ParameterError(f"the domain of a loop must be cells or reals. Received {domain!r}.")
@@ -64,12 +64,12 @@ def sound_field(
     Parameters
     ----------
     symbols : iterable of Symbol
-        Everything that a rate may hold.
+        All symbols that a rate may contain.
 
     Raises
     ------
     ParameterError
-        When a rate is missing or one too many, or holds a float, an infinity or an unknown symbol.
+        When a rate is missing or superfluous, or contains a float, an infinity or an unknown symbol.
     """
     order, allowed = tuple(states), set(symbols)
     if set(order) != set(field):
@@ -113,7 +113,7 @@ def _require_symbols(expression: sp.Expr, symbols: set[sp.Symbol], what: str) ->
 
 
 def require_names(symbols: Iterable[sp.Symbol]) -> None:
-    """Reject names that a certificate file does not admit, and equal names."""
+    """Reject names that a certificate file does not admit, and duplicate names."""
     names = [str(symbol) for symbol in symbols]
     wrong = [name for name in names if not _NAME.fullmatch(name)]
     twice = [name for name, n in Counter(names).items() if n > 1]
@@ -135,7 +135,7 @@ def require_roots(roots: Mapping[sp.Symbol, sp.Symbol], numbers: Iterable[sp.Sym
 def require_units(
     units: Mapping[sp.Symbol, sp.Expr], states: Iterable[sp.Symbol], numbers: Iterable[sp.Symbol]
 ) -> None:
-    """Reject a unit that is not of a state, or contains more than gains, constants and roots."""
+    """Reject a unit of anything but a state, or one that contains more than gains, constants and roots."""
     order, symbols = tuple(states), set(numbers)
     for state, unit in units.items():
         if state not in order:
@@ -164,14 +164,14 @@ class LoopField:
     roots : mapping of Symbol to Symbol
         Symbols that stand for the positive square root of a gain.
     units : mapping of Symbol to Expr
-        Error that one unit of a state stands for, where it is not one unit; in gains.
+        Error that corresponds to one unit of a state, if not one; in gains.
 
     Raises
     ------
     ParameterError
-        For names that are equal or that a certificate file cannot hold, an unknown domain, states of one sign, weights
-        that are no integers from 1 to 12, a rate that is missing, inexact or holds an unknown symbol, a root of
-        anything but a gain or constant, a unit of anything but a state.
+        For duplicate names or names that a certificate file does not admit, an unknown domain, states declared with a
+        sign, weights that are not integers from 1 to 12, a rate that is missing, inexact or contains an unknown symbol,
+        a root of anything but a gain or constant, a unit of anything but a state.
     """
 
     states: dict[sp.Symbol, int]
@@ -230,13 +230,13 @@ class LoopField:
 
 
 def lowest_degree(weights: Iterable[int], domain: str) -> int:
-    """Degree of the product of the two heaviest states, from where on a V can couple them; 2 on the reals."""
+    """Degree of the product of the two heaviest states, the least for a V that couples them; 2 on the reals."""
     *_, first, second = (1, *sorted(weights))
     return first + second if domain == "cells" else 2
 
 
 def _require_bounded(speeds: Mapping[str, Iterable[Term]]) -> None:
-    """Refuse a negative power that no other factor of its product makes up for."""
+    """Reject a negative power that no other factor of its product compensates."""
     for state, terms in speeds.items():
         for of, exponent, kind in (factor for term in terms for factor in term.factors if factor[1] < 0):
             power = f"|{of}|^({exponent})" if kind == "a" else f"⌈{of}⌋^({exponent})"

@@ -61,7 +61,7 @@ def cut_off(
     *,
     within: tuple[sp.Expr, ...] | None = None,
 ) -> tuple[sp.Expr, ...]:
-    """Applied pressure [Pa] within the limit at rest, and `RestLimit.STATES` afterwards.
+    """Applied pressure [Pa] within the limit at rest, and `RestLimit.STATES` after it.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def cut_off(
     width, per_slip, resolution : Expr
         [Pa], [Pa/m], [m].
     within : tuple of Expr, optional
-        Least and largest pressure [Pa], and the slip between two samples [m] up to which they are not passed.
+        Least and largest pressure [Pa], and the largest slip between two samples [m] for which they apply.
     """
     highest, last = states
     moved = per_slip * reference
@@ -88,14 +88,14 @@ def cut_off(
 
 
 # ----------------------------------------------------------------------
-# A linear law of samples as a controller that simulations run.
+# A sampled linear law as a controller for simulations.
 
 
 def growth_at_rest(law: LinearLaw, step: Fraction) -> float | None:
     """Time [s] in which the states grow e-fold while the fault is at rest, sampled every T_s [s]; None if stable."""
     sizes = np.abs(np.linalg.eigvals(np.array(law.update, dtype=float).reshape((len(law.states),) * 2)))
     growth = float(np.max(sizes, initial=0.0))
-    return float(step) / log(growth) if growth > 1 + 1e-6 else None  # rounding moves double eigenvalues of 1 by less
+    return float(step) / log(growth) if growth > 1 + 1e-6 else None  # rounding changes double eigenvalues of 1 by less
 
 
 def winds_up(law: LinearLaw) -> bool:
@@ -132,13 +132,13 @@ class SampledController(Controller):
     ----------
     law : LinearLaw
     step : Fraction
-        T_s [s] for which it is meant.
+        T_s [s] of the design.
     delay, lag, diffusion, longest : Fraction
-        As of `Sampling` [s].
+        As in `Sampling` [s].
     rest_limit : RestLimit, optional
-        Of its pressure; its states are then told what is applied, and those of the limit follow them.
+        Limit of its pressure; the law then receives the applied pressure, and the states of the limit follow its own.
     gains : mapping of str to Fraction
-        Read off the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
+        Derived from the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
     """
 
     name: ClassVar[str] = "sampled"
@@ -164,26 +164,26 @@ class SampledController(Controller):
 
     @property
     def sampling(self) -> Sampling:
-        """By the scheme ``explicit``, once every T_s."""
+        """Scheme ``explicit``, one step every T_s."""
         return Sampling(step=self.step, delay=self.delay, lag=self.lag, diffusion=self.diffusion, longest=self.longest)
 
     @property
     def warning_at_rest(self) -> str:  # type: ignore[override]
-        """That its pressure grows while the fault is at rest; empty if it does not."""
+        """Warning if the pressure grows while the fault is at rest; else empty."""
         return warning_at_rest(self.law, self.step, limited=self.rest_limit is not None)
 
     @property
     def of_slip(self) -> LinearLaw | None:
-        """The law, if it does without the slip rate and measures the slip error."""
+        """The law, if it measures the slip error and does not need the slip rate."""
         return self.law if self.law.of_slip_alone and not self.law.of_reference else None
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was changed when floats of a user's law became exact numbers."""
+        """Changes of a user-defined law when its floats became exact numbers."""
         return ()
 
     def behind(self, **path: Fraction) -> Self:
-        """The law with other delay, lag, diffusion or longest interval [s] between law and fault in runs."""
+        """The law with another delay, lag, diffusion time or longest interval [s] in runs."""
         return replace(self, **path)  # type: ignore[arg-type]
 
     @property
@@ -193,12 +193,12 @@ class SampledController(Controller):
 
     @property
     def gain_units(self) -> Mapping[str, str]:  # type: ignore[override]
-        """Of a state: Pa per its own unit."""
+        """Pa per unit of the state."""
         return {"k1": "Pa/m", "k2": "Pa s/m", **dict.fromkeys(self.law.states, "Pa")}
 
     @property
     def integral_units(self) -> tuple[str, ...]:  # type: ignore[override]
-        """One for every state; the law's own."""
+        """A hyphen for every state of the law, then the units of the limit."""
         return ("-",) * len(self.law.states) + (RestLimit.UNITS if self.rest_limit else ())
 
     def pressure(self, signals: Signals) -> sp.Expr:
@@ -206,7 +206,7 @@ class SampledController(Controller):
         return self._decided(signals)[0]
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """(Fz + Gy − z)/T_s, of what the limit cuts off what the law makes of it besides, and of the limit's states."""
+        """(Fz + Gy − z)/T_s plus the law's response to the limit, and the rates of the limit's states."""
         cut, after = self._decided(signals)[1:]
         z, seen, period = signals.integrals, self._read(signals), to_sympy(self.step)
         applied = self.law.applied or (Fraction(0),) * len(self.law.states)
@@ -216,7 +216,7 @@ class SampledController(Controller):
         return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
 
     def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
-        """The applied pressure, its excess over the commanded one divided by T_s, and the next states of the limit."""
+        """Applied pressure, its excess over the commanded one divided by T_s, and the next states of the limit."""
         commanded = _combined((*self.law.output, *self.law.feedback), self._read(signals))
         commanded += self._of_reference(signals)[-1]
         if self.rest_limit is None:
@@ -232,7 +232,7 @@ class SampledController(Controller):
         return (*signals.integrals[: len(self.law.states)], signals.slip_error, signals.slip_rate_error)
 
     def _of_reference(self, signals: Signals) -> list[sp.Expr]:
-        """What r and r′ add to z⁺ and, last, to p."""
+        """Contributions of r and r′ to z⁺ and, last, to p."""
         moves = signals.slip - signals.slip_error, signals.slip_rate - signals.slip_rate_error
         rows = self.law.of_reference or ((Fraction(0),) * 2,) * (len(self.law.states) + 1)
         return [_combined(row, moves) for row in rows]
@@ -255,10 +255,10 @@ def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Exp
 
 
 # ----------------------------------------------------------------------
-# What an implicit step does with an estimate of the disturbance in place of integral states; simulated and proved.
+# Implicit step with an estimate of the disturbance in place of integral states; simulated and proved.
 #
-# Both functions take floats, SymPy and CasADi expressions. The estimate d follows what the slip rate did over the last
-# period beyond T_s·B0·p, and the pressure takes the slip rate to the end w of the step, less d.
+# Both functions take floats, SymPy and CasADi expressions. The estimate d follows the change of the slip rate over the
+# last period beyond T_s·B0·p. The pressure is −d plus that which drives the slip rate to the solution w.
 
 _STATES = ("rate_error_before", "push_before", "disturbance")
 
@@ -276,12 +276,12 @@ def compensation_answered(rate_error: Any, end_rate: Any, estimate: Any, gain: A
 def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearLaw:
     """The compensated step as matrices, with the states e2⁻, T_sB0·p⁻ and T_sB0·d [m/s].
 
-    The first sample, before which there is none, says nothing of the disturbance: there e2⁻ = e2.
+    The first sample has no predecessor and gives no information on the disturbance: there e2⁻ = e2.
 
     Parameters
     ----------
     root : ImplicitRoot
-        Of the step's end w.
+        Gives the solution w of the step.
     weight : Fraction
         a [-], above 0 and at most 1.
     gain : Fraction
@@ -310,6 +310,6 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
 
 
 def _coefficients(expression: sp.Expr, symbols: tuple[sp.Symbol, ...]) -> tuple[Fraction, ...]:
-    """Of a linear expression."""
+    """Coefficients of a linear expression."""
     expanded = sp.expand(expression)
     return tuple(fraction_of(sp.Rational(expanded.coeff(symbol))) for symbol in symbols)

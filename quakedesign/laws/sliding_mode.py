@@ -21,7 +21,7 @@ from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.laws.loop_field import LoopField
 
 # ----------------------------------------------------------------------
-# What the continuous sliding-mode laws share: p = ν/(μ0N̂0), one integral state, homogeneity.
+# Common base of the continuous sliding-mode laws: p = ν/(μ0N̂0), one integral state, homogeneity.
 
 beta, d = sp.symbols("beta d", real=True)
 e1, e2, e3 = sp.symbols("e1 e2 e3", real=True)
@@ -34,13 +34,13 @@ class SlidingMode(Controller):
     Attributes
     ----------
     scale : Fraction
-        λ [-], which stretches the loop: e → λe maps the loop with λ = 1 onto this one.
+        λ [-], which scales the loop: e → λe maps the loop with λ = 1 onto this one.
     divisor : Fraction
         μ0N̂0 of eq. ps [m²/kg].
     feedforward : FeedForward
-        What is added to ν from what is known of the plant; nothing by default.
+        Terms of the nominal plant that are added to ν; none by default.
     sampling : Sampling, optional
-        How it runs as a law of samples; None for the law in continuous time, which any scheme runs.
+        Sampling of a sampled law; None for the law in continuous time, which any scheme runs.
     """
 
     integral_units: ClassVar[tuple[str, ...]] = ("m/s^2",)
@@ -76,7 +76,7 @@ class SlidingMode(Controller):
 
     @property
     def numbers(self) -> dict[str, Fraction]:
-        """Gains, ``scale``, ``divisor``, a feed-forward that is on, and numbers of the scheme of a law of samples."""
+        """Gains, ``scale``, ``divisor``, an active feed-forward, and numbers of the scheme of a sampled law."""
         added = {} if self.feedforward == NONE else self.feedforward.coefficients
         gains = {f"feedforward_{name}": value for name, value in added.items()}
         settings = self.sampling.settings if self.sampling else ()
@@ -137,7 +137,7 @@ class SlidingMode(Controller):
 
 
 # ----------------------------------------------------------------------
-# What laws for a chain of integrators share: a continuous ν, one discontinuous integral, weights n+1 … 1.
+# Common base of laws for a chain of integrators: a continuous ν, one discontinuous integral, weights n+1 … 1.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,7 +180,7 @@ class IntegratorChain(Law):
     def counterexample(
         cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
-        """At e1 = 1, e2 = … = en = 0, e(n+1) = −ν0 a constant d holds the loop where the sliding ξ' can cancel it."""
+        """At e1 = 1, e2 = … = en = 0, e(n+1) = −ν0, an equilibrium for a constant d that the sliding ξ' can cancel."""
         exact = [sp.Rational(gains[name].numerator, gains[name].denominator) for name in cls.gain_units]
         rest = sp.Rational(cls.virtual_control((sp.Integer(1), *[sp.Integer(0)] * (cls.order - 1)), exact))
         if rest == 0:

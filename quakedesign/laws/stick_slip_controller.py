@@ -24,7 +24,7 @@ def level_after(
     Parameters
     ----------
     states : sequence of four
-        Level D [Pa], predicted slip rate [m/s], and slip rate [m/s] and slip [m] measured last.
+        Level D [Pa], predicted slip rate [m/s], last measured slip rate [m/s] and slip [m].
     seen : (slip, slip rate)
         As measured [m], [m/s].
     period : expression
@@ -32,7 +32,7 @@ def level_after(
     gains : (level_gain, slip_gain, rest_slip)
         Of `StickSlipLaw`.
     sticks : bool
-        Whether the innovation of the slip is cut off at rest.
+        Whether the innovation of the slip is limited at rest.
     """
     (level, predicted, last_rate, last_slip), (slip, rate) = states, seen
     level_gain, slip_gain, rest_slip = gains
@@ -47,7 +47,7 @@ def level_after(
 class StickSlipController(Controller):
     """The law as a controller of a simulation: one step every T_s by the scheme ``explicit``.
 
-    Its states are the level D [Pa], the predicted slip rate [m/s], and the slip rate [m/s] and slip [m] measured last.
+    Its states are the level D [Pa], the predicted slip rate [m/s], the last measured slip rate [m/s] and slip [m].
 
     Attributes
     ----------
@@ -55,9 +55,9 @@ class StickSlipController(Controller):
     step : Fraction
         T_s [s].
     sticks : bool
-        Whether the predicted slip rate and the innovation at rest are cut off; without, the law is linear.
+        Whether the predicted slip rate and the innovation at rest are limited; otherwise the law is linear.
     longest : Fraction
-        Of aperiodic sampling in runs, as of `Sampling` [s].
+        Longest interval of aperiodic sampling in runs, as in `Sampling` [s].
 
     Raises
     ------
@@ -90,12 +90,12 @@ class StickSlipController(Controller):
 
     @property
     def while_moving(self) -> "StickSlipController":
-        """The linear law that it is while the fault slides and its target rate is positive."""
+        """Linear law while the fault slides and the target rate is positive."""
         return replace(self, sticks=False)
 
     @property
     def sampling(self) -> Sampling:
-        """By the scheme ``explicit``, once every T_s."""
+        """Scheme ``explicit``, one step every T_s."""
         return Sampling(step=self.step, longest=self.longest)
 
     def pressure(self, signals: Signals) -> sp.Expr:

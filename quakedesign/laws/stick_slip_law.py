@@ -29,13 +29,13 @@ class StickSlipLaw:
         v = r′ − return_rate·e,   v⁺ = max(v, 0),
         p = −rate_gain·y + target_gain·v − D.
 
-    v is the slip rate that the law wants at the next sample. The plant cannot slip backward, so v⁺ is the slip rate
-    that it expects there. The innovation of the slip prevents that disturbances which turn within a period move the
-    fault between samples at which it rests. At rest that innovation is cut off below: an early stop must not lower D.
+    v is the target slip rate at the next sample. The plant cannot slip backward, so v⁺ is the predicted slip rate
+    there. Without the innovation of the slip, disturbances that change sign within a period could move the fault
+    between samples at which it rests. At rest this innovation is limited from below: an early stop must not lower D.
     Noise of the slip would add up in D at rest if rest_slip were less than twice its bound.
 
-    Of a sliding mode v = r′ + w instead, where w is the end of its implicit step, see `quakedesign.laws.implicit_root`.
-    Where that step is deadbeat, w = −e/T, the law is the one above with return_rate = 1/T.
+    A sliding mode has v = r′ + w instead, where w solves its implicit step, see `quakedesign.laws.implicit_root`. If
+    that step is deadbeat, w = −e/T, the law is the one above with return_rate = 1/T.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class StickSlipLaw:
     slip_gain : Fraction
         [Pa/m], 0 or more.
     rest_slip : Fraction
-        [m], 0 or more: measured slips of a fault at rest may be as far apart; 0 for exact ones.
+        [m], 0 or more: largest difference of measured slips of a fault at rest; 0 for exact ones.
     pull : tuple of Power
         q [m/s] of the implicit step of a sliding mode; empty for a law whose target rate is linear.
 

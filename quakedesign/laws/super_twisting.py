@@ -14,7 +14,7 @@ from quakedesign.symbolic import SignedPower
 class SuperTwisting(IntegratorChain):
     """ν = −k1⌈e1⌋^½ + ξ, ξ' = −k2⌈e1⌋⁰ for e1' = β(ν + h), such as a slip rate that a pressure rate acts on.
 
-    For a constant β = 1 and |h'| ≤ L < k2 the gains that stabilise are known exactly: Seeber and Horn (2018), Necessary
+    For a constant β = 1 and |h'| ≤ L < k2 the stabilising gains are known exactly: Seeber and Horn (2018), Necessary
     and sufficient stability criterion for the super-twisting algorithm, 15th Workshop on Variable Structure Systems.
     """
 

@@ -1,6 +1,6 @@
-"""Sampled linear laws of users: from matrices, gains or a PID, and from untrusted files.
+"""User-defined sampled linear laws: from matrices, gains or a PID, and from untrusted files.
 
-Chapters: the law; an integrator that rounding has moved; files.
+Chapters: the law; an integrator perturbed by rounding; files.
 """
 
 import io
@@ -40,26 +40,26 @@ _PLACES |= {"reference": (None, 0), "reference_rate": (None, 1)}
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SampledLaw(SampledController):
-    """A user-defined sampled linear law: p = Cz + Dy and z⁺ = Az + By once every T_s, z = 0 at first, all exact.
+    """A user-defined sampled linear law: p = Cz + Dy and z⁺ = Az + By once every T_s, z = 0 initially, all exact.
 
-    Built by `from_statespace`, `from_gains`, `from_pid` or `load`; input of `guarantee`, `simulate`, `loop_transfer`,
-    `compare`, `campaign_problem` and `export_controller`.
+    Built by `from_statespace`, `from_gains`, `from_pid` or `load`; accepted by `guarantee`, `simulate`,
+    `loop_transfer`, `compare`, `campaign_problem` and `export_controller`.
 
     Attributes
     ----------
     gains : mapping of str to Fraction
-        Gains of the law: p = −k1·e1 − k2·e2 − Σ gain·state.
+        Derived from the law: p = −k1·e1 − k2·e2 − Σ gain·state.
     law : LinearLaw
     step : Fraction
         T_s [s].
     delay, lag, diffusion, longest : Fraction
         Path between law and fault in runs, see `Sampling` [s].
     rest_limit : RestLimit, optional
-        None: the limited pressure is not fed back to the law.
+        None: the law does not receive the pressure applied at a limit.
     label : str
-        Name in texts.
+        Name for display.
     notes : tuple of str
-        What was changed when floats became exact numbers.
+        Changes when floats became exact numbers.
     """
 
     name: ClassVar[str] = "user-law"
@@ -71,19 +71,19 @@ class SampledLaw(SampledController):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "title", self.label)  # in place of those of the class, as there may be several
+        object.__setattr__(self, "title", self.label)  # replaces that of the class, as instances differ
         object.__setattr__(self, "name", re.sub(r"[^A-Za-z0-9_-]+", "-", self.label).strip("-") or type(self).name)
 
     @classmethod
     def from_statespace(
         cls, system: Any, *, inputs: Sequence[str] = (), output: str = OUTPUT, label: str = "user-defined law"
     ) -> Self:
-        """Law of a discrete-time system of python-control, or of anything with A, B, C, D and dt.
+        """Law of a discrete-time system of python-control, or of any object with A, B, C, D and dt.
 
         Parameters
         ----------
         system : control.StateSpace or control.TransferFunction
-            Its one output is the pressure [Pa], sign included: a law made for negative feedback is given with −1.
+            Its one output is the pressure [Pa] with its sign: multiply a law for negative feedback by −1.
         inputs : sequence of str
             Signals in the order of its inputs: slip_error, slip_rate_error, slip, slip_rate, reference or
             reference_rate [m, m/s].
@@ -133,11 +133,11 @@ class SampledLaw(SampledController):
         ----------
         gains : sequence or array
             One to four gains [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)]: P, PD, PID, double integral; (k1, 0, k3) is a PI. The
-            K of ``control.dlqr`` for these states as it comes, with its sign.
+            K of ``control.dlqr`` for these states, with its sign.
         step : str, float or Fraction
             T_s, [s] or with a unit.
         inputs : (str, str)
-            What k1 and k2 act on: slip_error or slip, slip_rate_error or slip_rate. Integrals are those of the error.
+            Signals of k1 and k2: slip_error or slip, slip_rate_error or slip_rate. Integrals are those of the error.
         """
         values = [rational(v, f"k{i}") for i, v in enumerate(np.asarray(gains, dtype=object).ravel().tolist(), 1)]
         if not 1 <= len(values) <= 4:
@@ -188,7 +188,7 @@ class SampledLaw(SampledController):
         if rate <= 0:
             raise ParameterError(f"N of a PID must be positive. Received {shortly(rate)} 1/s.")
         share, zero, one = 1 / (1 + rate * time), Fraction(0), Fraction(1)
-        states = [  # own, of the error, output: the sum, and what the filter keeps, N·w with D = N(e − w)
+        states = [  # own, of the error, output: the sum, and the filter state N·w with D = N(e − w)
             ([one, zero], time, -i),
             ([zero, share], 1 - share, d * rate * share),
         ]
@@ -313,7 +313,7 @@ def _step(value: Any) -> Fraction:
 
 
 def exact_matrix(part: Any, name: str) -> Matrix:
-    """Rows of rationals."""
+    """Matrix as rows of rationals."""
     rows = part.tolist() if hasattr(part, "tolist") else part
     if not isinstance(rows, list | tuple) or not all(isinstance(row, list | tuple) for row in rows):
         raise ParameterError(f"matrix {name} of a law must be a list of rows. Received {rows!r:.60}.")
@@ -331,16 +331,16 @@ def _require_shapes(wanted: Mapping[str, tuple[Matrix, int, int]]) -> None:
 
 
 # ----------------------------------------------------------------------
-# An integrator that rounding has moved. A guarantee needs z with Az = z and Cz = 1, exactly: at rest the law then asks
-# for any pressure without an error. Where no such z is there, but a pole within 1e-6 of 1, let v be its vector with
-# Cv = 1 and qv = 1. A − (Av − v)q has Av = v exactly, and is the same matrix but for what rounding had left.
+# An integrator perturbed by rounding. A guarantee needs z with Az = z and Cz = 1, exactly: at rest the law then
+# commands any constant pressure without an error. If no such z exists, but a pole within 1e-6 of 1, let v be its vector
+# with Cv = 1 and qv = 1. A − (Av − v)q has Av = v exactly and differs from A by rounding alone.
 
 _NEAR = 1e-6
 _DEPENDENT = 1e-6
 
 
 def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
-    """A law with an integrator but for rounding as one with an integrator, and what was changed."""
+    """Law with an exact integrator in place of one perturbed by rounding, and a note of the change."""
     size = len(A)
     with suppress(ParameterError):
         still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(A))
@@ -380,7 +380,7 @@ def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
 
 
 # ----------------------------------------------------------------------
-# Files, which may come from anybody.
+# Files, which may be untrusted.
 
 _LARGEST = 1 << 20
 
@@ -396,7 +396,7 @@ def _of_json(content: bytes, path: str | Path) -> dict[str, Any]:
 
 
 def _of_npz(content: bytes, path: str | Path) -> dict[str, Any]:
-    """Arrays of a file, as lists; without pickles, and no larger unpacked than files may be."""
+    """Arrays of a file as lists; rejects pickles, and arrays above the size limit of files."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as folder:
             if sum(entry.file_size for entry in folder.infolist()) > _LARGEST:

@@ -1,4 +1,4 @@
-"""Linear feedback that holds where Theorem 2 as printed does not: bounds, design, analysis, sampled implementation."""
+"""Linear feedback, corrected where Theorem 2 as printed fails: bounds, design, analysis, sampled implementation."""
 
 from quakedesign.arguments import attach
 

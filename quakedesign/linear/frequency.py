@@ -107,13 +107,13 @@ def frequency_properties(loop: FeedbackLoop, corner: Vertex) -> FrequencyFacts:
 
 
 def _crossings(feedback: Sequence[float], plant: Sequence[float]) -> dict[str, list[float]]:
-    """All factors on the gain, phases [deg] and scaled delays at which −1 is crossed; none without feedback."""
+    """Gain factors, phases [deg] and scaled delays at which the loop crosses −1; none without feedback."""
     import control
 
     if not any(feedback):
         return {"gain": [], "phase": [], "delay": []}
     above, below = list(feedback), list(plant)
-    while not above[-1] and not below[-1]:  # a gain of an integral is zero: its pole at 0 is not seen
+    while not above[-1] and not below[-1]:  # the gain of an integral is zero: its pole at 0 cancels
         above, below = above[:-1], below[:-1]
     gain, phase, _, _, at_gain, _ = control.stability_margins(control.tf(above, below), returnall=True)
     phases = np.atleast_1d(phase)

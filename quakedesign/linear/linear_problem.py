@@ -31,7 +31,7 @@ Matrix = tuple[tuple[Fraction, ...], ...]
 
 
 def floats(matrix: Sequence[Sequence[Fraction | float]] | np.ndarray) -> np.ndarray:
-    """Array of floats."""
+    """Matrix as an array of floats."""
     return np.array([[float(v) for v in row] for row in matrix])
 
 
@@ -81,7 +81,7 @@ def times(factor: Fraction | int, a: Rows) -> Matrix:
 
 
 def congruent(matrix: Sequence[Sequence[Fraction | float]], units: Sequence[Fraction]) -> Matrix:
-    """DMD for the diagonal D of some units: a quadratic form in states that are so many times smaller."""
+    """DMD with D = diag(units): a quadratic form in states divided by their units."""
     return tuple(
         tuple(Fraction(v) * a * b for v, b in zip(row, units, strict=True))
         for a, row in zip(units, matrix, strict=True)
@@ -165,11 +165,11 @@ class ProblemScales:
         return tuple(self.slip * self.time**n for n in (0, -1, 1, 2))
 
     def gains_outside(self, gains: Sequence[Fraction | float]) -> tuple[Fraction, ...]:
-        """Gains in SI (4) of nondimensional ones."""
+        """Gains in SI (4) from nondimensional ones."""
         return tuple(Fraction(k) * self.pressure / u for k, u in zip(gains, self.states, strict=True))
 
     def gains_inside(self, gains: Sequence[Fraction | float]) -> tuple[Fraction, ...]:
-        """Nondimensional gains (4) of those in SI."""
+        """Nondimensional gains (4) from gains in SI."""
         return tuple(Fraction(k) * u / self.pressure for k, u in zip(gains, self.states, strict=True))
 
     def form_inside(self, matrix: Sequence[Sequence[Fraction | float]]) -> Matrix:
@@ -240,7 +240,7 @@ class LinearProblem:
         )
 
     def vertices(self) -> list[Vertex]:
-        """Different corners (β, s, w) of the ranges."""
+        """Distinct corners (β, s, w) of the ranges."""
         return self.sectors.vertices()
 
     def nominal(self) -> Matrix:
@@ -256,9 +256,9 @@ class LinearProblem:
 class FeedbackLoop:
     """The loop of p = −Kx, also about a moving reference: e1' = e2, e2' = s·e1 − w·e2 − βb(k1e1 + k2e2 + ζ) + force.
 
-    ζ' = k3e1 + χ + drift and χ' = k4e1 + drift_rate, where ζ = k3ξ1 + k4ξ2 + p*(r) and χ = k4ξ1, each plus what the
-    law feeds forward of the reference. The substitution removes every large term: the loop sees only
-    force = φ_e − r″ − w·r′, drift = dp*(r)/dt and, for feedback on the state, drift_rate = k1r″ + k2r‴.
+    ζ' = k3e1 + χ + drift and χ' = k4e1 + drift_rate, where ζ = k3ξ1 + k4ξ2 + p*(r) and χ = k4ξ1, each plus the
+    feed-forward of the reference in the law. The substitution removes every large term: the remaining inputs are force
+    = φ_e − r″ − w·r′, drift = dp*(r)/dt and, for feedback on the state, drift_rate = k1r″ + k2r‴.
     """
 
     gains: Sequence[Fraction]  # sequence of 4 Fraction: k1 … k4 in SI
@@ -269,7 +269,7 @@ class FeedbackLoop:
         return loop_matrix(vertex, self.sectors.authority, self.gains)
 
     def stable(self, vertex: Vertex) -> bool:
-        """Whether it is asymptotically stable with constant parameters, exactly (Routh, Hurwitz)."""
+        """Whether the loop is asymptotically stable with constant parameters, exactly (Routh, Hurwitz)."""
         return hurwitz(characteristic(self.matrix(vertex)))
 
     def unstable_vertex(self) -> Vertex | None:
@@ -343,7 +343,7 @@ def _row(loop: Loop, state: str, parameters: Mapping[str, Fraction]) -> tuple[Fr
 class ModalScaling:
     """Real coordinates x = T·z in which the mean of a polytope is block diagonal and its input as large as its poles.
 
-    They do not depend on the units of x; time is counted in 1/pace.
+    The coordinates do not depend on the units of x; the unit of time is 1/pace.
     """
 
     transform: np.ndarray  # shape (n, n): T
@@ -361,7 +361,7 @@ class ModalScaling:
 
 
 def modal_scaling(polytope: Polytope, entries: Sequence[Sequence[float]]) -> ModalScaling:
-    """Modal coordinates of the mean of the vertices, balanced so that the modes couple as weakly as they can.
+    """Modal coordinates of the mean of the vertices, balanced so that the coupling of the modes is minimal.
 
     Parameters
     ----------
@@ -397,7 +397,7 @@ def decreases(
 ) -> bool:
     """Whether V = xᵀΘx is positive and V̇ < −2aV at every vertex, hence over the whole box; exact.
 
-    V̇ is affine in β, s and w each, so that the vertices suffice, for parameters that vary in time as well.
+    V̇ is affine in each of β, s and w, so that the vertices suffice, also for time-varying parameters.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ _ENOUGH = Fraction(1, 10**30)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RiccatiSolution:
-    """X of Q + AᵀX + XA − XGX = 0 in rationals, with what is left of the equation."""
+    """X of Q + AᵀX + XA − XGX = 0 in rationals, with the residual of the equation."""
 
     X: Matrix  # Symmetric, n × n
     # Rigorous bound on ‖Q + AᵀX + XA − XGX‖ relative to ‖Q‖ + 2‖AᵀX‖ + ‖XGX‖, Frobenius norms, in the scaled states in
@@ -163,7 +163,7 @@ Choice = tuple[float, float]
 
 
 class ScaledDesign:
-    """The design in nondimensional variables, undone at the end.
+    """Design in nondimensional variables, converted to SI at the end.
 
     Parameters
     ----------
@@ -223,9 +223,9 @@ class ScaledDesign:
         return max(abs(pole) for pole in vertex_poles(self.outside.sectors, self.gains(K)))
 
     def weight_for_pole(self, target: float) -> Choice:
-        """R at which the fastest pole has a modulus [rad/s], or the nearest one from 1e-14 to 1; and the split.
+        """R for a modulus of the fastest pole [rad/s], or the nearest R from 1e-14 to 1; and the split.
 
-        The split of W follows in a few rounds.
+        The split of W is iterated in a few rounds.
         """
         split, root = 0.5, _HEAVIEST
         for _ in range(_ROUNDS):
@@ -259,7 +259,7 @@ def vertex_poles(needed: Sectors, gains: Sequence[float | Fraction]) -> list[com
 
 
 def _root(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Zero of a decreasing function, or the end that is nearest to one."""
+    """Zero of a decreasing function, or the end nearest to a zero."""
     if excess(low) <= 0:
         return low
     if excess(high) >= 0:
@@ -268,7 +268,7 @@ def _root(excess: Callable[[float], float], low: float, high: float) -> float:
 
 
 # ----------------------------------------------------------------------
-# e-LQR from the Riccati equation with a bound on the uncertainty that the plant can meet (ERRATA 6, 7, 9, 10).
+# e-LQR from the Riccati equation with a bound that the plant's uncertainty satisfies (ERRATA 6, 7, 9, 10).
 
 BANDWIDTH_TIMES_STEP = 1.5
 _STATES = ("x1", "x2", "xi1", "xi2")
@@ -276,7 +276,7 @@ _STATES = ("x1", "x2", "xi1", "xi2")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RiccatiDesign:
-    """u = −Kx with K, S, E in python-control's order, and the weights that gave them.
+    """u = −Kx with K, S, E in python-control's order, and the weights of the design.
 
     Attributes
     ----------
@@ -287,7 +287,7 @@ class RiccatiDesign:
     K : ndarray, shape (4,)
         In SI, before it is rounded to decimals.
     Q, S : ndarray, shape (4, 4)
-        Nondimensional: time in 1/ω_n, slip in the target slip, p in target·ω_n²/b. Q holds Q0 + R·W.
+        Nondimensional: time in 1/ω_n, slip in the target slip, p in target·ω_n²/b. Q is Q0 + R·W.
     R : float
         Nondimensional.
     split : float
@@ -332,7 +332,7 @@ def riccati_design(fault: Fault, *, bandwidth: float | None = None) -> RiccatiDe
     Returns
     -------
     RiccatiDesign
-        With the nearest bandwidth that weights R from 1e-14 to 1 reach, where the wanted one is out of reach.
+        With the nearest bandwidth for weights R from 1e-14 to 1 if the specified one is infeasible.
     """
     problem = LinearProblem.of(fault)
     task = ScaledDesign(problem, problem.scales(fault.reference.target_slip))
@@ -341,7 +341,7 @@ def riccati_design(fault: Fault, *, bandwidth: float | None = None) -> RiccatiDe
 
 
 def _finished(task: ScaledDesign, choice: Choice) -> RiccatiDesign:
-    """Design in SI with exact gains and an exact V, from a Riccati equation solved to the end."""
+    """Design in SI with exact gains and an exact V, from a refined solution of the Riccati equation."""
     R, split = choice
     weight = Fraction(R)
     Q = total(COST, times(weight, sound_bound(task.inside.bounds, Fraction(split))))
@@ -395,7 +395,7 @@ def _decimal(value: Fraction, digits: int = 17) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# The smallest gain of all Riccati designs that are guaranteed over the uncertainty.
+# The smallest gain of all Riccati designs with a guarantee over the uncertainty.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -64,7 +64,7 @@ class CommonQuadratic:
         self._margin, self._problem = margin, cp.Problem(cp.Maximize(margin), bounds)
 
     def __call__(self, rate: float = 0.0) -> QuadraticProposal | None:
-        """V that decreases at least at a rate [1/s] everywhere, with the largest margin; None if none is found."""
+        """V with at least a given decay rate [1/s] at all vertices, with the largest margin; None without one."""
         self._rate.value = rate / self.scaling.pace
         if not solve(self._problem) or self._margin.value is None or not self._margin.value > _LEAST_MARGIN:
             return None
@@ -99,7 +99,7 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
     loop : Loop
         Linear, on the reals.
     fastest : bool
-        Whether to look for the V with the largest decay rate instead of the one with the largest margin.
+        Whether to search the V with the largest decay rate instead of that with the largest margin.
     """
     polytope = polytope_of(loop)
     if polytope.slowest() >= 0:
@@ -110,16 +110,16 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
         return None
     certificate = finished(loop, proposal)
     if fastest and (certificate is None or float(certificate.claims["rate"]) < -_GOOD * polytope.slowest()):
-        other = search()  # where the fastest V is hard to find or to round, the roundest may do better
+        other = search()  # where the fastest V is hard to find or to round, the best conditioned may succeed
         rounder = finished(loop, other) if other is not None else None
         certificate = max(filter(None, (certificate, rounder)), key=lambda c: c.claims["rate"], default=None)
     return certificate
 
 
 def finished(loop: Loop, proposal: QuadraticProposal) -> Certificate | None:
-    """Certificate for a proposed V, in exact arithmetic, with the largest share of its decay rate that holds."""
+    """Certificate for a proposed V, in exact arithmetic, with the largest provable share of its decay rate."""
     form = proposal.form
-    size = float(abs(form).max())  # entries over the largest one are read as the decimals that Python prints
+    size = float(abs(form).max())  # entries over the largest one are taken as the decimals that Python prints
     both = form + form.T - np.diag(np.diag(form))
     lyapunov = quadratic_terms(tuple(loop.states), lambda i, j: rational(float(both[i, j] / size)))
     positive = quadratic_margin(loop, lyapunov) / 2
@@ -134,7 +134,7 @@ def finished(loop: Loop, proposal: QuadraticProposal) -> Certificate | None:
 def finished_exactly(loop: Loop, theta: Sequence[Sequence[Fraction]]) -> Certificate | None:
     """Certificate for V = xᵀΘx with the largest decay rate a·10⁻ⁿ, a the slowest pole, that exact forms allow, or None.
 
-    For a V so far from round that floating point cannot tell whether it decreases: witnesses are read off.
+    For a V so ill-conditioned that floating point cannot decide its decrease: witnesses are derived directly.
     """
     lyapunov = quadratic_terms(tuple(loop.states), lambda i, j: theta[i][j] * (1 if i == j else 2))
     slowest, positive = -polytope_of(loop).slowest(), quadratic_margin(loop, lyapunov) / 2
@@ -178,7 +178,7 @@ def sector_loop(controller: Any, sectors: Sectors) -> Loop:
 
 
 # ----------------------------------------------------------------------
-# How much of the box a given K tolerates: friction slope, range of β, decay rate. Each proved, beside its limit.
+# Tolerances of a given K: friction slope, range of β, decay rate, each proved and reported with its limit.
 
 _MARGIN_SHARES = (Fraction(9995, 10000), Fraction(999, 1000), Fraction(997, 1000), Fraction(992, 1000))
 _STEPS = 10
@@ -284,13 +284,13 @@ def _decimal(value: Fraction) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainRange:
-    """Range of β = μN̂/b over which one V proves stability with everything else anywhere in the box."""
+    """Range of β = μN̂/b over which one V proves stability with all other parameters anywhere in the box."""
 
-    # low, high: Printed, they stay inside what is proved. Each with the other end as the box has it. `high` is at most
-    # 1024 times the box's: no upper limit was looked for above.
+    # low, high: Printed values stay inside the proved range. Each is proved with the other end of the box. `high` is at
+    # most 1024 times that of the box: larger values are not tried.
     low: UpperBound
     high: LowerBound
-    # A constant β of this, with a constant vertex of the rest, is not asymptotically stable (exact)
+    # This constant β is not asymptotically stable at a constant vertex of the other parameters (exact)
     low_limit: LowerBound
     certificates: tuple[Certificate, ...]
 
@@ -347,15 +347,15 @@ def _least_stable(loop: FeedbackLoop) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DecayRate:
-    """Exponential decay for all measurable courses of the parameters in the box."""
+    """Exponential decay for all measurable time histories of the parameters in the box."""
 
     certified: LowerBound  # a with |x(t)| ≤ C·e^{−at} [1/s]
-    limit: float  # The slowest pole of a constant vertex [1/s], measured; nothing decays faster
+    limit: float  # Slowest pole of a constant vertex [1/s], measured: an upper limit of a
     certificate: Certificate
 
 
 def decay_rate(loop: Loop) -> DecayRate | None:
-    """Certify the largest decay rate that a common quadratic V finds; None when stability is not proved."""
+    """Certify the largest decay rate of a common quadratic V; None when stability is not proved."""
     certificate = robust_stability(loop, fastest=True)
     if certificate is None:
         return None
@@ -364,12 +364,12 @@ def decay_rate(loop: Loop) -> DecayRate | None:
 
 
 # ----------------------------------------------------------------------
-# The verdict on a given K over a whole box, with every certified margin beside its limit.
+# Verdict on a given K over a whole box, with every certified margin and its limit.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Analysis:
-    """What is proved of a K about any constant reference, and how much more than the box it tolerates."""
+    """Proved stability of a K about any constant reference, with margins beyond the box."""
 
     decay: DecayRate | None  # None when no V was found for the whole box
     # β, s [1/s²] and w [1/s] of a vertex at which the loop is not asymptotically stable (Routh–Hurwitz, exact)
@@ -387,7 +387,7 @@ class Analysis:
 
     @property
     def certificates(self) -> dict[str, Certificate]:
-        """What was proved, by name: ``stability``, ``friction-slope``, ``low-beta`` and ``high-beta``."""
+        """Certificates by name: ``stability``, ``friction-slope``, ``low-beta`` and ``high-beta``."""
         by_name: dict[str, Certificate | None] = {"stability": self.decay.certificate if self.decay else None}
         by_name["friction-slope"] = self.slope.certificate if self.slope else None
         if self.span is not None:
@@ -427,7 +427,7 @@ def analysis(fault: Fault, controller: Controller) -> Analysis:
 
 
 def why_undecided(loop: FeedbackLoop) -> str:
-    """What is known about gains for which no V was found: an unstable vertex, or nothing."""
+    """Reason why no V was found for gains: an unstable vertex, or none known."""
     vertex = loop.unstable_vertex()
     if vertex is None:
         return (

@@ -39,22 +39,20 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.sos.solve.conic import hand_back, handing_back
 
 # ----------------------------------------------------------------------
-# The sampled law that runs, whatever its parameters do in time: one quadratic V and Wirtinger's inequality, exact.
+# The sampled law with arbitrarily time-varying parameters: one quadratic V and Wirtinger's inequality, exact.
 #
-# p = −Kx(t_k) is held, and the integrals are sums, ξ⁺ = ξ + T(x1, ξ1)(t_k): lines between the samples, so that for
-# all t
+# p = −Kx(t_k) is constant over a period, and the integrals are sums, ξ⁺ = ξ + T(x1, ξ1)(t_k), interpolated linearly
+# between samples, so that for all t
 #
 #     ẋ = (x2, s·x1 − w·x2 − βb(Kx + δu), x1 + δ1, ξ1 + δ2),   δ = y(t_k) − y(t),   y = (x1, ξ1, Kx).
 #
-# δ vanishes at every sample and δ' = −ẏ, so that for W > 0 (Liu, Suplin and Fridman 2010, IMA J. Math. Control Inf.
-# 27,
+# δ vanishes at every sample and δ' = −ẏ, so that for W > 0 (Liu, Suplin and Fridman 2010, IMA J. Math. Control Inf. 27,
 # 445) ∫δᵀWδ ≤ (2T/π)²∫ẏᵀWẏ over every period of at most T. If P > 0, W > 0 and
 #
 #     2xᵀPẋ + (2T/π)²ẏᵀWẏ − δᵀWδ < 0   for all (x, δ) ≠ 0 and all vertices of (s, w, β),
 #
-# the loop is exponentially stable for all measurable s, w, β in the box and all samples at most T apart. The left
-# side is
-# convex in (s, w, β), so that the vertices suffice.
+# the loop is exponentially stable for all measurable s, w, β in the box and all samples at most T apart. The left side
+# is convex in (s, w, β), so that the vertices suffice.
 
 FOUR_OVER_PI_SQUARED = Fraction(40529, 100000)  # not below (2/π)² = 0.4052847…
 BITS = (30, 45, 60)
@@ -73,18 +71,18 @@ class DelayProof:
     W: Matrix  # 3 × 3, in δ1, δ2, δu
 
     def covers(self, step: Fraction) -> bool:
-        """Whether it is about a period [s]."""
+        """Whether the proof covers a period [s]."""
         return 0 < step <= self.longest
 
     def forms(self, problem: LinearProblem, gains: Sequence[Fraction]) -> dict[str, Matrix]:
-        """Matrices that all have to be positive definite, by name."""
+        """Matrices that must all be positive definite, by name."""
         matrices = {"P": self.P, "W": self.W}
         for n, vertex in enumerate(problem.vertices()):
             matrices[f"v{n}_"] = decrease_form(problem, gains, self.longest, vertex, self.P, self.W)
         return matrices
 
     def holds(self, problem: LinearProblem, gains: Sequence[Fraction]) -> bool:
-        """Whether it proves the loop, exactly."""
+        """Whether the matrices prove stability of the loop, exactly."""
         return all(map(definite, self.forms(problem, gains).values()))
 
 
@@ -113,7 +111,7 @@ def _motion(problem: LinearProblem, K: Sequence[Fraction], vertex: Vertex) -> Ma
 
 
 def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float | str | Fraction) -> DelayProof | None:
-    """Search P and W by a semidefinite program, round them, and decide every vertex exactly; None: not found.
+    """Search P and W by a semidefinite program, round them, and decide every vertex exactly; None on failure.
 
     Parameters
     ----------
@@ -138,14 +136,14 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
 
 
 def proposed(programme: Callable[..., list[Rows]], *question: object) -> list[Rows]:
-    """What a programme proposes, or has proposed before; it is solved where somebody waits for it."""
+    """Solution proposed by a programme, cached; it is solved only where the caller waits for it."""
     if handing_back():
         return programme(*question)
     return list(search_once(lambda: programme(*question), programme.__module__, *question))
 
 
 def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> list[Rows]:
-    """P and W with the largest margin, in units in which all parts of the law are as large."""
+    """P and W with the largest margin, in units in which all parts of the law have equal size."""
     import cvxpy as cp
 
     units = balanced_units(K)
@@ -169,14 +167,14 @@ def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> l
 
 
 def solved(program: Any, margin: Any) -> bool:
-    """Whether a solver proposes something with a margin; where it breaks down, once more with firmer factorisations."""
+    """Whether a solver finds a solution with a margin; after a breakdown, retried with firmer factorisations."""
     import cvxpy as cp
 
     hand_back(program)
     for settings in ({}, {"static_regularization_constant": 1e-7}):
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # an inaccurate proposal is decided exactly like any other
+                warnings.simplefilter("ignore", UserWarning)  # inaccurate proposals are verified exactly, too
                 program.solve(solver=cp.CLARABEL, **settings)
         except cp.SolverError:
             continue
@@ -191,7 +189,7 @@ def scaled(matrix: Rows, rows: Iterable[Fraction], columns: Iterable[Fraction]) 
 
 
 def balanced_units(K: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Powers of two for x1, x2, ξ1, ξ2 in which k1x1, k2x2, k3ξ1 and k4ξ2 are as large."""
+    """Powers of two for x1, x2, ξ1, ξ2 in which k1x1, k2x2, k3ξ1 and k4ξ2 have equal size."""
     first = max(abs(float(K[0])), 1e-12)
     return tuple(Fraction(2) ** round(math.log2(first / max(abs(float(k)), 1e-12))) for k in K)
 
@@ -202,17 +200,17 @@ def law_unit(K: Sequence[Fraction], units: Sequence[Fraction]) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# The sampled law that runs, with a V that depends on the clock: longer periods than one V for all phases can prove.
+# The sampled law with a clock-dependent V, which proves longer periods than one V for all phases.
 #
 # Within a period, z = (x1, x2, q1, q2, p) moves by x1' = x2, x2' = s·x1 − w·x2 + βb·p while p and the sums q =
-# ξ(t_{k+1}), known since t_k, wait; at its end z⁺ = Jz: p⁺ = −K(x1, x2, q), q⁺ = q + T(x1, q1). V = zᵀP(θ)z with the
-# phase θ = t/T and P(θ) = Σ B_i(θ)P_i, Bernstein polynomials of degree D. By degree elevation of P' the loop is
-# exponentially stable if
+# ξ(t_{k+1}), known since t_k, are constant; at its end z⁺ = Jz: p⁺ = −K(x1, x2, q), q⁺ = q + T(x1, q1). V = zᵀP(θ)z
+# with the phase θ = t/T and P(θ) = Σ B_i(θ)P_i, Bernstein polynomials of degree D. By degree elevation of P' the loop
+# is exponentially stable if
 #
 #     i(P_i − P_{i−1}) + (D − i)(P_{i+1} − P_i) + T(AᵀP_i + P_iA) < 0   for all i,   JᵀP_0J < P_D,   P_0 > 0
 #
 # at all vertices of (s, w, β), for all measurable s, w, β in the box. The first is affine in T and the second convex,
-# so that the two ends of a range of periods prove every period in it, also one that changes from sample to sample.
+# so that the ends of a range of periods prove every period in it, also periods that vary from sample to sample.
 
 DEGREE = 8
 """Of P(θ): 4 reaches a longest period 2 % shorter, 12 one that is 0.5 % longer."""
@@ -228,11 +226,11 @@ class ClockProof:
     P: tuple[Matrix, ...]  # 5 × 5 each, in x1, x2, q1, q2, p
 
     def covers(self, step: Fraction) -> bool:
-        """Whether it is about a period [s]."""
+        """Whether the proof covers a period [s]."""
         return 0 < self.shortest <= step <= self.longest
 
     def forms(self, problem: LinearProblem, gains: Sequence[Fraction]) -> dict[str, Matrix]:
-        """Matrices that all have to be positive definite, by name."""
+        """Matrices that must all be positive definite, by name."""
         matrices = {"P": self.P[0]}
         for m, step in enumerate(dict.fromkeys((self.shortest, self.longest))):
             matrices[f"j{m}_"] = total(self.P[-1], times(-1, _after(_jump(gains, step), self.P[0])))
@@ -244,7 +242,7 @@ class ClockProof:
         return matrices
 
     def holds(self, problem: LinearProblem, gains: Sequence[Fraction]) -> bool:
-        """Whether it proves the loop, exactly."""
+        """Whether the matrices prove stability of the loop, exactly."""
         return 0 < self.shortest <= self.longest and all(map(definite, self.forms(problem, gains).values()))
 
 
@@ -292,7 +290,7 @@ def _jump(K: Sequence[Fraction], step: Fraction) -> Matrix:
 def clock_proof(
     problem: LinearProblem, gains: Sequence[Fraction], steps: tuple[Fraction, Fraction], *, degree: int = DEGREE
 ) -> ClockProof | None:
-    """Search P_0 … P_D by a semidefinite program, round them, and decide every form exactly; None: not found.
+    """Search P_0 … P_D by a semidefinite program, round them, and decide every form exactly; None on failure.
 
     Parameters
     ----------
@@ -320,7 +318,7 @@ def clock_proof(
 def _propose_clock_dependent(
     problem: LinearProblem, K: Sequence[Fraction], lengths: Sequence[Fraction], degree: int
 ) -> list[Rows]:
-    """P_0 … P_D with the largest margin, in units in which all parts of the law are as large."""
+    """P_0 … P_D with the largest margin, in units in which all parts of the law have equal size."""
     import cvxpy as cp
 
     own = balanced_units(K)
@@ -342,14 +340,14 @@ def _propose_clock_dependent(
 
 
 # ----------------------------------------------------------------------
-# Poles of the sampled law that runs, p held over a period and integrals summed, at constant parameters, in balls.
+# Poles of the sampled law, with zero-order hold and summed integrals, at constant parameters, in balls.
 #
 # A corner of the box with a pole outside the unit circle refutes a sampling period for the whole box. Inside the box
-# constant parameters may be worse than at its corners: what is not refuted here is not proved either.
+# constant parameters may be worse than at its corners: a period that is not refuted here is not thereby proved.
 
 _DOUBLINGS = 24
 _TOLERANCE = 0.01  # relative width at which the bisection stops
-_BITS = (100, 2000)  # the second for a plant that grows far within a period
+_BITS = (100, 2000)  # the second for a plant with large growth within a period
 
 
 def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, vertex: Vertex) -> list[acb]:
@@ -381,7 +379,7 @@ def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, ver
 
 @dataclass(frozen=True, slots=True)
 class HeldPoles:
-    """What the poles at the corners of the box tell about sampling periods."""
+    """Sampling periods that the poles at the corners of the box allow or refute."""
 
     problem: LinearProblem  # In SI
     gains: Sequence[Fraction]
@@ -396,8 +394,8 @@ class HeldPoles:
         }
 
     def unstable(self, step: Fraction) -> Vertex | None:
-        """Corner at which a period [s] is surely not asymptotically stable; None where none was found."""
-        if not self.gains[3]:  # then z = 1 is a pole, whatever the plant
+        """Corner at which a period [s] is proved not asymptotically stable; None without one."""
+        if not self.gains[3]:  # then z = 1 is a pole for every plant
             return self.problem.vertices()[0]
         return next((corner for corner, poles in self.at(step).items() if any(abs(z) > 1 for z in poles)), None)
 
@@ -406,13 +404,13 @@ class HeldPoles:
         return max(float(abs(z).mid()) for poles in self.at(step).values() for z in poles)
 
     def limit(self) -> tuple[Fraction, Fraction | None] | None:
-        """Longest period [s] that the corners allow, nearly, and a longer one that they refute.
+        """Nearly the longest period [s] that the corners allow, and a longer one that they refute.
 
         Returns
         -------
         (Fraction, Fraction or None) or None
-            The second is None where none was refuted, up to four million times the fastest pole's time; None when
-            all periods are refuted.
+            The second is None if none was refuted, up to four million times the fastest pole's time; None when all
+            periods are refuted.
         """
         loops = (floats(self.problem.loop(vertex, self.gains)) for vertex in self.problem.vertices())
         first = low = rational(f"{0.5 / max(float(np.abs(np.linalg.eigvals(loop)).max()) for loop in loops):.3e}")
@@ -434,11 +432,10 @@ class HeldPoles:
 
 
 # ----------------------------------------------------------------------
-# Up to which sampling period the law that runs is proved: summed integrals, parameters that vary as they like.
+# Longest proved sampling period of the law with summed integrals and arbitrarily varying parameters.
 #
 # The integrals are summed over the samples as in the scheme ``explicit``; β, s and w are measurable in time, anywhere
-# in
-# their ranges over the box, also inside a period.
+# in their ranges over the box, also inside a period.
 
 _SHARES = tuple(Fraction(n, 100) for n in (99, 98, 96, 93, 88, 80))
 """Of the limit at the corners, where a V that depends on the clock is tried; degree 8 reaches 98 or 99 %."""
@@ -451,7 +448,7 @@ HoldProof = DelayProof | ClockProof
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VaryingVerdict:
-    """Verdict on the law that runs at one sampling period."""
+    """Verdict on the sampled law at one sampling period."""
 
     verdict: Verdict  # REFUTED: not asymptotically stable with the constant parameters of `witness`
     step: Fraction  # T [s]
@@ -461,15 +458,15 @@ class VaryingVerdict:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LargestVaryingStep:
-    """How long the sampling period of the law that runs may be."""
+    """Longest proved sampling period of the sampled law, and a longer refuted one."""
 
     proved: LowerBound  # Every period in (0, proved] is stable [s]
-    # A longer one at which some constant parameters of the box are unstable [s]; in between it is open
+    # A longer one, unstable for constant parameters of the box [s]; undecided in between
     refuted: UpperBound | None
-    proofs: tuple[HoldProof, ...]  # Together about every period up to `proved`
+    proofs: tuple[HoldProof, ...]  # These cover every period up to `proved`
 
     def proof_at(self, step: Fraction) -> HoldProof | None:
-        """Proof that is about a period [s]."""
+        """Proof that covers a period [s]."""
         return next((proof for proof in self.proofs if proof.covers(step)), None)
 
 
@@ -480,7 +477,7 @@ def varying_verdict(
     *,
     longest: LargestVaryingStep | None = None,
 ) -> VaryingVerdict:
-    """Prove the law that runs, or refute it with constant parameters, at a sampling period.
+    """Prove the sampled law, or refute it with constant parameters, at a sampling period.
 
     Parameters
     ----------
@@ -489,7 +486,7 @@ def varying_verdict(
     step : number or text
         T [s].
     longest : LargestVaryingStep, optional
-        What is proved of these gains already.
+        Existing result for these gains.
     """
     period = rational(step, "step")
     witness = HeldPoles(problem, gains).unstable(period)
@@ -502,10 +499,10 @@ def varying_verdict(
 
 
 def largest_varying_step(problem: LinearProblem, gains: Sequence[Fraction]) -> LargestVaryingStep | None:
-    """Longest sampling period up to which the law that runs is proved.
+    """Longest sampling period up to which the sampled law is proved.
 
-    One V for all phases from short periods on, by bisection; then one that depends on the clock, range by range,
-    towards the longest one that constant parameters at the corners allow. Periods have four digits.
+    One V for all phases covers short periods, by bisection; then clock-dependent V cover further ranges, towards the
+    longest period that constant parameters at the corners allow. Periods have four digits.
 
     Parameters
     ----------
@@ -542,7 +539,7 @@ def _longest_delay(problem: LinearProblem, gains: Sequence[Fraction], most: Frac
 
 
 def _further(problem: LinearProblem, gains: Sequence[Fraction], low: Fraction, limit: Fraction) -> ClockProof | None:
-    """Proof from a period on, as far towards the limit at the corners as one is found."""
+    """Proof from a period on, as far towards the limit at the corners as possible."""
     for share in _SHARES:
         high = _short(share * limit)
         proof = clock_proof(problem, gains, (low, high)) if high > low else None
@@ -552,26 +549,26 @@ def _further(problem: LinearProblem, gains: Sequence[Fraction], low: Fraction, l
 
 
 def _refuted(corners: HeldPoles, step: Fraction) -> UpperBound:
-    """A refuted period, with four digits where the next longer one of four digits is refuted too."""
+    """Refuted period, rounded up to four digits if that period is refuted too."""
     longer = Fraction(f"{UpperBound(step):.4g}")
     return UpperBound(longer if corners.unstable(longer) else step)
 
 
 def _short(step: Fraction) -> Fraction:
-    """Four digits of a period, not above it."""
+    """Period rounded down to four digits."""
     return Fraction(f"{LowerBound(step):.4g}")
 
 
 # ----------------------------------------------------------------------
-# Everything that is decided of a K when p is held over a sampling period.
+# All results on a K with zero-order hold over a sampling period.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeldLoop:
-    """What is decided of a K when p is held over a sampling period."""
+    """Results on a K with zero-order hold over a sampling period."""
 
-    runs: VaryingVerdict  # About the law that runs: summed integrals, any course of the parameters
-    longest: LargestVaryingStep | None  # Up to which period that is proved
+    runs: VaryingVerdict  # Verdict with summed integrals and any time history of the parameters
+    longest: LargestVaryingStep | None  # Longest proved period
     radius: float  # Spectral radius of a period, largest over the vertices, measured
 
     @property
@@ -581,16 +578,16 @@ class HeldLoop:
 
     @property
     def largest_step(self) -> LowerBound | None:
-        """Every period up to it is proved for the law that runs [s]."""
+        """Every period up to this one is proved for the sampled law [s]."""
         return self.longest.proved if self.longest else None
 
     @property
     def refuted_step(self) -> UpperBound | None:
-        """Longer period that constant parameters make unstable [s]; in between it is open."""
+        """Longer period, unstable for constant parameters [s]; undecided in between."""
         return self.longest.refuted if self.longest else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; periods that are proved are floats from below."""
+        """Plain values, SI; proved periods are floats rounded down."""
         refuted, witness = self.refuted_step, self.runs.witness
         return {
             "step": float(self.step),
@@ -608,7 +605,7 @@ def _number(bound: LowerBound | UpperBound | None) -> float | None:
 
 
 def sampled_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | str | Fraction) -> HeldLoop:
-    """Decide a K at a sampling period [s], and up to which period it holds.
+    """Decide a K at a sampling period [s], with its longest proved period.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ _ZERO: Range = (Fraction(0), Fraction(0))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contribution:
-    """What one uncertain quantity adds to h."""
+    """Contribution of one uncertain quantity to h."""
 
     name: str
     acts_on: str  # ``"slip"``, ``"slip rate"``, or ``"nothing"`` for a part that does not vanish at the equilibrium
@@ -80,13 +80,13 @@ _UNITS = {"slip": ("1/s²", "Pa/m"), "slip rate": ("1/s", "Pa·s/m"), "nothing":
 
 
 def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> UncertaintyBounds:
-    """Bounds of a fault, every term named.
+    """Bounds of a fault, term by term with names.
 
     Parameters
     ----------
     fault : Fault
     loading_rate : float or str
-        v∞ [m/s], speed of the far end: k̂v∞t stays as a term that does not vanish (ERRATA 24).
+        v∞ [m/s], speed of the far end: k̂v∞t remains as a non-vanishing term (ERRATA 24).
 
     Raises
     ------
@@ -114,7 +114,7 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
 
 
 def _terms(fault: Fault, sectors: Sectors, ranges: Any, values: Any, drift: Fraction) -> list[tuple[str, str, Range]]:
-    """Name, what it acts on, and range in x2' of every term of b·h."""
+    """Name, argument, and range in x2' of every term of b·h."""
     friction, disturbance = friction_bounds(fault.friction), fault.disturbance
     load = ranges[plant.N_hat][1] * sectors.largest_effective_stress
     slip_chord, rate_chord = (load * slope for slope in (friction.slip_slope, friction.rate_slope))

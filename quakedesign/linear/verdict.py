@@ -1,4 +1,4 @@
-"""Verdict on a given gain K for a fault, with the files that prove it.
+"""Verdict on a given gain K for a fault, with its certificate files.
 
 Definiteness of a matrix is written as a sum of squares (proofs/FORMAT.md).
 """
@@ -34,12 +34,12 @@ _LARGEST = 16
 
 
 def sampled_files(problem: LinearProblem, gains: Sequence[Fraction], verdict: VaryingVerdict) -> list[Answer]:
-    """Every form, in SI, whose definiteness proves a held loop; nothing for another verdict."""
+    """Every form, in SI, whose definiteness proves a sampled loop; none for another verdict."""
     return definite_files(verdict.proof.forms(problem, gains)) if verdict.proof is not None else []
 
 
 def definite_files(forms: Mapping[str, Matrix]) -> list[Answer]:
-    """Answers that together prove every matrix positive definite, each about forms in variables of their own.
+    """Results that together prove every matrix positive definite, each form with its own variables.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def definite_files(forms: Mapping[str, Matrix]) -> list[Answer]:
 
 
 def _groups(forms: Mapping[str, Matrix]) -> Iterator[dict[str, Matrix]]:
-    """Forms in order, together of at most 16 variables."""
+    """Forms in order, in groups of at most 16 variables."""
     group: dict[str, Matrix] = {}
     for name, matrix in forms.items():
         if group and sum(map(len, group.values())) + len(matrix) > _LARGEST:
@@ -86,7 +86,7 @@ def _answer(group: Mapping[str, Matrix]) -> Answer:
 
 
 # ----------------------------------------------------------------------
-# Everything that is decided of a given K on a fault, with the files that prove it.
+# All results on a given K for a fault, with their certificate files.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,9 +97,9 @@ class LinearVerdict:
     controller: ExtendedLQR
     analysis: Analysis
     facts: Json  # See `linear_entries`
-    held: HeldLoop  # What is decided when p is held over the sampling period asked for
-    peaks: ContinuousProof | NoProof | None  # In continuous time; None when they were not asked for
-    asked: str | None = None  # Class of the disturbance for which peaks were asked for
+    held: HeldLoop  # Results with zero-order hold over the requested sampling period
+    peaks: ContinuousProof | NoProof | None  # In continuous time; None if not requested
+    asked: str | None = None  # Class of the disturbance of requested peaks
 
     def to_dict(self) -> Json:
         """Plain values: exact numbers as texts, measured ones as numbers, SI."""
@@ -119,7 +119,7 @@ class LinearVerdict:
         return by_name | {f"held{f'-{n}' if n else ''}": answer for n, answer in enumerate(sampled)}
 
     def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
-        """Write every proof: the one of stability to `out`, the others beside it with their names added.
+        """Write every proof: that of stability to `out`, the others to the same folder with their names added.
 
         Returns
         -------
@@ -152,14 +152,14 @@ class LinearVerdict:
 def judge(
     fault: Fault, controller: ExtendedLQR, *, step: float | str | None = None, peaks: str | None = None
 ) -> LinearVerdict:
-    """Decide what holds for a given K on a fault over its uncertainty box.
+    """Decide the properties of a given K on a fault over its uncertainty box.
 
     Parameters
     ----------
     fault : Fault
     controller : ExtendedLQR
     step : number or text, optional
-        Sampling period [s]; the fault's without.
+        Sampling period [s]; by default that of the fault.
     peaks : str, optional
         Class of the disturbance, ``"amplitude"`` or ``"rate"``, for which peaks are certified.
 
@@ -191,7 +191,7 @@ def linear_entries(fault: Fault, controller: ExtendedLQR, sampled: HeldLoop) -> 
     Parameters
     ----------
     sampled : HeldLoop
-        What is decided of the same gains when p is held.
+        Results on the same gains with zero-order hold.
 
     Returns
     -------

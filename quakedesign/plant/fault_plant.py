@@ -4,10 +4,10 @@ About p*(t), the pressure of equilibrium at rest at the reference r(t), the erro
 
     e1′ = e2,   e2′ = s·e1 − w·e2 + β·b·(p − p*) + φ − w·r′ − r″.
 
-p* balances N̂(μ*σ′ − μ(r, 0)(σ′ − p*)) = (k̂ − φ1)r; s and w are chords of friction between x and (r, 0), times N̂(σ′
-− p*), with −k̂ + φ1 and η̂ − φ2; β·b = μ(x)N̂. So all three lie in ranges for every friction μ(x) with the bounds
-and slopes given, and, k̂, N̂ and φ1 being constant, b·|dp*/dt| = |s_r|r′/β_r with s_r, β_r in the same
-ranges. r stands still outside [0, t_op].
+p* balances N̂(μ*σ′ − μ(r, 0)(σ′ − p*)) = (k̂ − φ1)r; s and w are chords of friction between x and (r, 0), times N̂(σ′ −
+p*), with −k̂ + φ1 and η̂ − φ2; β·b = μ(x)N̂. So all three lie in ranges for every friction μ(x) with the given bounds
+and slopes. As k̂, N̂ and φ1 are constant, b·|dp*/dt| = |s_r|r′/β_r with s_r, β_r in the same ranges. r is constant
+outside [0, t_op].
 """
 
 from collections.abc import Iterable
@@ -55,7 +55,7 @@ class FaultPlant:
     ----------
     name : str
     density, shear_modulus, length, damping, normal_stress : Fraction
-        ρ, G, L, η, σ′; of one square of a patch of several.
+        ρ, G, L, η, σ′; for a patch of several squares, those of one square.
     spreads : (Fraction, Fraction, Fraction)
         Relative half-widths of k̂, η̂ and N̂ [-].
     friction : Friction
@@ -151,7 +151,7 @@ class FaultPlant:
 
     @cached_property
     def stress(self) -> Range:
-        """Range of σ′ − p* [Pa] along the reference; monotone in μ, κ, and in r between the points tried."""
+        """Range of σ′ − p* [Pa] along the reference, monotone in μ, κ, and in r between the evaluated points."""
         law, target = self.friction, self.target_slip
         breaks = {Fraction(0), target}
         breaks |= {(law.static - law.least) / law.weakening} if law.weakening else set()
@@ -206,7 +206,7 @@ class FaultPlant:
 
     @cached_property
     def reference_jerk(self) -> Fraction:
-        """Bound of |r‴| [m/s³] within the task; where r″ jumps at its ends there is none."""
+        """Bound of |r‴| [m/s³] within the task; does not exist where r″ jumps at its ends."""
         bound = max(map(abs, _range_of(_derived(self.shape, 3))))
         return bound * self.target_slip / self.operation_time**3
 
@@ -221,13 +221,13 @@ class FaultPlant:
 
     @cached_property
     def model(self) -> NominalModel:
-        """Nominal model: middle of the ranges."""
+        """Nominal model: midpoints of the ranges."""
         s, w, beta = ((low + high) / 2 for low, high in (self.slip_chord, self.rate_chord, self.beta))
         return NominalModel(slip=s, rate=w, gain=beta * self.authority)
 
     @cached_property
     def half_ranges(self) -> dict[str, Fraction]:
-        """Half the ranges of s, w and β by the output that they multiply."""
+        """Half-widths of the ranges of s, w and β, by the output that they multiply."""
         return {
             name: (high - low) / 2
             for name, (low, high) in (
@@ -250,7 +250,7 @@ class FaultPlant:
 
     @property
     def course(self) -> str:
-        """How far the reference moves and in which time, for people."""
+        """Distance and duration of the reference, as text."""
         return f", which moves {quantity(float(self.target_slip), 'm')} in {duration(float(self.operation_time))}"
 
     def differences(self, other: "FaultPlant") -> list[str]:
@@ -274,7 +274,7 @@ def _derived(shape: tuple[Fraction, ...], order: int) -> tuple[Fraction, ...]:
 
 
 def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
-    """Coefficients on both halves (de Casteljau), on the right one from its end."""
+    """Coefficients on both halves (de Casteljau), those of the right half from its end."""
     left, right = [], []
     while row:
         left.append(row[0])
@@ -286,7 +286,7 @@ def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
 def _range_of(shape: tuple[Fraction, ...]) -> Range:
     """Enclosure of a polynomial on [0, 1], by halving."""
     n = len(shape) - 1
-    rows = [  # coefficients in Bernstein's basis, whose hull holds every value
+    rows = [  # Bernstein coefficients, whose hull contains every value
         [sum((Fraction(comb(i, j), comb(n, j)) * shape[j] for j in range(i + 1)), Fraction(0)) for i in range(n + 1)]
     ]
     for _ in range(_HALVINGS):
@@ -310,7 +310,7 @@ _SPREADS = ("stiffness", "damping", "authority")
 
 
 def _other(proved: FaultPlant, asked: FaultPlant) -> list[str]:
-    """Constants that are not the same."""
+    """Constants that differ."""
     pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(asked, name)) for name, unit in _SAME.items()}
     pairs["static friction [-]"] = proved.friction.static, asked.friction.static
     for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, asked.growths, strict=True):
@@ -339,7 +339,7 @@ def _wider_than_needed(proved: FaultPlant, asked: FaultPlant) -> list[str]:
 
 
 def _rougher(proved: Friction, asked: Friction) -> list[str]:
-    """Bounds of friction that reach beyond those of the proof."""
+    """Bounds of friction beyond those of the proof."""
     beyond = {part.name: getattr(asked, part.name) > getattr(proved, part.name) for part in fields(Friction)}
     beyond |= {"static": False, "least": asked.least < proved.least}
     names = [name for name, wider in beyond.items() if wider]

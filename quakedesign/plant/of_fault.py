@@ -32,12 +32,12 @@ def static_friction(fault: Fault) -> Fraction:
 def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
     """Slow-sliding plant at V, the first rate of the reference, under a stress of at most `stress` [Pa].
 
-    The ranges of a, b and D are their values and `spread` of them to both sides [-]; that of μ* follows from a − b.
+    The ranges of a, b and D extend by the fraction `spread` to both sides [-]; that of μ* follows from a − b.
 
     Raises
     ------
     UnsupportedError
-        For friction without a state, or whose state feels the normal stress, and for a ramp from 8/23 on.
+        For friction without a state, or whose state depends on the normal stress, and for a ramp of at least 8/23.
     """
     if fault.friction.name not in _LAWS or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
         sensitivity = getattr(fault.friction, "stress_sensitivity", 0)
@@ -84,10 +84,10 @@ def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fracti
 
 
 def plant_like(plant: FaultPlant | SlidingPlant, fault: Fault, *, wide: bool = False) -> FaultPlant | SlidingPlant:
-    """Plant of a fault of the same kind as a given one: of its class of disturbances, or under its stress.
+    """Plant of a fault of the same kind as a given one, with its class of disturbances or its stress.
 
-    In slow sliding constants of friction are those of the fault, with the given plant's ramp of the planned pressure,
-    which belongs to its law. With `wide` they are as uncertain as the given plant's, with the fault's own ramp.
+    In slow sliding the constants of friction are those of the fault, and the ramp of the planned pressure is that of
+    the given plant and its law. With `wide` they are as uncertain as the given plant's, with the fault's own ramp.
     """
     if isinstance(plant, FaultPlant):
         return uncertain_plant(fault, rate_limited=plant.change is not None)

@@ -1,7 +1,6 @@
 """Plant of a rate-and-state fault in slow sliding, in rationals, and cells of its parameter box.
 
-Quantities are per unit of area. Bisection of the box of constants gives cells that cover it, whatever the
-cuts.
+Quantities are per unit of area. Cuts of the box of constants give cells that cover it for every choice of cuts.
 """
 
 from collections.abc import Mapping
@@ -15,13 +14,13 @@ from quakedesign.exact import apart, shortly, six_digits
 from quakedesign.loop import StateLaw
 
 # ----------------------------------------------------------------------
-# What a guarantee of slow sliding uses of a fault with rate-and-state friction, in rationals.
+# Data of a rate-and-state fault for a guarantee of slow sliding, in rationals.
 #
 # Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at V,
 # μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
-# state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). The fault slides at V at first,
-# without pressure, its far end at rest. Along a reference r from 0, whose rate stays within V(1 ± ``swing``), it then
-# needs p* = Kr/μ*, of which the plan brings ``ramp``·r/V. Without a swing r = Vt.
+# state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). Initially the fault slides at V,
+# without pressure, with its far end at rest. Along a reference r from 0, whose rate stays within V(1 ± ``swing``), it
+# then needs p* = Kr/μ*, of which the plan supplies ``ramp``·r/V. If ``swing`` is 0, r = Vt.
 
 Range = tuple[Fraction, Fraction]
 AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
@@ -53,15 +52,15 @@ class SlidingPlant:
     ranges : mapping of str to (Fraction, Fraction)
         By the names of `AXES`.
     rate, distance, ramp : Fraction
-        V [m/s], how far the reference goes [m], and how fast the planned pressure rises along Vt [Pa/s].
+        V [m/s], distance of the reference [m], and rate of the planned pressure along Vt [Pa/s].
     swing : Fraction
-        How far the rate of the reference may be from V, over V [-], below 1; 0 for a constant rate.
+        Largest relative deviation of the reference rate from V [-], below 1; 0 for a constant rate.
     stress : Fraction
         Bound of the shear stress disturbance [Pa].
     state_law : str
         ``"ageing"`` or ``"slip"``.
     regularised : bool
-        Whether friction is of the form that stays finite at rest.
+        Whether friction has the regularised form, which is finite at rest.
     """
 
     name: str
@@ -100,14 +99,14 @@ class SlidingPlant:
 
     @property
     def course(self) -> str:
-        """For people; nothing, as the reference slides throughout."""
+        """Empty text, as the reference slides throughout."""
         return ""
 
     def differences(self, other: "SlidingPlant") -> list[str]:
-        """Differences to another task that a proof for this one does not cover, with both values, SI.
+        """Differences of another task that a proof for this one does not cover, with both values, SI.
 
         Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
-        swing and stress lie within those of the proof. The name is none of it.
+        swing and stress must lie within those of the proof. The name is not compared.
         """
         texts = [
             f"{name} [{unit}] {_in_words(getattr(self, name))} there, {_in_words(getattr(other, name))} here"
@@ -164,12 +163,12 @@ class SlidingPlant:
 
 
 def _in_words(value: Fraction | str | bool) -> str:
-    """With six digits, or as it is."""
+    """Number with six digits, or unchanged text."""
     return six_digits(value) if isinstance(value, Fraction) else str(value)
 
 
 # ----------------------------------------------------------------------
-# A box of constants, cut in two again and again: whatever the cuts, the cells cover it.
+# Repeated cuts of a box of constants: the cells cover it for every choice of cuts.
 
 MOST_CELLS = 64
 Cuts = tuple[tuple[str, Fraction] | None, ...]

@@ -1,4 +1,4 @@
-"""Every search: gains with a proof, and verdicts on given gains."""
+"""Design of gains with a proof, guarantees, and verdicts on given gains."""
 
 from quakedesign.arguments import attach
 

@@ -1,6 +1,6 @@
 """Design methods by family of control laws: problem, interface and sampled linear laws.
 
-The base method also judges a law that belongs to no family.
+The base method also assesses a law that belongs to no family.
 """
 
 from collections.abc import Callable
@@ -60,7 +60,7 @@ class SlowSlidingDesign:
     diffusion : Fraction or None
         L²/D [s]; None for a well near the fault.
     stress : Fraction or None
-        [Pa]; None for about the largest with a guarantee.
+        [Pa]; None for nearly the largest with a guarantee.
     spread : Fraction
         [-].
     """
@@ -84,11 +84,11 @@ class GainProblem(Generic[Designed]):
     feedforward : FeedForward
     setup : LoopSetup
     sliding : SlowSlidingDesign or None
-        Of friction with a state.
+        For friction with a state.
     disturbance_class : str
         Class of the disturbances of a guarantee, ``amplitude`` or ``rate``.
     plant : str or None
-        ``printed`` for a guarantee on the plant without stick alone.
+        ``printed`` for a guarantee on the plant without stick only.
     tell : callable
         Called with the present task of a long search, and the completed fraction [-].
     """
@@ -106,7 +106,7 @@ class GainProblem(Generic[Designed]):
 
     @property
     def task(self) -> FaultPlant:
-        """Uncertain plant of the fault, as a guarantee uses it."""
+        """Uncertain plant of the fault for a guarantee."""
         return uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
 
     def require_exact_in_continuous_time(self) -> None:
@@ -136,7 +136,7 @@ class GainProblem(Generic[Designed]):
     ) -> Designed:
         """Gains with their results; premises of the sampled loop come first.
 
-        The default verdict is that on the certificate; for a sampled law it is that on the sampled loop.
+        The default verdict is that on the certificate, or for a sampled law that on the sampled loop.
         """
         own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
         verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
@@ -163,7 +163,7 @@ class GainProblem(Generic[Designed]):
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """Problem of a guarantee of the sampled loop."""
+    """Problem of a guarantee for a sampled loop."""
 
     gains: tuple[str, ...] = ()
     objective: str = OBJECTIVES[0]
@@ -206,11 +206,11 @@ class DesignMethod(Generic[L]):
     family : type of Controller
         From which the laws of the family derive.
     designs : bool
-        Whether it finds gains for a fault.
+        Whether the method computes gains for a fault.
     without_state : str
-        Why it finds none for friction with a state; empty where it does.
+        Reason why there are none for friction with a state; empty if there are.
     takes_base_gains : bool
-        Whether it scales base gains, as of a sliding mode.
+        Whether the method scales base gains, as for a sliding mode.
     """
 
     name: ClassVar[str] = "any"
@@ -301,13 +301,13 @@ def method_of(law: type[Controller]) -> DesignMethod[Any]:
 
 
 def designable(fault: Fault | None = None) -> tuple[str, ...]:
-    """Names of the package's laws that find gains for a fault; for some fault if none is given."""
+    """Names of the package's laws with a design method for a fault, or for any fault if none is given."""
     left = left_out(fault) if fault is not None else {}
     return tuple(name for name, law in control_laws().items() if method_of(law).designs and name not in left)
 
 
 def left_out(fault: Fault) -> dict[str, str]:
-    """Why laws of the package that find gains for others find none for a fault, by name."""
+    """Reasons why laws with a design method for other faults have none for this fault, by name."""
     able = {name: method_of(law) for name, law in control_laws().items()}
     return {name: why for name, method in able.items() if method.designs and (why := _why_none(fault, method))}
 
@@ -339,7 +339,7 @@ class Samples(DesignMethod[SampledController]):
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingProof | NoProof:
-        """Guarantee at the law's T_s; its own path applies where the loop setup has none."""
+        """Guarantee at the law's T_s; the path of the law applies unless the loop setup has one."""
         law, step = controller.law, controller.step
         if setup.step is not None and setup.step != step:
             own, requested = apart(step, setup.step)
@@ -395,16 +395,16 @@ class Samples(DesignMethod[SampledController]):
 
 
 def _times(factor: Fraction | int, law: LinearLaw) -> LinearLaw:
-    """A law with its pressure multiplied."""
+    """Law with its pressure multiplied by a factor."""
     output, feedback = (tuple(factor * v for v in row) for row in (law.output, law.feedback))
     *states, pressure = law.of_reference or ((),)
     moved = (*states, tuple(factor * v for v in pressure)) if law.of_reference else ()
     return replace(law, output=output, feedback=feedback, of_reference=moved)
 
 
-_STABLE = 1 - 1e-6  # an eigenvalue that is 1 may be computed as less
+_STABLE = 1 - 1e-6  # an eigenvalue of 1 may be computed below 1
 _OPPOSITE = "; with the opposite sign of the pressure it is stable"
-_FACTORS = tuple(map(Fraction, ("1/2", "2", "1/4", "4", "-1", "1/16", "16")))  # tried where a law has no guarantee
+_FACTORS = tuple(map(Fraction, ("1/2", "2", "1/4", "4", "-1", "1/16", "16")))  # tried if a law has no guarantee
 _DELAYS = Fraction(3, 4), Fraction(1, 2), Fraction(1, 4)
 """Shares of a delay for which a given law is tried where it has no guarantee."""
 _STANDING = (

@@ -34,7 +34,7 @@ def guarantee_plant(
     setup : LoopSetup
         Step, delay and lag.
     decentralised : bool
-        Of a law that is designed: whether the pressure of each well depends on its own measurements alone.
+        For a designed law: whether the pressure of each well depends on its own measurements alone.
     """
     if unknown := setup.given().keys() - _KNOWN:
         raise ParameterError(
@@ -46,7 +46,7 @@ def guarantee_plant(
     radius, mode = escaping(around, exact)
     if radius >= 1:
         count = _shown(around)
-        mode = mode / (max(mode[:count], key=abs) or 1)  # blocks may have pressures [Pa] beside slips [m]
+        mode = mode / (max(mode[:count], key=abs) or 1)  # blocks may have pressures [Pa] as well as slips [m]
         shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[:count], 9))
         seen = np.abs(np.array(around.C, dtype=float) @ mode).max() > _UNSEEN
         return NoProof(
@@ -65,7 +65,7 @@ def _shown(plant: UncertainPlant) -> int:
 def _law_of(
     plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup, decentralised: bool
 ) -> tuple[MatrixLaw, tuple[str, ...]]:
-    """A law in exact numbers, and what was changed for it."""
+    """Law in exact numbers, and notes of the changes by rounding."""
     entries: Any = gains if hasattr(gains, "shape") else list(gains)
     empty = len(entries) == 0
     if (law is None) == empty and not (law is None and "slope of block 1" in plant.sectors and not setup.delay):

@@ -39,7 +39,7 @@ class TrialSampling:
     fault : Fault
     law : type of Controller
     gain_range : tuple of two
-        b_m and b_M that the gains must be proved for.
+        b_m and b_M of the required proof.
     scale, divisor : Fraction
         λ and μ0N̂0 [m²/kg] of the controller; λ scales |h'| ≤ 1 of the base gains to the required bound.
     metric, scheme : str
@@ -96,11 +96,11 @@ def sampling(
     law : str
         A sliding mode.
     lipschitz : number or text, optional
-        L̄ [m/s³]; a tenth above what the fault's reference and disturbance need unless given.
+        L̄ [m/s³]; by default 1.1 times the requirement of the fault's reference and disturbance.
     gain_range : tuple of two, optional
         b_m and b_M; those of the fault's box unless given.
     metric : str
-        One of `Metrics` that are better when smaller.
+        One of `Metrics`, to be minimised.
     scheme : str
         One of `quakedesign.loop.schemes`.
     step : float, optional
@@ -111,7 +111,7 @@ def sampling(
     Raises
     ------
     ParameterError
-        For a law that is no sliding mode, an unknown metric or scheme, or numbers that are not positive.
+        For a law that is not a sliding mode, an unknown metric or scheme, or numbers that are not positive.
     """
     chosen = control_law(law)
     divisor = least_authority(fault)
@@ -147,8 +147,8 @@ def synthesise_sampled(
     """Find proved base gains with the least simulated error, for |h'| ≤ 1 and a range of β.
 
     The search uses the Nelder–Mead method on the logarithms of the gains, from the gains of the smallest norm and from
-    the best published ones. Every point is screened before it is simulated. The error is that of one window of one run;
-    it is not part of the proof.
+    the best published ones. Every point is screened before it is simulated. The error is that of one window of one run,
+    and is not part of the proof.
 
     Parameters
     ----------
@@ -156,12 +156,12 @@ def synthesise_sampled(
     degrees : iterable of int, optional
         Of V, as for `synthesise`; the search itself uses the last.
     rounds : int
-        Simulations at most.
+        Largest number of simulations.
 
     Returns
     -------
     Synthesis or None
-        Its value is the metric, in its unit; never worse than that of gains from the literature that are proved.
+        Its value is the metric, in its unit; never worse than that of proved gains from the literature.
     """
     problem = question(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
     measured = [_measured(trial, problem, loop) for loop in problem.published]
@@ -195,7 +195,7 @@ def synthesise_sampled(
 def _tried(
     trial: TrialSampling, problem: SynthesisProblem, begin: Sequence[Fraction], rounds: int
 ) -> dict[float, tuple[Fraction, ...]]:
-    """Screened gains by their errors, from some gains on."""
+    """Screened gains and their errors, from given initial gains."""
     base = {name: float(k) for name, k in zip(problem.loop.gains, begin, strict=True)}
     free = [name for name, k in base.items() if k]
     setting = replace(problem.setting, degree=problem.degrees[-1])

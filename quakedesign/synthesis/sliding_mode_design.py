@@ -80,7 +80,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         return _compensated(problem, base, certificate)
 
     def assess(self, problem: GainProblem[Designed], controller: SlidingMode) -> Designed:
-        """Try 99, 90 and 50 % of the bound on |h'| that no V can exceed."""
+        """Verdict for 99, 90 and 50 % of the bound on |h'| that no V can exceed."""
         runs = guarantee_of(problem.task, controller) if controller.sampling else None
         limit = controller.lipschitz_limit / controller.scale
         beta = coefficient_range(problem.fault, controller.divisor)
@@ -106,7 +106,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SlidingMode, setup: LoopSetup
     ) -> FaultProof | NoProof:
-        """In the scheme ``compensated`` or ``stick-slip``, and in no other."""
+        """Guarantee in the scheme ``compensated`` or ``stick-slip``, and in no other."""
         return guarantee_of(task, controller, ExactSetup(**setup.noise))
 
     def base_law(self, task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...]) -> SlidingMode:
@@ -114,7 +114,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         return deadbeat(task, law, gains).controller
 
     def compensation(self, controller: SlidingMode, proof: FaultProof | NoProof) -> Compensation:
-        """With the weight and the authority of its scheme."""
+        """Sliding mode with weight and authority of its scheme."""
         return Compensation(controller=controller, proof=proof)
 
     def variants(self, fault: Fault, controller: SlidingMode, certificate: Certificate | None) -> tuple[Variant, ...]:
@@ -146,7 +146,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
 
 
 def _proved_base(fault: Fault, law: type[SlidingMode]) -> tuple[BaseGains[SlidingMode], Certificate | None]:
-    """First base gains of a law that are proved for the fault's range of β, else the first."""
+    """First base gains of a law with a proof for the fault's range of β, else the first ones."""
     beta, candidates = coefficient_range(fault, least_authority(fault)), law.base_gains()
     for base in candidates:
         loop = sliding_mode_loop(base.law, base.lipschitz, beta)
@@ -200,7 +200,7 @@ def _scaled(
     certificate: Certificate | None,
     runs: NoProof | None = None,
 ) -> Designed:
-    """Design in continuous time; `runs` has the reason why there is no sampled guarantee."""
+    """Design in continuous time; `runs` gives the reason why there is no sampled guarantee."""
     law, divisor, added = base.law, least_authority(problem.fault), problem.feedforward
     why = {"reason": runs.reason} if runs else {}
     if certificate is None:

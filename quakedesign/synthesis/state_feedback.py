@@ -55,7 +55,7 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
     without_state: ClassVar[str] = ""
 
     def design(self, problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
-        """As it runs, or with an exact proof about any constant reference in continuous time."""
+        """Sampled design, or a design in continuous time with an exact proof about any constant reference."""
         if problem.feedforward != NONE:
             raise ParameterError(
                 f"feedforward is for sliding modes. Received {problem.feedforward.name!r} with {law.name}. "
@@ -67,14 +67,14 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         return _continuous(problem, law) if problem.continuous else _sampled(problem, law)
 
     def assess(self, problem: GainProblem[Designed], controller: ExtendedLQR) -> Designed:
-        """Over the fault's sectors."""
+        """Verdict over the fault's sectors."""
         loop = sector_loop(controller, sectors(problem.fault))
         return _judged(problem, controller, quadratic_certificate(loop), {})
 
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: ExtendedLQR, setup: LoopSetup
     ) -> FaultProof | NoProof:
-        """With integrals summed over the T_s of the fault."""
+        """Guarantee with integrals summed over the T_s of the fault."""
         if controller.feedback != "error" or controller.limits is not None or controller.offset:
             return super().guarantee(fault, task, controller, setup)
         step = rational(fault.sampling_time)
@@ -84,11 +84,11 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
     def certified_peaks(
         self, fault: Fault, controller: ExtendedLQR, disturbance_class: str
     ) -> ContinuousProof | NoProof:
-        """In continuous time."""
+        """Certified peaks in continuous time."""
         return certified_peaks(fault, controller, disturbance_class=disturbance_class)
 
     def held_loop(self, fault: Fault, controller: ExtendedLQR) -> HeldLoop | None:
-        """The law as it is, over the fault's T_s."""
+        """Stability of the unchanged law with zero-order hold over the fault's T_s."""
         return sampled_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
 
     def sampled(
@@ -149,7 +149,7 @@ def sticking_options(problem: GainProblem[Any]) -> dict[str, Any]:
 
 
 def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
-    """On the stick–slip plant where that is proved, else on the plant without stick."""
+    """Design on the stick–slip plant if proved there, else on the plant without stick."""
     fault = problem.fault
     step, task, setup = rational(fault.sampling_time), problem.task, problem.setup
     without: dict[str, Any] = {}
@@ -180,7 +180,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
 
 
 def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: type[ExtendedLQR]) -> Designed:
-    """A law of the slip alone that holds slow sliding along the task."""
+    """Design of a law of the slip alone for slow sliding along the task."""
     usual = OBJECTIVES[0], CLASSES[0]
     if problem.continuous or (problem.objective, problem.disturbance_class) != usual or problem.setup.noise:
         raise ParameterError(
@@ -235,7 +235,7 @@ def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certifi
     ----------
     loop : Loop
     theta : matrix (4 × 4) of Fraction, optional
-        V = xᵀΘx in SI that may be a proof.
+        Candidate V = xᵀΘx in SI.
     """
     certificate = find_certificate(loop, 2) or robust_stability(loop)
     return certificate or (finished_exactly(loop, theta) if theta is not None else None)
@@ -244,7 +244,7 @@ def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certifi
 def _judged(
     problem: GainProblem[Designed], controller: ExtendedLQR, certificate: Certificate | None, details: dict[str, Any]
 ) -> Designed:
-    """Refuted where a constant vertex of the box is not stable, undecided where no V was found."""
+    """Refuted if a constant vertex of the box is not stable, undecided if no V was found."""
     details = {**details, "rate": str(certificate.claims["rate"]) if certificate else None}
     if certificate is not None:
         return problem.judged(controller, certificate, details=details)

@@ -1,6 +1,6 @@
 """Objects shared by several kinds of guarantee files: fault, reference, disturbance, step.
 
-Each object says what its keys are and how it becomes a value of the package, and back.
+Each class declares its keys and converts to a value of the package, and back.
 """
 
 from fractions import Fraction
@@ -37,7 +37,7 @@ class SpreadEntries(Entries):
 
 
 class FaultEntries(Entries):
-    """A fault with friction without a state."""
+    """A fault with friction of slip and slip rate."""
 
     name: FaultName
     density: Fraction
@@ -66,7 +66,7 @@ class DisturbanceEntries(Entries, kw_only=True):
 
 
 class TaskEntries(Entries):
-    """Beginning of a file about a fault with friction without a state."""
+    """Common keys of files about a fault with friction of slip and slip rate."""
 
     fault: FaultEntries
     reference: ReferenceEntries
@@ -102,7 +102,7 @@ Powers = Annotated[tuple[PowerEntries, ...], Meta(max_length=MOST_TERMS)]
 
 
 class RootEntries(Entries):
-    """The sum q of an implicit step, and the lines between which its root lies."""
+    """The sum q of an implicit step, and the lines that enclose its solution."""
 
     pull: Powers
     slopes: Pair

@@ -1,6 +1,6 @@
 """Certificate files of guarantees (proofs/FORMAT.md): typed objects, reading, writing.
 
-An object says what its keys are; `quakedesign.sos.exact.strict` reads and writes it by their types. Numbers are in SI
+Each class declares its keys; `quakedesign.sos.exact.strict` reads and writes objects by their types. Numbers are in SI
 units.
 """
 
@@ -71,7 +71,7 @@ class JitterEntries(Entries):
 
 
 class PumpEntries(Entries):
-    """Limits of the pressure at the valve [Pa], [Pa/s], and the longest time of a change [s]."""
+    """Limits of the valve pressure [Pa] and its rate [Pa/s], and the longest time of a change [s]."""
 
     least: Fraction | None = None
     largest: Fraction | None = None
@@ -132,7 +132,7 @@ class SampledLoopEntries(Entries, kw_only=True):
 
 
 class ContinuousLoopEntries(Entries, kw_only=True):
-    """A law in continuous time."""
+    """A law in continuous time, whose pressure acts without delay."""
 
     states: Names
     rates: Matrix
@@ -143,7 +143,7 @@ class ContinuousLoopEntries(Entries, kw_only=True):
 
 
 class TrackingFile(TaskEntries, kw_only=True):
-    """All of a file about a sampled law but its format and kind."""
+    """Content of a file about a sampled law, without format and kind."""
 
     loop: SampledLoopEntries
     start: SlipAndRate | None = None
@@ -153,7 +153,7 @@ class TrackingFile(TaskEntries, kw_only=True):
 
 
 class ContinuousFile(TaskEntries):
-    """All of a file about a law in continuous time but its format and kind."""
+    """Content of a file about a law in continuous time, without format and kind."""
 
     loop: ContinuousLoopEntries
     claims: Claims
@@ -229,7 +229,7 @@ def _require_few(states: tuple[str, ...]) -> None:
 
 
 class SlidingFaultEntries(Entries):
-    """A fault with friction with a state, its constants in ranges."""
+    """A fault with rate-and-state friction, its constants in ranges."""
 
     name: FaultName
     density: Fraction
@@ -270,7 +270,7 @@ class SlidingLoopEntries(Entries):
 
 
 class SlidingFile(Entries):
-    """All of a file but its format and kind."""
+    """Content of a file without its format and kind."""
 
     fault: SlidingFaultEntries
     reference: SlidingReferenceEntries
@@ -332,7 +332,7 @@ def guarantee_document(claim: Claim | PlantProof) -> dict[str, Any]:
 
 
 def _stick_slip() -> Any:
-    """Module of files about the stick–slip plant, loaded for these alone: it takes NumPy."""
+    """Module of files about the stick–slip plant, imported on demand, as it needs NumPy."""
     return import_module("quakedesign.guarantees.exact.stick_slip_files")
 
 

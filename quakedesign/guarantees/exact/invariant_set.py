@@ -1,24 +1,24 @@
 """Invariant polytope of a loop with aperiodic sampling, verified in ball arithmetic.
 
-**Loop.** Every sampling interval T is arbitrary within T_s ≤ T ≤ T_m; all else is as with periodic sampling, and T is
-not an input of the law. Let the map of a sample be J = CB, B its reduced row echelon form without rows of
-zeros and C its columns at B's pivots. With y the state just before a sample, ξ = By is all that a sample keeps; θ after
-it, x(θ) = e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
+**Loop.** Each sampling interval T is arbitrary within T_s ≤ T ≤ T_m; all else is as with periodic sampling, and the law
+does not measure T. Let the map of a sample be J = CB, B its reduced row echelon form without rows of zeros and C its
+columns at B's pivots. With y the state just before a sample, the sample retains only ξ = By. At θ after it, x(θ) =
+e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
 
 **Theorem.** Let X = {ξ: |h_l·ξ| ≤ 1 for all l}, 0 ∈ X, and let every input be at most W_i. Suppose |h_l·Bx(T)| ≤ 1 for
-all l and T_s ≤ T ≤ T_m, and |c_y·x(θ)| ≤ Y_y for 0 ≤ θ ≤ T_m, whatever ξ ∈ X and the inputs are. If W_i ≥ F_i + Σ_y
+all l and T_s ≤ T ≤ T_m, and |c_y·x(θ)| ≤ Y_y for 0 ≤ θ ≤ T_m, for all ξ ∈ X and all such inputs. If W_i ≥ F_i + Σ_y
 c_iy·Y_y for every input (`inputs`), then from rest every output stays below Y_y for all t.
 
 **Proof.** By induction ξ stays in X while the inputs obey their bounds. Along a trajectory of the loop s, w, β and φ
-are some functions of time, with which the inputs are linear in the state. Saturate the inputs at ±W_i: a solution
-obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t. So no input saturates, and the solution is that of
-the loop, which is unique. ∎
+are functions of time, with which the inputs are linear in the state. Saturate the inputs at ±W_i: a solution of this
+loop obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t. So no input saturates, and this is the unique
+solution of the original loop. ∎
 
-**What is verified.** With r facets l ∈ L that are independent, |gξ| ≤ |gH_L⁻¹|·1 on X: a file says which r facets to
-take for every row g at every end of a piece. For c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) =
-|ce^{Aθ}(Cξ + Σ j·n)| + Σ W_i∫₀^θ|ce^{Aσ}b_i|dσ. On a piece [α, β] the first term is that of a vector within (β −
-α)²/8·max|cA²e^{Aσ}||x(0)| of its chord, and the second is within (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i| of its own: f is at
-most the larger of its ends and that. Integrals are trapezoidal sums, as in `norms`.
+**What is verified.** For r independent facets l ∈ L, |gξ| ≤ |gH_L⁻¹|·1 on X. A file names r facets for every row g at
+every end of a piece. For c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) = |ce^{Aθ}(Cξ + Σ j·n)| + Σ
+W_i∫₀^θ|ce^{Aσ}b_i|dσ. On a piece [α, β] the first term is that of a vector within (β − α)²/8·max|cA²e^{Aσ}||x(0)| of
+its chord, and the second is within (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i| of its own: f is at most the larger of its ends
+plus both. Integrals are trapezoidal sums, as in `norms`.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -44,7 +44,7 @@ _BITS, _ZERO = 128, Fraction(0)
 SOONEST = 4  # pieces of the shortest interval, for integrals
 MOST_FACETS = 400
 MOST_PIECES = 32
-MOST_SIZE, MOST_BASES, LARGEST = 6, 4000, 10**20  # entries of a facet, bases in all, numbers of an entry
+MOST_SIZE, MOST_BASES, LARGEST = 6, 4000, 10**20  # limits: entries of a facet, bases in all, size of numbers
 Basis = tuple[int, ...]
 Row = tuple[Fraction, ...]
 
@@ -60,9 +60,9 @@ class InvariantPolytope:
     facets : tuple of rows
         h_l, of r entries each.
     at_samples : tuple of tuple of Basis
-        Of every facet, r facets each, by their numbers from 0, at the ends of equal pieces of [T_s, T_m].
+        For every facet, the indices of r facets, from 0, at each end of equal pieces of [T_s, T_m].
     between : tuple of tuple of Basis
-        Of every output, the same on [0, T_m].
+        The same for every output on [0, T_m].
 
     Raises
     ------
@@ -158,7 +158,7 @@ def reached_bounds(task: FaultPlant, held: SampledLoop, reach: InvariantPolytope
 
 @dataclass(frozen=True)
 class BetweenSamples:
-    """Rows of the state and the inputs that flow (columns), from one sample to the next."""
+    """Flow from one sample to the next, for rows of the state and columns of inputs."""
 
     by: Arithmetic
     flow: Any
@@ -168,9 +168,9 @@ class BetweenSamples:
     def along(
         self, rows: Any, ends: Sequence[Any], first: int, largest: Any, bounds: Iterable[Any]
     ) -> Iterator[tuple[Any, Any, Any]]:
-        """At the ends from the first on: rows, what bounded inputs add, and how far the next piece may be above both.
+        """At each end from `first` on: rows, contribution of bounded inputs, and excess within the next piece.
 
-        `largest` is the largest state right after a sample, entry by entry; no piece follows the last end.
+        `largest` bounds the state right after a sample, entry by entry; no piece follows the last end.
         """
         by, area, sizes = self.by, rows * (self.flow * 0) * largest, self.by.absolute(self.inputs)
         for i, piece in enumerate(b - a for a, b in pairwise(ends)):
@@ -194,7 +194,7 @@ class BetweenSamples:
 
 @dataclass(frozen=True)
 class _SampleMap:
-    """From one sample to the next: B, C, H, output rows, what flows, and what a sample adds, with their bounds."""
+    """Map from one sample to the next: B, C, H, output rows, inputs of the flow and of samples, with their bounds."""
 
     between: BetweenSamples
     seen: Any
@@ -206,7 +206,7 @@ class _SampleMap:
 
     @classmethod
     def of(cls, loop: PeriodicLoop, channels: Sequence[Channel], reach: InvariantPolytope) -> "_SampleMap":
-        """Of a loop with one jump, and a set that fits it."""
+        """Map for a loop with one jump, and a set of matching size."""
         seen, lift = reduced(loop.segments[0].jump)
         bounds = {channel.name: ball(bound) for channel, bound in zip(channels, reach.inputs, strict=True)}
         return cls(
@@ -237,7 +237,7 @@ class _SampleMap:
         return [upper(self._largest(arb_mat([row]), ends, bases)) for row, bases in rows]
 
     def _largest(self, row: Any, ends: list[Fraction], bases: tuple[Basis, ...]) -> Any:
-        """Bound of |c·x(θ)| at every θ from the end on for which there is the first of the bases."""
+        """Bound of |c·x(θ)| for every θ from the end of the first basis on."""
         places = self.between.along(row, ends, len(ends) - len(bases), self._largest_state, self.bounds)
         pieces = [
             (self._height(now, basis) + area[0, 0], more[0, 0])
@@ -253,7 +253,7 @@ class _SampleMap:
 
     @cached_property
     def _largest_state(self) -> Any:
-        """Right after a sample, entry by entry."""
+        """Bounds of the state right after a sample, entry by entry."""
         frame = absolute(arb_mat(self._inverse(tuple(range(self.facets.ncols())))))
         total = absolute(self.lift) * BALLS.sums(frame)
         for entry, bound in self.sampled:

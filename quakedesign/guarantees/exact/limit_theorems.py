@@ -24,9 +24,8 @@ from quakedesign.plant.fault_plant import FaultPlant
 # ----------------------------------------------------------------------
 # Performance limits of every controller for the linearised fault in slow sliding: two theorems, in ball arithmetic.
 #
-# The plant is the nominal one about sliding at V, linearised at the pressure 0, without inertia (`SlidingModel` with
-# c = c_z = 1): slip error x, y = ln(v/V), z = ln(θ/θ_ss), pressure error q = p − p*, any measurable shear stress |d|
-# ≤ D;
+# The plant is the nominal one, linearised about sliding at V and the pressure 0, without inertia (`SlidingModel` with c
+# = c_z = 1): slip error x, y = ln(v/V), z = ln(θ/θ_ss), pressure error q = p − p*, any measurable shear stress |d| ≤ D;
 # x(0) = z(0) = 0 and
 #
 #     x′ = Vy,   z′ = −ρ(y + z),   Sy = −Kx − Wz + μq + d.
@@ -35,17 +34,17 @@ from quakedesign.plant.fault_plant import FaultPlant
 # sample.
 #
 # **Theorem 1 (surprise).** If pressures are decided at samples T apart, no controller keeps |y| below D·h(t) for any 0
-# ≤ t < T, h the response of y to a unit step of d with q = 0: h(0) = 1/S. *Proof.* Take d = D for all t, and the course
-# on which it turns to −D just after a sample. All that is decided at this sample or before is the same, so q is, until
-# the next one. The two courses of y then differ by 2D·h(t) at t after the turn, and one of them is at least D·h(t) in
-# size. ∎  By continuity t = T may be taken as well.
+# ≤ t < T, h the response of y to a unit step of d with q = 0: h(0) = 1/S. *Proof.* Compare d = D for all t with a d
+# that changes to −D just after a sample. All decisions up to this sample are the same, so q is the same until the next
+# one. At t after the change both solutions y differ by 2D·h(t), and one of them is at least D·h(t) in size. ∎ By
+# continuity t = T is included.
 #
-# **Theorem 2 (push).** Let λ > 0 be an eigenvalue without control, G the transfer function of the path from well to
-# fault, whose impulse response is not negative, and q the path's response to the well's u, |u| ≤ P. If a stress d = D
-# begins while x = z = u = 0 and u stays 0 until T later, no controller keeps x and z bounded if D·e^{λT} > μP·G(λ).
-# *Proof.* The plant is controllable from y, so that a left eigenvector w can be scaled to give ζ = w·(x, z) with
-# ζ′ = λζ + μq + d. With what u up to now will still do, η: η′ = λη + μG(λ)u + D, η(0) = 0. Until T η grows to
-# D(e^{λT} − 1)/λ, and then η′ ≥ λη + D − μG(λ)P > 0 at all later t: η grows exponentially. What differs from ζ is
+# **Theorem 2 (limited pressure).** Let λ > 0 be an eigenvalue without control, G the transfer function of the path from
+# well to fault, whose impulse response is not negative, and q the path's response to the well pressure u, |u| ≤ P. If a
+# stress d = D begins while x = z = u = 0 and u remains 0 until T later, no controller keeps x and z bounded if D·e^{λT}
+# > μP·G(λ). *Proof.* The plant is controllable from y, so a left eigenvector w can be scaled to give ζ = w·(x, z) with
+# ζ′ = λζ + μq + d. Let η be ζ plus the future effect of u up to now: η′ = λη + μG(λ)u + D, η(0) = 0. Until T η grows to
+# D(e^{λT} − 1)/λ, and then η′ ≥ λη + D − μG(λ)P > 0 at all later t: η grows exponentially. Its difference from ζ is
 # bounded. ∎
 
 _BITS = 128
@@ -107,68 +106,68 @@ class SlidingPush:
 # Performance limits of every controller for a fault: three theorems, evaluated in ball arithmetic.
 #
 # A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem takes the
-# worst of a few plants. κ = k̂ − φ1 and w = η̂ − φ2 stand for the plant, φ is any measurable function of
-# time with |φ| ≤ H, the pressure p is from any controller: linear or not, with memory, knowing plant, slip,
-# slip rate and disturbance exactly up to the sample; or, with noise in theorem 1, knowing the plant and measuring, at
-# all times up to the sample, slip and slip rate within n and n′ of the true ones, either of which may be missing (n =
-# ∞). X and P below are the largest slip-rate error and the largest withdrawal.
+# worst of a few plants. A plant has κ = k̂ − φ1 and w = η̂ − φ2, and φ is any measurable function of time with |φ| ≤ H.
+# The controller is arbitrary: linear or not, with memory, with exact knowledge of plant, slip, slip rate and
+# disturbance up to the sample. With noise in theorem 1 it knows the plant, and measures slip and slip rate at all times
+# up to the sample within n and n′ of the true ones; either may be missing (n = ∞). X and P below are the largest
+# slip-rate error and the largest withdrawal.
 #
 # **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
-# continued to negative slip rates no controller keeps the slip error within E and the slip-rate error below X for
+# without stick (linear continuation) no controller keeps the slip error within E and the slip-rate error below X for
 # all t if
 #
 #     X ≤ 2H·h(T + θ + τ),   h: impulse response of h″ = σh − wh′ from acceleration to slip,
 #
-# where noise hides for a time τ that the disturbance has changed sign: H·h₊(t) ≤ n′ and H·∫₀ᵗ h₊ ≤ n for 0 ≤ t ≤ τ, h₊
-# as h with σ₊; τ = 0 without noise. Once the reference r rests, friction that is affine there, μ(r + e1) = μr − m·e1
-# for |e1| ≤ E, gives with q = p − p*
+# where τ is a time for which noise hides a change of sign of the disturbance: H·h₊(t) ≤ n′ and H·∫₀ᵗ h₊ ≤ n for 0 ≤ t ≤
+# τ, h₊ as h with σ₊; τ = 0 without noise. Once the reference r rests, friction that is affine there, μ(r + e1) = μr −
+# m·e1 for |e1| ≤ E, gives with q = p − p*
 #
 #     e1′ = e2,   e2′ = s·e1 − w·e2 + N̂(μr − m·e1)q + φ,   s = N̂m(σ′ − p*) − κ,
 #     σ = s − m(2X/T + sE + |w|X)/(μr − mE),   σ₊ = s + m(2X/T + sE + |w|X + H)/(μr − mE),
 #
-# and σ must not be negative. Friction that does not change, m = 0, leaves σ = σ₊ = s = −κ, and E may be any bound.
-# *Proof.* Suppose |e1| ≤ E, |e2| ≤ X′ < X for every φ and every noise. Take φ = H from the rest of r on. While p is
-# held, y = e2 obeys y″ = σ_k·y − w·y′ with σ_k = s − N̂mq_k. Integrated over the T that q_k lasts, e2′ bounds q_k:
-# −(2X′/T + sE + |w|X′ + H) ≤ N̂q_k(μr − mE) ≤ 2X′/T + sE + |w|X′, so σ ≤ σ_k ≤ σ₊. If y ≥ δ > 0 at all changes of p
-# from some on, then y is in between above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0
-# since κT² ≤ 1 < π²), each T adds at least a fixed part of δ to e1, and e1 leaves E. So for every δ some change of p,
-# at t + θ + T with t a sample, has e2 < δ, as late as one likes. Turn φ to −H at t − τ. As long as p is the same in
-# both, the difference d of both courses has d2′ = σ(t)d1 − w·d2 + 2H with σ ≤ σ(t) ≤ σ₊, so that d1 and d2 are at least
-# 0 and at most what σ₊ makes of them: up to t at most 2n and 2n′. So let the measurements be n and n′ too low in the
-# first course, always, and higher by d in the turned one: they are within n and n′ there too, and up to t they are the
-# same in both, which determines p until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the turned course has e2 < δ −
-# X, for every δ > 0. ∎ A controller that holds for T also holds for T/n, and one that acts θ late could act earlier, so
-# T and θ may be shortened, and τ as well.
+# and σ must not be negative. Constant friction, m = 0, gives σ = σ₊ = s = −κ, and E may be any bound. *Proof.* Suppose
+# |e1| ≤ E, |e2| ≤ X′ < X for every φ and every noise. Take φ = H once r rests. While p is constant, y = e2 obeys y″ =
+# σ_k·y − w·y′ with σ_k = s − N̂mq_k. The integral of e2′ over the interval T of q_k bounds q_k: −(2X′/T + sE + |w|X′ +
+# H) ≤ N̂q_k(μr − mE) ≤ 2X′/T + sE + |w|X′, so σ ≤ σ_k ≤ σ₊. Suppose y ≥ δ > 0 at all changes of p from some time on.
+# Between them y is above the solution for σ₊ with δ at both ends (maximum principle, or for σ < 0 since κT² ≤ 1 < π²),
+# so each T adds at least a fixed part of δ to e1, and e1 exceeds E. So for every δ there are arbitrarily late changes
+# of p, at t + θ + T with t a sample, with e2 < δ. Change φ to −H at t − τ. While p is the same in both solutions, their
+# difference d has d2′ = σ(t)d1 − w·d2 + 2H with σ ≤ σ(t) ≤ σ₊, so d1 and d2 are at least 0 and at most those for σ₊: up
+# to t at most 2n and 2n′. Let the measurements always be n and n′ too low in the first solution, and their errors
+# higher by d in the second. These are within n and n′ too, and up to t the measurements of both agree, which determines
+# p until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the second solution has e2 < δ − X, for every δ > 0. ∎ A hold
+# over T is also one over T/n, and a controller with delay θ could act earlier, so T and θ may be shortened, and τ as
+# well.
 #
-# **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a disturbance φ = H begins. Let the pressure at the well
-# be 0 until a time T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse
-# response is not negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ −
-# κ and, for s > 0, the unstable pole λ, λ² + wλ = s. If
+# **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a disturbance φ = H begins. Let the well pressure be 0
+# until T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is
+# not negative: delay, diffusion 1/cosh √(sL²/D). Friction that falls from μ* by m per slip gives s = N̂mσ′ − κ and, for
+# s > 0, the unstable pole λ, λ² + wλ = s. If
 #
 #     H·e^{λT} > N̂μ*·P·G(λ),
 #
-# then slip exceeds E = (μ* − μ_res)/m, where friction has its residual value, under every controller, even if it
-# knows φ and the plant from the onset on; also on the stick–slip plant. *Proof.* For 0 ≤ x1 ≤ E: x2′
-# ≥ s·x1 − w·x2 + N̂(μ* − m·x1)p_f + H, an equality unless the fault sticks, and the third term is at least c·min(p_f,
-# 0), c = N̂μ*, and min(p_f, 0) at least the path's response to u = min(p, 0). With z = (λ + w)x1 + x2, z′ = λz + … so
-# that z ≥ ζ, ζ = z0 + what u up to now will still do; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ grows to H(e^{λT} −
+# then slip exceeds E = (μ* − μ_res)/m, where friction has its residual value, under every controller, even if it knows
+# φ and the plant from the onset; also on the stick–slip plant. *Proof.* For 0 ≤ x1 ≤ E: x2′ ≥ s·x1 − w·x2 + N̂(μ* −
+# m·x1)p_f + H, an equality unless the fault is at rest. The third term is at least c·min(p_f, 0), c = N̂μ*, and
+# min(p_f, 0) is at least the path's response to u = min(p, 0). With z = (λ + w)x1 + x2, z′ = λz + … so that z ≥ ζ,
+# where ζ is z0 plus the future effect of u up to now; ζ′ = λζ + cG(λ)u + H, ζ(0) = 0. Until T ζ grows to H(e^{λT} −
 # 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 at all later t: ζ grows exponentially. x1′ = z − (λ + w)x1 with z ≥ ζ > 0
-# keeps x1 positive, so the premise x1 ≥ 0 lasts, and takes x1 beyond E. ∎
+# keeps x1 positive, so the premise x1 ≥ 0 remains true, and x1 exceeds E. ∎
 #
-# **Theorem 3 (stick–slip plant).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward.
-# Let the pressure be decided at samples T apart and stay for T. No controller that moves the fault keeps its slip rate
-# below 2H·h(T), h as in theorem 1 with σ = −κ, κT² ≤ 1, for every φ, with friction that does not change.
-# *Proof.* Let φ = −H always. While the fault rests, the force on it changes with the pressure alone, so that it first
-# moves in a period of some pressure p with N̂μ*p ≥ H. Turn φ to H as that pressure begins to act. Until then both are
-# the same course, so p is the same, and it stays for T. The fault starts from rest with the force N̂μ*p + H ≥ 2H, and
-# y = x2 has y′ = N̂μ*p + H − κx1 − wy, whose solution is that many times h and positive up to T. ∎
-# So theorem 3 replaces theorem 1 without negative slip rates: a moving reference requires that the controller moves the
-# fault. While the reference rests there is no such limit: at low enough pressure friction holds the fault at rest.
+# **Theorem 3 (stick–slip plant).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward. Let
+# the pressure be decided at samples T apart and stay for T. No controller that moves the fault keeps its slip rate
+# below 2H·h(T), h as in theorem 1 with σ = −κ, κT² ≤ 1, for every φ, with constant friction. *Proof.* Let φ = −H
+# always. While the fault rests, the force on it changes with the pressure alone, so it first moves in a period of some
+# pressure p with N̂μ*p ≥ H. Change φ to H when that pressure begins to act. Until then both solutions agree, so p is
+# the same, and it stays for T. The fault starts from rest with the force N̂μ*p + H ≥ 2H, and y = x2 has y′ = N̂μ*p + H
+# − κx1 − wy, whose solution is this force times h and positive up to T. ∎ So theorem 3 replaces theorem 1 without
+# negative slip rates: a moving reference requires that the controller moves the fault. While the reference rests there
+# is no such limit: at low enough pressure friction holds the fault at rest.
 
-_SHARE = Fraction(1, 20)  # E of theorem 1: of the slip over which friction falls, and of the target
+_SHARE = Fraction(1, 20)  # E of theorem 1, as a share of the slip of weakening or of the target, if smaller
 _BISECTIONS = 14
-_SHARES = [Fraction(3, 4) ** n for n in range(16)]  # of τ, tried until they forbid less
-_GROWN, _TURNED = 32, 1  # longest T·√|s| that theorem 1 is used with, for s above and below 0
+_SHARES = [Fraction(3, 4) ** n for n in range(16)]  # shares of τ, tried until X decreases
+_GROWN, _TURNED = 32, 1  # largest T·√|s| used in theorem 1, for s above and below 0
 _IMPOSSIBILITY_ZERO = Fraction(0)
 
 
@@ -181,7 +180,7 @@ class SmallestPeak:
     slip_rate_error : LowerBound
         X [m/s].
     slip_error : UpperBound or None
-        E [m]; None where any bounded slip error is meant.
+        E [m]; None if X applies to every bounded slip error.
     """
 
     slip_rate_error: LowerBound
@@ -215,15 +214,15 @@ class _Measurements:
 
     @property
     def noisy(self) -> bool:
-        """Whether anything is hidden."""
+        """Whether noise can hide a disturbance."""
         return bool(self.slip_noise) and self.rate_noise != 0
 
     def hides(self, slip: Fraction, rate: Fraction, push: Fraction, step: Fraction) -> Fraction:
         """τ [s]: time for which noise hides a reversed disturbance.
 
-        Within a small part of T, for a disturbance `push` [m/s²], σ₊ = `slip` and w = `rate`.
+        Exact up to a small part of T, for a disturbance `push` [m/s²], σ₊ = `slip` and w = `rate`.
 
-        A larger σ₊ hides it for less. Answers with σ₊ of at least 0 only grow: it is enough to look at their ends.
+        A larger σ₊ gives a shorter τ. Responses with σ₊ ≥ 0 only grow, so it suffices to check their ends.
         """
         if not push or not self.noisy:
             return _IMPOSSIBILITY_ZERO
@@ -316,7 +315,7 @@ def smallest_stick_slip_rate(task: FaultPlant, step: Fraction) -> LowerBound | N
 
 
 def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
-    """T + θ [s] beyond which every controller fails, without a diffusion path; or None."""
+    """T + θ [s] beyond which every controller fails, without a diffusion path; None without a limit."""
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
     def longest(plant: _Pushed | SlidingPush) -> Any:
@@ -327,7 +326,7 @@ def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> Up
 
 
 def longest_diffusion(task: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
-    """L²/D [s] beyond which every controller with samples T apart fails; or None."""
+    """L²/D [s] beyond which every controller with samples T apart fails; None without a limit."""
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
     def longest(plant: _Pushed | SlidingPush) -> Any:
@@ -353,7 +352,7 @@ def nearest_proved_well(diffusion_time: LowerBound, diffusivity: Fraction) -> Lo
 
 
 def smallest_withdrawal(task: FaultPlant | SlidingPush, step: Fraction) -> LowerBound | None:
-    """P [Pa] below which every controller with samples T apart fails; or None."""
+    """P [Pa] below which every controller with samples T apart fails; None without a limit."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
         needed = (ball(task.amplitude / plant.authority) * (plant.pole * ball(step)).exp() for plant in _pushed(task))
@@ -425,7 +424,7 @@ def _pushed(task: FaultPlant | SlidingPush) -> Sequence[_Pushed | SlidingPush]:
 
 
 def _surprised(task: FaultPlant) -> Iterator[_Surprised]:
-    """Friction that does not change near the target, and friction that falls as fast as it may."""
+    """Plants with constant friction near the target, and with friction of the largest weakening slope."""
     law, target = task.friction, task.target_slip
     for kappa, w, area in _corners(task):
         yield _Surprised(-kappa, w, _IMPOSSIBILITY_ZERO, law.static, None)
@@ -440,7 +439,7 @@ def _surprised(task: FaultPlant) -> Iterator[_Surprised]:
 def _surprise(
     plant: _Surprised, step: Fraction, delay: Fraction, measurements: _Measurements, amplitude: Fraction
 ) -> Fraction:
-    """X, or 0 where the theorem says nothing."""
+    """X, or 0 where the theorem gives no bound."""
     pace = sqrt(abs(plant.slip))
     most = _GROWN if plant.slip > 0 else _TURNED
     interval = step / max(1, ceil(float(step) * pace / most))
@@ -483,7 +482,7 @@ def _surprise(
 
 
 def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[Any, Any]:
-    """Slip and slip rate after a unit push for some time, from rest."""
+    """Slip and slip rate from rest after a unit acceleration for some time."""
     flow = arb_mat([[arb(0), arb(1), arb(0)], [ball(slip), -ball(rate), arb(1)], [arb(0), arb(0), arb(0)]])
     moved = (flow * ball(time)).exp()
     return moved[0, 2], moved[1, 2]
@@ -496,5 +495,5 @@ def _require(holds: bool, what: str, *values: Fraction) -> None:
 
 
 def _at_least_one(value: Any) -> Any:
-    """Upper end of a ball, or one."""
+    """Larger of the upper end of a ball and 1."""
     return value.upper().max(arb(1))

@@ -1,9 +1,8 @@
 """Upper bounds of L1 norms and free responses of periodic and continuous linear loops.
 
-A bound is computed in ball arithmetic, from rational matrices to rational numbers. Each chapter states and
-proves its bound: continuous loops, one segment of a periodic loop, separation of the slowest mode, free
-response, and periodic loops. The algorithms for periodic loops serve estimates of a search too, which hand
-in other numbers (`Arithmetic`).
+A bound is computed in ball arithmetic, from rational matrices to rational numbers. Each chapter states and proves its
+bound: continuous loops, one segment of a periodic loop, separation of the slowest mode, free response, and periodic
+loops. The algorithms for periodic loops also give estimates for a search, with other number types (`Arithmetic`).
 """
 
 from abc import ABC, abstractmethod
@@ -26,22 +25,22 @@ from quakedesign.loop import Fading, PeriodicLoop, Pulse, Segment
 
 
 def ball(value: Fraction) -> Any:
-    """A rational."""
+    """Ball of a rational."""
     return arb(fmpq(value.numerator, value.denominator))
 
 
 def matrix(rows: tuple[tuple[Fraction, ...], ...]) -> Any:
-    """A matrix of rationals."""
+    """Ball matrix of rational rows."""
     return arb_mat([[ball(v) for v in row] for row in rows])
 
 
 def column(values: tuple[Fraction, ...]) -> Any:
-    """One column of rationals."""
+    """Ball matrix of one rational column."""
     return arb_mat([[ball(v)] for v in values])
 
 
 def identity(size: int) -> Any:
-    """The unit matrix."""
+    """Identity matrix."""
     return arb_mat(size, size, [int(i == j) for i in range(size) for j in range(size)])
 
 
@@ -59,7 +58,7 @@ def majorant(flow: Any) -> Any:
 
 
 def absolute(matrix: Any) -> Any:
-    """Upper bounds of the absolute values, exact numbers."""
+    """Exact upper bounds of the absolute values of all entries."""
     return arb_mat([[v.abs_upper() for v in row] for row in matrix.tolist()])
 
 
@@ -69,7 +68,7 @@ def upper(value: Any) -> Fraction:
 
 
 def above(parts: list[Any]) -> Any:
-    """Matrices one above the other."""
+    """Matrices stacked vertically."""
     return arb_mat([row for part in parts for row in part.tolist()])
 
 
@@ -79,7 +78,7 @@ def modulus(matrix: Any) -> Any:
 
 
 def larger(one: Any, other: Any) -> Any:
-    """The larger entries of two matrices."""
+    """Entrywise maximum of two matrices."""
     return arb_mat(one.nrows(), one.ncols(), [*map(arb.max, one.entries(), other.entries())])
 
 
@@ -89,7 +88,7 @@ def row_sums(matrix: Any) -> Any:
 
 
 def scaled(matrix: Any, weights: Iterable[Any]) -> Any:
-    """Columns times numbers."""
+    """Matrix with its columns scaled by numbers."""
     return arb_mat([[*map(mul, row, weights)] for row in matrix.tolist()])
 
 
@@ -101,13 +100,13 @@ def grouped(matrix: Any, weights: list[Any]) -> Any:
 
 
 def not_above(one: Any, other: Any) -> bool:
-    """Whether no entry is larger; those of `other` are bounds, not negative."""
+    """Whether no entry of `one` exceeds that of `other`, whose entries are bounds ≥ 0."""
     return all(a == 0 or a <= b for a, b in zip(one.entries(), other.entries(), strict=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowestMode:
-    """Slowest mode of a loop by an estimate: left and right eigenvector, and what is left of it after 2^doublings."""
+    """Estimated slowest mode of a loop: both eigenvectors, and the sum of its remainder after 2^doublings periods."""
 
     doublings: int
     seen: Any
@@ -117,10 +116,10 @@ class SlowestMode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arithmetic:
-    """Numbers and matrices of an algorithm: balls, which prove, unless others are given, which estimate.
+    """Number and matrix types of an algorithm: by default balls, for proofs; others for estimates.
 
     In both, `*` is the product of matrices, and matrices have the methods `exp`, `nrows` and `ncols` of `arb_mat`. An
-    estimate has no remainders and is given the slowest mode of Ψ.
+    estimate omits remainders and uses a given slowest mode of Ψ.
     """
 
     slowest: Callable[[Any], SlowestMode] | None = None
@@ -151,36 +150,36 @@ BALLS = Arithmetic()
 
 
 # ----------------------------------------------------------------------
-# L1 norms of a loop in continuous time: how large an output can get under an input that is bounded by 1.
+# L1 norms of a loop in continuous time: bounds of every output for an input bounded by 1.
 #
 # **Statement.** Let x′ = Ax + b·w, x(0) = 0, and w be measurable with |w| ≤ W on [0, t]. Then |cx(t)| ≤ g·W with the g
 # that `flow_norms` returns.
 #
-# **Proof.** |cx(t)| ≤ W·∫₀^∞|ce^{Aσ}b|dσ. Time is cut into stretches of 64 equal pieces, those of every stretch twice
-# as long as those of the one before, so that fast and slow modes cost the same.
+# **Proof.** |cx(t)| ≤ W·∫₀^∞|ce^{Aσ}b|dσ. Time is divided into stretches of 64 equal pieces, each piece twice as long
+# as in the stretch before, so that fast and slow modes cost the same.
 #
 # - *A piece of length h from α on.* y(σ) = ce^{Aσ}b is within (σ − α)(α + h − σ)/2·max|y″| of its chord, so its part of
 #   the integral is at most h(|y(α)| + |y(α + h)|)/2 + h³/12·max|y″|, and |y″| ≤ |c|·V·|A²e^{Aα}b| for every V ≥
 #   |e^{Aδ}|, 0 ≤ δ ≤ h, entry by entry. V = e^{Mh} for the first pieces, M = |A| off the diagonal and max(A, 0) on it;
-#   if V serves h, then max(V, |e^{Ah}|V) serves 2h.
+#   if V is valid for h, then max(V, |e^{Ah}|V) is valid for 2h.
 # - *The rest.* Let S be the sums up to T for c and every unit column e_j in place of b, and S|e^{AT}| ≤ q·S with q < 1.
-#   Sums over later spans of T are at most q·S, q²·S …, so ∫₀^∞|ce^{Aσ}e_j|dσ ≤ S_j/(1 − q), and what is left out for b
-#   is at most S|e^{AT}b|/(1 − q). ∎
+#   Sums over later intervals of length T are at most q·S, q²·S …, so ∫₀^∞|ce^{Aσ}e_j|dσ ≤ S_j/(1 − q), and the
+#   remainder for b is at most S|e^{AT}b|/(1 − q). ∎
 
 _BITS = 256
 _HALVINGS = 6  # 2^6 pieces in a stretch
 _SMALL = Fraction(1, 1 << 12)  # q
 _MOST_STRETCHES = 128
-_HUGE = 1 << _BITS  # that only an unstable loop grows to
+_HUGE = 1 << _BITS  # size that only an unstable loop reaches
 
 
 def flow_norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, ...]]:
-    """Gain of every (output, input) of a loop without jumps, rounded up, in a tuple of one: it has no parts.
+    """Gain of every (output, input) of a loop without jumps, rounded up, as a tuple of one entry.
 
     Raises
     ------
     ParameterError
-        When the nominal loop is not found to be stable.
+        When the nominal loop is not proved to be stable.
     """
     with ctx.workprec(_BITS):
         flow, rows = matrix(loop.flow), matrix(tuple(loop.outputs.values()))
@@ -230,7 +229,7 @@ def _columns(whole: Any, first: int, end: int) -> Any:
 
 
 # ----------------------------------------------------------------------
-# What an input of size 1 does over one segment of a periodic loop; the arguments are those of `norms`.
+# Responses to an input bounded by 1 over one segment of a periodic loop; for the proof see `norms`.
 
 Weights = tuple[tuple[Any, Any], ...]
 _ZERO = Fraction(0)
@@ -249,7 +248,7 @@ class _SegmentFlow:
 
     @classmethod
     def of(cls, by: Arithmetic, flow: Any, segment: Segment, *, past: bool) -> "_SegmentFlow":
-        """Pieces for outputs, or for the past."""
+        """Segment with its pieces for outputs or for past inputs."""
         lengths = by.pieces(segment, past)
         parts = {h: (by.number(h), (flow * by.number(h)).exp()) for h in set(lengths)}
         return cls(by, flow, by.matrix(segment.jump), lengths, *zip(*(parts[h] for h in lengths), strict=True))
@@ -281,13 +280,13 @@ class _SegmentFlow:
         return self.pieces[number] ** 2 / 8
 
     def phases(self, rows: Any) -> list[Any]:
-        """Of rows at the ends of the pieces."""
+        """Rows times e^{Aσ} at the ends of the pieces."""
         return list(accumulate(self.steps, mul, initial=rows))
 
 
 @dataclass(frozen=True)
 class _Response(ABC):
-    """Of an input that enters with b over one segment."""
+    """Response to an input that enters with b over one segment."""
 
     of: _SegmentFlow
     entry: Any
@@ -307,22 +306,22 @@ class _Response(ABC):
 
     @abstractmethod
     def columns(self, later: Any) -> Any:
-        """What is left at the end of the segment, mapped by what comes later: columns whose absolute values are added.
+        """Response at the end of the segment, mapped by `later`: columns whose absolute values are added.
 
-        Those of the remainder are in `rest`.
+        The remainder is in `rest`.
         """
 
     @abstractmethod
     def rest(self, later: Any) -> Any:
-        """Entries of the remainder."""
+        """Bounds of the entries of the remainder."""
 
     @abstractmethod
     def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Of output rows in every piece: sums since the jump at both ends, and the remainder of the larger one."""
+        """Sums of output rows since the jump at both ends of every piece, and the remainder of the larger."""
 
 
 class _Flowing(_Response):
-    """Of an input that is bounded by 1 at every time."""
+    """Response to an input that is bounded by 1 at every time."""
 
     def columns(self, later: Any) -> Any:
         return self.of.by.scaled(later * self.of.by.beside(self.ends), self.of.widths)
@@ -343,7 +342,7 @@ class _Flowing(_Response):
 
 
 class _Sudden(_Response):
-    """Of an input that enters with the jump alone."""
+    """Response to an input that enters with the jump alone."""
 
     def columns(self, later: Any) -> Any:
         return later * self.ends[-1]
@@ -361,19 +360,19 @@ class _Sudden(_Response):
 
 @dataclass(frozen=True)
 class _Faded(_Response):
-    """Of an input that fades: `weights` are Ω and Ω′ of every piece."""
+    """Response to a decaying input: `weights` are Ω and Ω′ of every piece."""
 
     weights: Weights
 
     def _from(self, start: int) -> list[Any]:
-        """e^{Aσ}b from the start of a piece to the end of that piece and of all later ones, from b on."""
+        """b at the start of a piece, then e^{Aσ}b at the ends of that piece and of all later ones."""
         return list(accumulate(self.of.steps[start:], lambda now, step: step * now, initial=self.entry))
 
     def columns(self, later: Any) -> Any:
         return beside([later * self._from(i)[-1] * mass for i, (mass, _) in enumerate(self.weights)])
 
     def rest(self, later: Any) -> Any:
-        """By the slope at the end of the segment, of what entered within the piece."""
+        """Bounds by slopes, at the end of the segment, of responses to inputs within a piece."""
         moved = (self.slope(self._from(i + 1)[-1], i) * moment for i, (_, moment) in enumerate(self.weights))
         return absolute(absolute(later) * reduce(add, moved))
 
@@ -397,10 +396,10 @@ class _Faded(_Response):
 
 @dataclass(frozen=True)
 class _Pulsed(_Response):
-    """Of an input that is there near a jump: `here` that of the segment itself, `ahead` that of the next one.
+    """Response to a pulse near a jump: `here` that of the segment itself, `ahead` that of the next one.
 
-    e^{A(τ − σ)}b is within σ·|A·…| of e^{Aτ}b. Of what is before and after the jump one is larger, and max(|x|, |y|) =
-    |x + y|/2 + |x − y|/2.
+    e^{A(τ − σ)}b is within σ·|A·…| of e^{Aτ}b. The larger of the parts before and after the jump counts: max(|x|, |y|)
+    = |x + y|/2 + |x − y|/2.
     """
 
     pulse: Pulse
@@ -409,13 +408,13 @@ class _Pulsed(_Response):
 
     @cached_property
     def _sides(self) -> tuple[Any, Any]:
-        """After the jump, for what is before and after it: b with its share."""
+        """States after the jump for the parts of the pulse before and after it."""
         number = self.of.by.number
         return self.of.jump * self.entry * number(self.pulse.before), self.entry * number(self.pulse.after)
 
     @cached_property
     def _off(self) -> tuple[Any, Any]:
-        """By how much these are off, at most."""
+        """Bounds of the errors of these states."""
         pulse, flow = self.pulse, self.of.flow
         moved, early, late = flow * self.entry, self._within(pulse.early), self._within(pulse.late)
         shifted = absolute(self.of.jump) * early * absolute(moved) * ball(pulse.before * pulse.early)
@@ -447,20 +446,20 @@ class _Pulsed(_Response):
                 start, end = (by.larger(v, by.modulus(phases[j] * side)) for v, j in ((start, i), (end, i + 1)))
             for side, off in zip(self._sides, self._off, strict=True) if self.here and by.proves else ():
                 bent = absolute(phases[i] * self.of.square) * self.of.within[i] * absolute(side)
-                far = absolute(phases[i]) * self.of.within[i] * off  # by what it is off, anywhere in the piece
+                far = absolute(phases[i]) * self.of.within[i] * off  # error anywhere in the piece
                 more = larger(more, bent * self.of.chord(i) + far)
             left = sum(self.of.lengths[i + 1 :], _ZERO)
             yield start, end, more + soon if left < self.pulse.early else more
 
     def _ahead(self, rows: Any) -> Any:
-        """Of the pulse before the jump that ends the segment, as long as it is there."""
+        """Outputs for the part of the pulse before the jump that ends the segment, while it lasts."""
         moved = self._within(self.pulse.early) * absolute(self.of.flow * self.entry)
         height = modulus(rows * self.entry) + absolute(rows) * moved * ball(self.pulse.early)
         return height * ball(self.pulse.before)
 
 
 def responses(loop: PeriodicLoop, flows: list[_SegmentFlow], name: str) -> list[_Response]:
-    """Of an input, over all segments; an estimate counts one that fades as one at the jump, of the same area."""
+    """Responses to an input over all segments; an estimate replaces a decaying input by an impulse of its area."""
     by = flows[0].by
     if name in loop.inputs:
         return [_Flowing(flow, by.column(loop.inputs[name])) for flow in flows]
@@ -503,21 +502,21 @@ def _weight(fading: Fading, start: Fraction, length: Fraction) -> tuple[Any, Any
 
 
 # ----------------------------------------------------------------------
-# The slowest mode of a periodic loop, seen alone, so that nothing else has to be followed until it is gone.
+# The slowest mode of a periodic loop, isolated so that sums need not continue until it has decayed.
 
 MOST_DOUBLINGS = 12
 
 
 def slowest(flows: list[_SegmentFlow]) -> list[Any]:
-    """What the slowest mode is seen along, if there is one: a row of what is left of all states after 2^12 periods.
+    """Row that isolates the slowest mode, if there is one: a row of the map of 2^12 periods.
 
-    That with the largest entry on the diagonal, which is the same in all units of the states: whoever else takes it
-    looks back as far, and finds the same bounds.
+    It has the largest diagonal entry, which does not depend on the units of the states: a checker that uses it needs as
+    many periods, and obtains the same bounds.
 
     Raises
     ------
     ParameterError
-        When that is more than there was.
+        When the powers of the period map grow.
     """
     period = reduce(lambda now, flow: flow.whole * now, flows[1:], flows[0].whole)
     growth = before = 0.0
@@ -534,7 +533,7 @@ def slowest(flows: list[_SegmentFlow]) -> list[Any]:
 
 
 class _Periods:
-    """Ψ of a loop, its powers, and what is left of states after 2^j periods; each is formed once."""
+    """Ψ of a loop, its powers, and bounds of the states after 2^j periods; each is computed once."""
 
     def __init__(self, flows: list[_SegmentFlow], period: Any = None) -> None:
         self.by, self.size = flows[0].by, flows[0].jump.nrows()
@@ -552,13 +551,13 @@ class _Periods:
         return self.powers[number]
 
     def followed(self, columns: Any, doublings: int) -> Any:
-        """Columns of 2^doublings periods."""
+        """Columns times Ψᵏ, for 2^doublings periods."""
         for number in range(doublings):
             columns = self.by.beside([columns, self.power(number) * columns])
         return columns
 
     def seen_alone(self, sums: Any) -> tuple[int, Any]:
-        """Row of the state that counts most, in whose place the slowest mode is seen, and W of `norms`."""
+        """Index of the dominant state, whose row of W isolates the slowest mode, and W of `norms`."""
         sizes = [(abs(v) * size).mid() for v, size in zip(self.slow, sums.entries(), strict=True)]
         place = sizes.index(max(sizes))
         if place not in self._seen:
@@ -580,7 +579,7 @@ class _Periods:
 
 
 def unstable() -> ParameterError:
-    """Error for a loop that is not shown stable."""
+    """Error for a loop that is not proved to be stable."""
     return ParameterError(
         f"the nominal loop must be stable. Received one that is not shown stable in {2**MOST_DOUBLINGS} periods. "
         "Change the gains, or shorten T_s."
@@ -588,50 +587,50 @@ def unstable() -> ParameterError:
 
 
 # ----------------------------------------------------------------------
-# How far a start away from 0 takes a periodic loop without inputs: the sup of its free response, in ball arithmetic.
+# Supremum of the free response of a periodic loop from a box of initial states, in ball arithmetic.
 #
 # **Statement.** Let x′ = Ax between jumps and x(0) = Σ θ_i·s_i with |θ_i| ≤ 1, just before the first jump. Then |cx(t)|
 # ≤ g with the g that `free_peaks` returns for the part of the period in which t lies.
 #
 # **Proof.** Let X have the columns s_i and Ψ be the map of one period, so that |cx(t)| is at most the sum of the
-# absolute values of the entries of cΦ(θ)ΨᵏX, θ after the beginning of period k.
+# absolute values of the entries of cΦ(θ)ΨᵏX, at the time θ after the beginning of period k.
 #
 # - *Between two phases α < β.* ce^{Aσ}y is within (β − α)²/8·max|cA²e^{Aσ}y| of the chord of its ends, for every column
-#   y, and the sum of the absolute values of chords is convex: at most the larger of both ends plus the remainders.
-# - *Periods.* Those with k < K = 2^J are looked at one by one. Let W be any invertible matrix, m at least the sums of
+#   y, and the sum of the absolute values of chords is convex. The sum is at most the larger end plus the remainders.
+# - *Periods.* Those with k < K = 2^J are computed one by one. Let W be any invertible matrix, m at least the sums of
 #   the absolute values of every row of WΨᵏX for all k < K, and D = |WΨᴷW⁻¹|. If Dm ≤ m, these sums are at most m for k
 #   < 2K, 3K and so on, that is, for all k, and those of cΦ(θ)ΨᵏX at most |cΦ(θ)ΨᴷW⁻¹|m for all k ≥ K. W is that of
-#   `norms`: the slowest mode, seen alone, only has to fall. All of m is raised by 2⁻⁶⁰ of its largest entry, so that
-#   none is 0. ∎
+#   `norms`: the isolated slowest mode only has to decrease. All entries of m are raised by 2⁻⁶⁰ of its largest entry,
+#   so that none is 0. ∎
 
 Group = tuple[Any, list[Any]]
 
 START = "start"
 _FREE_BITS = 128
-_FREE_SMALL = Fraction(1, 1 << 10)  # share of m that is left of it after K periods, but for the slowest mode
+_FREE_SMALL = Fraction(1, 1 << 10)  # largest share of m left after K periods, without the slowest mode
 _FAINT = Fraction(1, 1 << 60)
 
 
 @lru_cache(maxsize=128)
 def free_peaks(loop: PeriodicLoop) -> Mapping[str, tuple[Fraction, ...]]:
-    """Bound of every output from every start of a loop, rounded up, one for each part of the period, as in `norms`.
+    """Bound of every output from all initial states of a loop, rounded up, for each part of the period as in `norms`.
 
     Raises
     ------
     ParameterError
-        When the loop is not found to be stable within 4096 periods.
+        When the loop is not proved to be stable within 4096 periods.
     """
     with ctx.workprec(_FREE_BITS):
         return dict(zip(loop.outputs, _upper_rows(LoopResponses(BALLS, loop).free()), strict=True))
 
 
 def _upper_rows(columns: list[Any]) -> list[tuple[Fraction, ...]]:
-    """Rational bounds of the rows of columns beside each other."""
+    """Rational bounds of the rows of columns side by side."""
     return [tuple(map(upper, row)) for row in beside(columns).tolist()]
 
 
 def _followed(periods: _Periods, start: Any) -> list[Group]:
-    """ΨᵏX for all k < K, and ΨᴷW⁻¹ with m; K is so large that little is left but the slowest mode."""
+    """ΨᵏX for all k < K, and ΨᴷW⁻¹ with m; K is so large that almost only the slowest mode is left."""
     columns, even = start, [periods.by.number(Fraction(1))] * start.ncols()
     if periods.mode:
         return [(periods.followed(start, periods.mode.doublings), even)]
@@ -659,7 +658,7 @@ def _but(column: Any, place: int) -> Any:
 
 
 # ----------------------------------------------------------------------
-# L1 norms of a periodic loop: how large an output can get under an input that is bounded by 1, in ball arithmetic.
+# L1 norms of a periodic loop: bounds of every output for an input bounded by 1, in ball arithmetic.
 #
 # **Statement.** Let x′ = Ax + b·w between jumps, x(0) = 0, and w be measurable with |w| ≤ W on [0, t]. Then |cx(t)| ≤
 # g·W with the g that `norms` returns for the part of the period in which t lies.
@@ -669,51 +668,52 @@ def _but(column: Any, place: int) -> Any:
 #
 # - *A piece of length h of a flow.* y(σ) = row·e^{Aσ}b is within (σ − α)(β − σ)/2·max|y″| of its chord on [α, β], so
 #   ∫|y| ≤ h(|y(α)| + |y(β)|)/2 + h³/12·max|y″|, and |y″| ≤ |row|·|A²e^{Aσ}b| with absolute values entry by entry.
-# - *All periods before.* With Ψ the map of one period, N(c) = Σ_k ‖cΨᵏU‖₁; the columns U are the ends of the pieces of
-#   one period, weighted, and one column for every entry of the remainders. Terms up to k < K = 2^J are summed. Let W be
-#   any invertible matrix, y_j that sum for its row j, z_j the whole one and D = |WΨᴷW⁻¹|. Sums over one block of K
-#   periods, two and so on are at most y, y + Dy, …, so if y + Dx ≤ x, then z ≤ x, and N(c) ≤ partial sum + |cΨᴷW⁻¹|·x.
-#   Rows of W are unit rows but for one, along which the slowest mode is seen alone: what is left of that mode after K
-#   periods counts as it is, and K need not outlast it.
+# - *All periods before.* With Ψ the map of one period, N(c) = Σ_k ‖cΨᵏU‖₁; the columns of U are the weighted ends of
+#   the pieces of one period, and one column for every entry of the remainders. Terms with k < K = 2^J are summed. Let W
+#   be any invertible matrix, y_j that partial sum for its row j, z_j the whole sum and D = |WΨᴷW⁻¹|. Sums over one,
+#   two, … blocks of K periods are at most y, y + Dy, …, so y + Dx ≤ x gives z ≤ x and N(c) ≤ partial sum + |cΨᴷW⁻¹|·x.
+#   All rows of W but one are unit rows; that one isolates the slowest mode. The remainder of this mode after K periods
+#   is counted, so that K need not be large enough for its decay.
 # - *Between two phases α < β of the output.* ce^{Aθ} is within (β − α)²/8·max|cA²e^{Aσ}| of the chord of its ends, and
-#   N is convex: at most the larger end and N of the remainder. The flow since the last jump adds ∫₀^θ|ce^{Aσ}b|dσ,
-#   whose derivative has the Lipschitz constant max|cAe^{Aσ}b|: it is within (β − α)²/8 times that of its chord. Both
-#   together are below a chord plus remainders, hence at most the larger of the two ends plus remainders. ∎
+#   N is convex: the sum is at most the larger end plus N of the remainder. The flow since the last jump adds
+#   ∫₀^θ|ce^{Aσ}b|dσ, whose derivative has the Lipschitz constant max|cAe^{Aσ}b|: it is within (β − α)²/8 times this
+#   constant of its chord. The total is below a chord plus remainders, hence at most the larger of the two ends plus
+#   remainders. ∎
 #
 # **Sampled inputs.** Where Σ j·w_k enters with the jumps at kT and |w_k| ≤ W for every k up to t, |cx(t)| ≤ W·Σ|cΦ(t,
-# kT)j|: the same with a sum in place of the integral. A period has the one column e^{Aτ}j without a remainder, the flow
+# kT)j|, as above with a sum in place of the integral. A period has one column, e^{Aτ}j, without a remainder. The flow
 # since the last jump adds |ce^{Aθ}j|, which is within (β − α)²/8·max|cA²e^{Aσ}j| of its chord.
 #
-# **Fading inputs.** Where |w(τ)| ≤ W·ω(τ) with a weight ω of the phase, let Ω ≥ ∫ω and Ω′ ≥ ∫(τ − α)ω over a piece that
-# begins at α. There |cΦ(t, τ)b| ≤ |cΦ(t, α)b| + (τ − α)·max|cΦA·b|, so Ω|cΦ(t, α)b| + Ω′·max|…| stands in place of the
-# trapezoidal sum. Of the flow since the last jump, a piece that has passed adds Ω|ce^{A(θ − α)}b|, which is within (β −
-# α)²/8·Ω·max|cA²e^{Aσ}b| of its chord, and Ω′ times the largest slope; the piece in which θ lies adds at most
+# **Decaying inputs.** Where |w(τ)| ≤ W·ω(τ) with a weight ω of the phase, let Ω ≥ ∫ω and Ω′ ≥ ∫(τ − α)ω over a piece
+# that begins at α. There |cΦ(t, τ)b| ≤ |cΦ(t, α)b| + (τ − α)·max|cΦA·b|, so Ω|cΦ(t, α)b| + Ω′·max|…| replaces the
+# trapezoidal sum. In the flow since the last jump, a past piece adds Ω|ce^{A(θ − α)}b|, which is within (β −
+# α)²/8·Ω·max|cA²e^{Aσ}b| of its chord, and Ω′ times the largest slope; the piece that contains θ adds at most
 # Ω·max|ce^{Aσ}b|. Since e^{−x} ≤ 1/(1 + x + x²/2 + x³/6 + x⁴/24) = E(x), the weight he^{−λθ} + f has Ω =
 # hE(λα)·min(1/λ, ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 #
-# **Pulses.** Where w is there from `early` before a jump J to `late` after it, an impulse of it at −σ or σ has become
-# Je^{Aσ}b or e^{−Aσ}b, after the jump, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. As the area before the
-# jump, over `before`, and that after it, over `after`, are W in all, what comes of both is at most the larger of what
-# `before`·Jb and `after`·b become, and of these remainders. With x and y for the two that is |x + y|/2 + |x − y|/2: two
-# columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added to the
-# outputs of the pieces that `early` reaches.
+# **Pulses.** Let w be nonzero from `early` before a jump J to `late` after it. After the jump, an impulse of w at −σ or
+# σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area before the jump,
+# divided by `before`, and the area after it, divided by `after`, are W in all. So both together give at most the larger
+# of the responses to `before`·Jb and `after`·b, and of these remainders. With x and y for the two that is |x + y|/2 +
+# |x − y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is
+# added to the outputs of the pieces within `early`.
 #
-# **At once.** What an input of size 1 adds to an output at the same instant is added to the gain, for every weight.
+# **Direct feedthrough.** The direct effect of an input of size 1 on an output is added to the gain, for every weight.
 
-_MOST_SUMS = 5 * 10**7  # products for one input: half of what the standalone checker takes before it gives up
-_ROOM = Fraction((1 << 32) + 1, 1 << 32)  # for sums that are solved for to bound themselves
+_MOST_SUMS = 5 * 10**7  # products for one input: half the limit of the standalone checker
+_ROOM = Fraction((1 << 32) + 1, 1 << 32)  # enlargement of a solution of y + Dx = x
 
 
 def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     """Gains of every (output, input), rounded up, one for each part of the period; the same parts for all.
 
-    A start that is not 0 is one input more, `START`, of size 1. Gains of loops that came before are
-    remembered: a proof is found, checked, told and written of one loop.
+    A nonzero initial state is one more input, `START`, of size 1. Gains of earlier loops are cached: search, check,
+    statement and file of a proof use the same loop.
 
     Raises
     ------
     ParameterError
-        When the nominal loop is not found to be stable within 4096 periods.
+        When the nominal loop is not proved to be stable within 4096 periods.
     """
     gains = dict(_norms(replace(loop, start=())))
     return gains | {(output, START): peaks for output, peaks in free_peaks(loop).items()} if loop.start else gains
@@ -744,7 +744,7 @@ class LoopResponses:
 
     @cached_property
     def _seen(self) -> list[tuple[list[Any], list[Any]]]:
-        """Rows of every segment just before it and before all earlier ones; what bends its pieces, of a proof."""
+        """Output rows mapped to before each segment and all earlier ones; in a proof, bounds of second derivatives."""
         by, all_rows = self.by, []
         for number, flow in enumerate(self.flows):
             phases, bends = flow.phases(self.rows), list[Any]()
@@ -757,7 +757,7 @@ class LoopResponses:
         return all_rows
 
     def sums(self, name: str) -> Iterator[list[tuple[Any, Any, tuple[Any, ...]]]]:
-        """For an input, on every piece of every segment: sums for every output at both ends, and remainders."""
+        """Sums of an input for every output at both ends of every piece of every segment, and remainders."""
         by, count, size = self.by, self.rows.nrows(), self.periods.size
         parts = responses(self.loop, self.flows, name)
         earlier = parts if self.earlier is self.flows else responses(self.loop, self.earlier, name)
@@ -773,7 +773,7 @@ class LoopResponses:
             yield result
 
     def free(self) -> list[Any]:
-        """Largest outputs of the free response from the box: of a proof on every piece, else at all ends of pieces."""
+        """Largest outputs of the free response from the box: in a proof on every piece, else at all ends of pieces."""
         by, peaks = self.by, []
         period = reduce(lambda now, flow: flow.whole * now, self.flows, by.identity(self.periods.size))
         periods = _Periods(self.flows, period) if by.proves else self.periods
@@ -796,7 +796,7 @@ class LoopResponses:
 
 @dataclass(frozen=True, slots=True)
 class _Past:
-    """Everything before the first jump of a period: columns of K periods, and what bounds the rest."""
+    """Inputs before the first jump of a period: columns of K periods, and bounds of all earlier ones."""
 
     parts: list[_Response]
     columns: Any
@@ -829,9 +829,9 @@ class _Past:
         raise unstable()
 
     def of_rows(self, rows: list[Any], segment: int) -> Any:
-        """N of rows that act just before a segment: those before it in this period, and all that is earlier.
+        """N of rows just before a segment: inputs earlier in this period, and those of all earlier periods.
 
-        `rows` are these, and what they are just before all earlier segments, the last first.
+        `rows` are these rows, mapped back to before this and all earlier segments, the last first.
         """
         by = self.parts[0].of.by
         sums = by.sums(rows[-1] * self.columns) + by.absolute(rows[-1] * self.far) * self.bound
@@ -848,7 +848,7 @@ def _whole(left: Any, sums: Any) -> Any:
     Raises
     ------
     ParameterError
-        When the one that is tried is none.
+        When the computed x does not satisfy this.
     """
     try:
         solution = absolute((identity(left.nrows()) - left).solve(sums) * ball(_ROOM))
@@ -860,6 +860,6 @@ def _whole(left: Any, sums: Any) -> Any:
 
 
 def _diagonal(column: Any) -> Any:
-    """One column for every entry that is not zero."""
+    """One column for every nonzero entry."""
     nonzero = [i for i, v in enumerate(column.entries()) if not v.is_zero()]
     return arb_mat([[column[i, 0] if i == j else arb(0) for j in nonzero] for i in range(column.nrows())])

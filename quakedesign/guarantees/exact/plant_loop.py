@@ -35,7 +35,7 @@ from quakedesign.guarantees.exact.norms import (
 from quakedesign.plant.plant_values import ExactSector, Matrix, Row, SlowLoad, unit
 
 # ----------------------------------------------------------------------
-# The loop: states of the plant, of the law, controls on their way, controls that act.
+# The loop: states of the plant and of the law, delayed controls, acting controls.
 
 MOST_PERIODS = 8
 MOST_LOOP_STATES = 96
@@ -43,7 +43,7 @@ MOST_LOOP_STATES = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatrixLaw:
-    """Sampled law u = Cz + Dy, z⁺ = Az + By with z = 0 at first; u acts `delay` later."""
+    """Sampled law u = Cz + Dy, z⁺ = Az + By with z = 0 initially; u acts `delay` later."""
 
     step: Fraction
     delay: Fraction
@@ -63,7 +63,7 @@ class MatrixLaw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlantLoop:
-    """x′ = Fx + Σ b·w between jumps, the first jump at t = 0, with the rows that are bounded.
+    """x′ = Fx + Σ b·w between jumps, the first jump at t = 0, and the rows to be bounded.
 
     Attributes
     ----------
@@ -71,11 +71,11 @@ class PlantLoop:
     segments : tuple of (Matrix, Fraction)
         Jump and the time [s] that follows it.
     inputs : tuple of Row
-        Columns of inputs that flow: disturbances, loads, sectors.
+        Columns of inputs of the flow: disturbances, loads, sectors.
     sampled : tuple of Row
         Columns of noise, which enters with the first jump.
     start : tuple of Row
-        Columns of the box of starts.
+        Columns of the box of initial states.
     rows : tuple of Row
         Outputs, arguments of sectors, controls.
     """
@@ -103,12 +103,12 @@ class LinearPart:
     outputs: Matrix
 
     def loop(self, law: MatrixLaw) -> PlantLoop:
-        """Loop about the balance of the loads, each sector at its middle.
+        """Loop relative to the equilibrium under the loads, each sector at its midpoint.
 
         Raises
         ------
         ParameterError
-            For sizes that do not fit, too many states, or a load that the law cannot hold.
+            For sizes that do not fit, too many states, or a load that the law cannot balance.
         """
         n, m, q, zero = len(self.A), len(self.B[0]), len(law.update), Fraction(0)
         seen = len(self.C)
@@ -145,7 +145,7 @@ class LinearPart:
         ):
             line = [sum((fed[a] * self.C[a][j] for a in range(seen) if fed[a]), zero) for j in range(n)]
             jump[target] = [*line, *own, *[zero] * (size - n - q)]
-        for place in range(n + q + m, size if not part else first):  # controls on their way move one place on
+        for place in range(n + q + m, size if not part else first):  # delayed controls move one place on
             jump[place] = list(unit(size, place - m))
         arrival = [list(unit(size, i if i < first else i - m)) for i in range(size)]
         segments = [(jump, part or law.step), *([(arrival, law.step - part)] if part else [])]
@@ -205,15 +205,15 @@ def solved(rows: Sequence[Sequence[Fraction]], unknowns: int) -> Row:
 
 
 # ----------------------------------------------------------------------
-# L1 norms of all rows for all inputs at once. The statements and their proofs are those of `norms`; but here the
-# remainders of all inputs are bounded by the sums for unit columns, which are formed once, and periods are followed by
-# rows: with P_k = rows·Ψᵏ the sums of |P_k·columns| over k < K are formed, and what is left is bounded by x with
-# y + |Ψᴷ|x ≤ x, y those sums for unit rows.
+# L1 norms of all rows for all inputs at once. The statements and their proofs are those of `norms`, except that sums
+# for unit columns, computed once, bound the remainders of all inputs, and rows are followed over the periods: the sums
+# of |P_k·columns| over k < K are computed, P_k = rows·Ψᵏ, and the rest is bounded by x with y + |Ψᴷ|x ≤ x, y those sums
+# for unit rows.
 
-_BITS = (128, 256)  # of the balls; more where fewer do not show that the loop forgets
+_BITS = (128, 256)  # precision of balls; the larger if the smaller does not show decay
 _AT_ONCE = 8  # periods
 _MOST_WORK = 12 * 10**8
-_BEYOND = 64  # times as many periods as may be followed, within which the map of one that forgets is small
+_BEYOND = 64  # times the limit of periods, within which the map of a stable loop must get small
 _LEFT = Fraction(1, 1024)
 _ROOM = Fraction((1 << 20) + 1, 1 << 20)
 _FAINT = Fraction(1, 1 << 60)
@@ -234,7 +234,7 @@ def response_bounds(loop: PlantLoop, pieces: int) -> ResponseBounds:
     Raises
     ------
     ParameterError
-        When the loop is not found to be stable, or takes too long.
+        When the loop is not proved to be stable, or exceeds the work limit.
     """
     *few, most = _BITS
     for bits in few:
@@ -266,12 +266,12 @@ class _AllResponses:
         self.within = [absolute((majorant(self.flow) * (h * pieces)).exp()) for h in self.lengths]
 
     def bounds(self) -> ResponseBounds:
-        """The bounds."""
+        """L1 norms and free response."""
         wholes = [powers[-1] * jump for powers, jump in zip(self.powers, self.jumps, strict=True)]
         *earlier, period = accumulate(wholes, lambda now, whole: whole * now, initial=identity(self.size))
         later = list(accumulate(wholes[:0:-1], mul, initial=identity(self.size)))[::-1]
         blocks, rests = zip(*(self._own(s, later[s]) for s in range(len(wholes))), strict=True)
-        # all periods before: groups of columns for every input, units for the remainders
+        # all earlier periods: groups of columns for every input, units for the remainders
         own = [beside([block[i] for block in blocks]) for i in range(self.kinds)]
         own += [later[0] * self.powers[0][-1] * column(entry) for entry in self.loop.sampled]
         left = [reduce(add, (rest[i] for rest in rests)) for i in range(self.kinds)]
@@ -282,7 +282,7 @@ class _AllResponses:
         peaks, places = [], seen[0].nrows()
         for s in range(len(wholes)):
             before = [BALLS.part(total, s * places, (s + 1) * places) for total in [*sums, free]]
-            if s:  # what entered earlier in this period
+            if s:  # inputs earlier in this period
                 first, first_rests = self._own(0, identity(self.size))
                 now = seen[s] * self.jumps[s]
                 for i, (near, rest) in enumerate(zip(first, first_rests, strict=True)):
@@ -310,7 +310,7 @@ class _AllResponses:
         ends = list(accumulate([*(block.ncols() for block in own), *[1] * size, len(start)], initial=0))
         now, height, width = rows, rows.nrows(), columns.ncols()
         sums, free = arb_mat(height, len(ends) - 1), arb_mat(height, 1)
-        # after some periods: products of many maps, one after another, would lose all digits
+        # several periods at once: long products of single maps would lose all precision
         turned = list(accumulate([period] * (_AT_ONCE - 1), lambda late, once: once * late, initial=columns))
         leap, check, done = period**_AT_ONCE, _AT_ONCE, 0
         _require_fading(leap, height * size * (width + size))
@@ -346,9 +346,9 @@ class _AllResponses:
         return totals, free
 
     def _peaks(self, s: int, i: int, before: Any) -> Row:
-        """Bounds of all rows in a segment for an input, or at last a start, from what came before it.
+        """Bounds of all rows in a segment for an input or, last, the initial states, given earlier inputs.
 
-        The largest of all pieces: of both ends, with what chords leave out.
+        The largest of all pieces: the larger end plus the remainder of the chord.
         """
         count, h, kinds = len(self.loop.rows), self.lengths[s], self.kinds
         bends = absolute(self.rows * self.square) * self.within[s]
@@ -377,13 +377,13 @@ def _total(sums: Any, i: int, count: int, rest: Any) -> Any:
 
 
 def _raised(part: Any) -> Any:
-    """Bounds of which none is 0, each a little larger."""
+    """Slightly larger bounds, none of which is 0."""
     faint = reduce(arb.max, part.entries()) * ball(_FAINT)
     return arb_mat([[(v + faint).abs_upper()] for v in part.entries()])
 
 
 def _require_fading(leap: Any, work: int) -> None:
-    """Reject a map of several periods that has no small power within the work limit."""
+    """Reject a map of several periods if none of its powers within the work limit is small."""
     power, periods = leap, _AT_ONCE
     while not all(v < 1 for v in absolute(power).entries()):
         if periods * work > _BEYOND * _MOST_WORK or not all(v < 1 << 80 for v in absolute(power).entries()):

@@ -1,15 +1,15 @@
 """Guarantee of a sampled loop with an uncertain plant: vector small gain, claims, files.
 
-**Theorem.** Of a loop about the balance of its loads, with every sector at its middle, let P_r be a bound of a row r by
-the sizes of the disturbances, the rates of the loads, the noise, the box of starts and numbers W_s ≥ 0 for what the
-sectors are more than their middles: P_r = start_r + Σ g_ri·size_i + Σ g_rs·W_s. Let h_s be half the width of sector s,
-and h_s·P_s < W_s for the argument of every sector with h_s > 0, and P_s < `within` for every sector that holds up to a
-bound. Then every row stays below P_r for all t ≥ 0.
+**Theorem.** Consider a loop relative to the equilibrium under its loads, with every sector at its midpoint. For numbers
+W_s ≥ 0 that bound the deviations of the sectors from their midpoints, let P_r = start_r + Σ g_ri·size_i + Σ g_rs·W_s.
+This bounds row r by the sizes of the disturbances, the rates of the loads, the noise, the box of initial states and W.
+Let h_s be half the width of sector s. If h_s·P_s < W_s for the argument of every sector with h_s > 0, and P_s <
+`within` for every sector valid up to a bound, then every row stays below P_r for all t ≥ 0.
 
-**Proof.** Let all sectors hold up to t. What a sector is more than its middle is at most h_s|y_s|, so the suprema W(t)
-up to t obey W(t) ≤ F + M·W(t) with M_sk = h_s·g_sk and F + M·W < W for the numbers W, so that M·W < W: the spectral
-radius of M is below 1 (Collatz and Wielandt), W(t) is finite, and W(t) ≤ (1 − M)⁻¹F < W. So all arguments stay below
-P_s, those with a bound strictly within it; as they are continuous and within it at first, they never leave it. ∎
+**Proof.** Let all sectors be valid up to t. The deviation of a sector from its midpoint is at most h_s|y_s|, so the
+suprema W(t) up to t obey W(t) ≤ F + M·W(t) with M_sk = h_s·g_sk and F + M·W < W for the numbers W, so that M·W < W: the
+spectral radius of M is below 1 (Collatz and Wielandt), W(t) is finite, and W(t) ≤ (1 − M)⁻¹F < W. So all arguments stay
+below P_s, those with a bound strictly within it. As they are continuous and initially within it, they never leave it. ∎
 """
 
 from collections.abc import Iterable, Mapping
@@ -64,7 +64,7 @@ class PlantProof(Proof[Row]):
         Units of outputs, controls and disturbances for display; empty for none.
     name : str
     remarks : mapping of str to str
-        As of `UncertainPlant`.
+        As in `UncertainPlant`.
     notes : tuple of str
         Changes of the law by rounding to exact numbers.
     """
@@ -144,20 +144,20 @@ class PlantProof(Proof[Row]):
 
 
 def _listed(values: Iterable[Fraction], units: Iterable[str] = ()) -> str:
-    """Different numbers that are covered, in their order."""
+    """Distinct covered numbers in their order, as text."""
     return ", ".join(dict.fromkeys(_shown(LowerBound(v), unit) for v, unit in zip_longest(values, units, fillvalue="")))
 
 
 def _shown(bound: LowerBound | UpperBound, unit: str) -> str:
-    """With four digits, and an engineering prefix of its unit."""
+    """Bound with four digits and an engineering prefix of its unit."""
     if unit.startswith("MPa"):
         bound, unit = type(bound)(bound * 10**6), unit[1:]
     return bound.quantity(unit, 4) if unit and bound else f"{bound:.4g}"
 
 
 def peaks(part: LinearPart, responses: ResponseBounds, inputs: Row) -> Row | None:
-    """Bounds of outputs and controls by numbers for the sectors; None where these do not close."""
-    if min(inputs, default=Fraction(0)) < 0:  # the comparison of Collatz and Wielandt is one of numbers >= 0
+    """Bounds of outputs and controls for given W_s of the sectors; None if a condition of the theorem fails."""
+    if min(inputs, default=Fraction(0)) < 0:  # Collatz and Wielandt compare numbers >= 0
         return None
     bounds = row_bounds(part, responses, inputs)
     count = len(part.outputs)
@@ -207,7 +207,7 @@ class PlantEntries(Entries):
     outputs: Matrix
 
     def part(self) -> LinearPart:
-        """The plant, of sizes that fit."""
+        """The plant, after a check of its sizes."""
         n, m = len(self.A), len(self.B[0]) if self.B else 0
         need(1 <= n <= MOST and 1 <= m, f"a plant must have 1 to {MOST} states, and a control")
         for name in ("C", "disturbances", "loads", "sectors", "outputs"):
@@ -244,7 +244,7 @@ class PlantLawEntries(Entries):
 
 
 class PlantFile(Entries):
-    """All of a file but its format and kind."""
+    """Content of a file without its format and kind."""
 
     plant: PlantEntries
     law: PlantLawEntries
@@ -283,7 +283,7 @@ def read_plant_guarantee(raw: dict[str, Any]) -> PlantProof:
     part, matrices = file.plant.part(), file.law
     need(len(matrices.A) <= _MOST_LAW_STATES, f"a law must have at most {_MOST_LAW_STATES} states")
     law = made(MatrixLaw, matrices, update=matrices.A, measured=matrices.B, output=matrices.C, feedback=matrices.D)
-    part.loop(law)  # rejects sizes that do not fit, and a load that the law cannot hold
+    part.loop(law)  # rejects sizes that do not fit, and a load that the law cannot balance
     count = {"output": len(part.outputs), "control": len(part.B[0])}
     names = {kind: [f"{kind}_{i}" for i in range(1, most + 1)] for kind, most in count.items()}
     expected = [*names["output"], *names["control"]]

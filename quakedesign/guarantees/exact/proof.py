@@ -17,27 +17,27 @@ B = TypeVar("B")
 class Proof(ABC, Generic[B]):
     """Claims about one loop that check themselves; base of one class for each theorem.
 
-    **Principle.** A theorem gives bounds of the claimed quantities up to time t, on every cell of the box of constants.
-    It may assume the claims up to t: slow sliding does for all inputs, tracking only for an implicit step and a slowly
-    varying input gain. Then each bound lies below its claim, or within it where earlier samples alone decide the input.
-    The quantities are continuous and within the claims at first, so none leaves its claim first.
+    **Principle.** A theorem bounds the claimed quantities up to time t, on every cell of the box of constants. It may
+    assume the claims up to t: slow sliding does so for all inputs, tracking only for an implicit step and a slowly
+    varying input gain. Then each bound lies below its claim, or within it if earlier samples alone determine the input.
+    The quantities are continuous and initially within the claims, so none leaves its claim first.
 
     Attributes
     ----------
     kind : str
         Of its certificate file (proofs/FORMAT.md).
     plant : str
-        Plant of `simulate` that it is about; empty where only one applies.
+        Plant of `simulate` that the proof is about; empty where only one applies.
     scope : str
         Idealisation of its plant, as text; empty for the stick–slip plant and slow sliding.
     motion : str
         Condition of the slip-rate bound, as text.
     lasts : str
-        For how long.
+        Time range of the claims, as text.
     covers_healing : bool
         Whether friction at rest may exceed friction in slip, see `StickSlipProof.beside_healing`.
     slides : bool
-        Whether it is about slow sliding with friction that has a state.
+        Whether the proof is about slow sliding with rate-and-state friction.
     sampled : bool
         Whether its law is sampled.
     root : ImplicitRoot or None
@@ -83,7 +83,7 @@ class Proof(ABC, Generic[B]):
 
     @property
     def lasts(self) -> str:
-        """For how long."""
+        """Time range of the claims, as text."""
         return "for all t >= 0"
 
     @property
@@ -113,7 +113,7 @@ class NoProof:
     small_gain : UpperBound or None
         At least 1; None where something else fails, such as the stability of the nominal loop.
     needs : Fraction, optional
-        Change of the pressure between samples that the pump would have to make [Pa].
+        Change of the pressure between samples required of the pump [Pa].
     pressed : bool
         Whether only the pressure fails: it exceeds a pump limit, or opens the fault.
     """
@@ -130,5 +130,5 @@ class NoProof:
         return Verdict.UNDECIDED
 
     def sentence(self) -> str:
-        """For people."""
+        """Result and its reason, as text."""
         return f"none: {self.reason}"

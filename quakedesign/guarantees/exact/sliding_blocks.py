@@ -1,20 +1,20 @@
 """Several blocks with rate-and-state friction in slow sliding, as an uncertain plant.
 
 Each block obeys the equations of `sliding_small_gain`, whose symbols are used here, and springs pull it towards its
-neighbours: with q the pressures of the wells less the plan Kr/μ*, after a lag, S their shares, and
-w = −Kx + Σk(x_j − x) + μ*Sq,
+neighbours: with q the well pressures after a lag, minus the plan Kr/μ*, S the shares of the wells, and w = −Kx + Σk(x_j
+− x) + μ*Sq,
 
     y·B = ŝ − Nbz + w,  B = Na + HV·f/y,    x′ = V(f − ω),    z′ = −ρ(f + g),    q′ = (u − q)/lag.
 
-On |y| ≤ Y and |z| ≤ Z let f = γy and g = ηz, γ and η between the chords. So f = −γα·z + γκ·(w + ŝ) with α = Nb/B and
-κ = 1/B. While |u| ≤ Q, also |Sq| ≤ Q, and N lies between σ′ − P − Q and σ′ + Q, P the largest planned pressure, which
-gives ranges of α and κ. The plant below has the sectors γα and η of z and γκ of w, which hold for |z| ≤ Z and |w| ≤ W,
-and disturbances of the size sup(γκ)·sup|ŝ|. From these claims Y = sup α·Z + sup κ·(W + sup|ŝ|) follows.
+For |y| ≤ Y and |z| ≤ Z let f = γy and g = ηz, γ and η between the chords. So f = −γα·z + γκ·(w + ŝ) with α = Nb/B and κ
+= 1/B. While |u| ≤ Q, also |Sq| ≤ Q, and N lies between σ′ − P − Q and σ′ + Q, P the largest planned pressure. This
+gives ranges of α and κ. The plant below has the sectors γα and η of z and γκ of w, valid for |z| ≤ Z and |w| ≤ W, and
+disturbances of size sup(γκ)·sup|ŝ|. These claims give Y = sup α·Z + sup κ·(W + sup|ŝ|).
 
-|ŝ| is at most the shear stress, what inertia adds, sup|r|/λ₀ with |w′| ≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇, Y the
-largest of all blocks here, in place of K|x′| + μ*|q′|, q̇ = 2Q/lag, and what the rounding of μ* leaves. y, z, w and q
-are continuous and 0 at first, and u is decided by samples before it acts: where smaller bounds follow from the claims
-Z, W and Q, none is ever reached. ∎
+|ŝ| is at most the sum of the shear stress, the rounding error of μ* and the term of inertia, sup|r|/λ₀. In this r, |w′|
+≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇ replaces K|x′| + μ*|q′|, q̇ = 2Q/lag, Y the largest of all blocks. y, z, w and q
+are continuous and initially 0, and u is determined by samples before it acts. So if bounds below the claims Z, W and Q
+follow from these, no claim is ever reached. ∎
 """
 
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ from quakedesign.text import counted
 
 MOST_SLIDING = MOST // 3
 MPA = 10**6  # Pa, unit of pressures and pulls of the plant
-_LARGEST = 3  # Y, as of one block
+_LARGEST = 3  # largest Y, as for one block
 _TURNS = 30
 _WIDER = Fraction(1001, 1000)
 _OUTWARD = 1e-9
@@ -50,9 +50,9 @@ class BlockClaims:
     log_state : Fraction
         Z: logarithm of θ over D/V [-].
     pull : Fraction
-        W: what springs and wells pull [Pa].
+        W: shear stress by springs and wells [Pa].
     push : Fraction
-        Q: commanded pressure at a well less the plan [Pa]; the pressures in the blocks are means of its past.
+        Q: commanded pressure at a well minus the plan [Pa]; the pressures in the blocks are means of its past.
     """
 
     log_state: Fraction
@@ -78,7 +78,7 @@ class SlidingBlocks:
     Attributes
     ----------
     chain : BlockChain
-        Of one steady friction coefficient; alike where there are fewer wells than blocks.
+        With one steady friction coefficient; identical blocks if there are fewer wells than blocks.
     lag : Fraction
         [s].
     stress : Fraction
@@ -130,7 +130,7 @@ class SlidingBlocks:
 
     @cached_property
     def springs(self) -> tuple[Row, ...]:
-        """Stiffness matrix of the pulls on blocks [Pa/m], with the far end."""
+        """Stiffness matrix of the stresses on blocks [Pa/m], including the far end."""
         N, inertia = len(self.tasks), self.tasks[0].inertia
         rows = [[-task.stiffness * (i == j) for j in range(N)] for i, task in enumerate(self.tasks)]
         add_springs(rows, self.chain.springs, inertia)
@@ -142,12 +142,12 @@ class SlidingBlocks:
         return 2 * len(self.tasks) + len(self.chain.wells)
 
     def log_rate(self, claims: BlockClaims) -> UpperBound | None:
-        """Y of all blocks [-] by claims; None where a block may open, or Y is beyond 3."""
+        """Largest Y of all blocks [-] under the claims; None if a block may open or Y exceeds 3."""
         ranges = self._ranges(claims)
         return None if ranges is None else UpperBound(max(one.log_rate for one in ranges))
 
     def _ranges(self, claims: BlockClaims) -> list[_Ranges] | None:
-        """Of all blocks."""
+        """Ranges of all blocks under the claims."""
         fastest = claims.log_state
         for _ in range(_TURNS):
             ranges = [self._of_block(i, claims, fastest) for i in range(len(self.tasks))]
@@ -161,7 +161,7 @@ class SlidingBlocks:
         return None
 
     def _of_block(self, i: int, claims: BlockClaims, fastest: Fraction) -> _Ranges | None:
-        """Of one block, with a bound of |y| of those that pull it."""
+        """Ranges of one block, given a bound of |y| of its neighbours."""
         task, Z, (mu_low, mu) = self.tasks[i], claims.log_state, self.tasks[i].ranges["coefficient"]
         a, b = task.ranges["direct_effect"][1], task.ranges["evolution_effect"][1]
         low, high = task.normal_stress(claims.push)
@@ -193,7 +193,7 @@ class SlidingBlocks:
         return None
 
     def plant(self, claims: BlockClaims) -> UncertainPlant | None:
-        """The plant by claims, or None where `log_rate` is.
+        """Uncertain plant under the claims, or None where `log_rate` is None.
 
         States: slip errors over D [-], logarithms of states [-], pressures of wells [MPa]; controls [MPa].
         """
@@ -253,5 +253,5 @@ class SlidingBlocks:
 
 
 def _outward(low: Fraction, high: Fraction) -> Range:
-    """Few digits that enclose a range of positive numbers."""
+    """Range of positive numbers, rounded outward to few digits."""
     return tuple(rational(f"{float(v) * (1 + s * _OUTWARD):.10g}") for v, s in ((low, -1), (high, 1)))  # type: ignore[return-value]

@@ -70,7 +70,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         return cells(self.task, self.cuts)
 
     def recomputed(self) -> Mapping[str, Fraction] | NoProof:
-        """Largest bounds over all cells by name, which follow from the claims, or the reason of the first cell."""
+        """Largest bounds over all cells that follow from the claims, by name, or the first reason for failure."""
         largest: dict[str, Fraction] = {}
         for cell in self.cells:
             bounds = cell_bounds(cell, self.held, self.claims)

@@ -5,49 +5,49 @@ p,
 
     mVe^y·y′ = s − ŝ,    ŝ = N(ay + bz) + HV(e^y − 1) + Kx − μ*q,    x′ = V(f − ω),    z′ = −ρ(f + g),
 
-f = e^y − 1, g = 1 − e^{−z}, ρ = V/D: the balance of forces, of which the steady one, with Nμ* + HV + Kr, is taken off,
-and the ageing law. The slip law has z′ = −ρe^y(y + z) in its place. Everything is 0 at first; a, b, D, μ* and σ′ are
-constants. The slip error is that from a reference r with r′ = V(1 + ω), |ω| ≤ W < 1 of any course, r = Vt without a
-swing W, and p* = Kr/μ*, so that |p*′| ≤ KV(1 + W)/μ*; 0 ≤ r, which rises to the distance. Rate and state are those
-beside V and D/V all the same: V does not follow r′.
+f = e^y − 1, g = 1 − e^{−z}, ρ = V/D. The first equation is the force balance minus that of steady sliding, Nμ* + HV +
+Kr; the last equation is the ageing law. The slip law has z′ = −ρe^y(y + z) instead. All variables are initially 0; a,
+b, D, μ* and σ′ are constants. The slip error is relative to a reference r with r′ = V(1 + ω), |ω| ≤ W < 1 with any time
+history, r = Vt for W = 0. r rises from 0 to the distance, and p* = Kr/μ*, so that |p*′| ≤ KV(1 + W)/μ*. Rate and state
+remain relative to V and D/V: V does not follow r′.
 
-**Regularised friction** is larger than a·ln(2s), 2s = 2sinh(μ*/a)·e^{y + bz/a}, by at most a/(4s²), as arsinh s =
-ln(2s) + ln((1 + √(1 + 1/s²))/2). With m = μ* − aY − bZ, 2m/a ≥ 1, this is below 4a·e^{−2m/a} =: ε, for (1 −
-e^{−2μ*/a})^{−2} < 4. So it is the logarithmic one under a shear stress that is larger by N_max·ε, far below 1 Pa.
+**Regularised friction** exceeds a·ln(2s), 2s = 2sinh(μ*/a)·e^{y + bz/a}, by at most a/(4s²), as arsinh s = ln(2s) +
+ln((1 + √(1 + 1/s²))/2). With m = μ* − aY − bZ, 2m/a ≥ 1, this is below 4a·e^{−2m/a} =: ε, as (1 − e^{−2μ*/a})^{−2} < 4.
+So it equals logarithmic friction under a shear stress that is larger by at most N_max·ε, far below 1 Pa.
 
 **Inertia.** Let |y| ≤ Y, |z| ≤ Z, |q| ≤ Q so far. Then ŝ′ = λ(s − ŝ) + r with λ = (Na + HVe^y)/(mVe^y) ≥ λ₀ =
-N_min·a/(mVe^Y) and r = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|r|/λ₀ it falls, so |ŝ| ≤ S + sup|r|/λ₀: the
-fault with its mass is one without it (ŝ in place of s) under a stress that is larger by sup|r|/λ₀, some Pa. Its r has
-|N′| ≤ KV(1 + W)/μ* + |q′|, |z′| ≤ ζ, ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), of the slip law ρe^Y(Y + Z),
-and |x′| ≤ V(e^Y − 1 + W). The pressure in the fault is that of the well, u beside the plan, through filters 1/(1 +
-s/λ_n), of which one has the rate λ: so q′ = λ(h − w) − δ′, w what comes out, h what goes into it, δ = p* − plan, |δ′| ≤
-d. Filters are means over the past, E late in all, so with |u − δ| ≤ U also |h − δ| ≤ U + dE, and |w − δ| = |q| ≤ Q:
-|q′| ≤ λ(U + dE + Q) + d. For rock λ = π²/(4τ) < 5/(2τ) and E = τ/2, with the lag ℓ before it E = τ/2 + ℓ; for a lag
-alone λ = 1/ℓ, E = ℓ.
+N_min·a/(mVe^Y) and r = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|r|/λ₀ it decreases, so |ŝ| ≤ S + sup|r|/λ₀:
+the fault with mass is one without mass (ŝ in place of s) under a stress that is larger by sup|r|/λ₀, a few Pa. In r,
+|N′| ≤ KV(1 + W)/μ* + |q′|, |z′| ≤ ζ with ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), or ρe^Y(Y + Z) for the
+slip law, and |x′| ≤ V(e^Y − 1 + W). The well pressure minus the plan, u, acts on the fault through filters 1/(1 +
+s/λ_n), one of which has the rate λ. So q′ = λ(h − w) − δ′ with h the input and w the output of that filter, δ = p* −
+plan, |δ′| ≤ d. Filters are means over the past, with a mean delay E in all. So |u − δ| ≤ U gives |h − δ| ≤ U + dE and,
+as |w − δ| = |q| ≤ Q, |q′| ≤ λ(U + dE + Q) + d. A diffusion path has λ = π²/(4τ) < 5/(2τ) and E = τ/2, and E = τ/2 + ℓ
+with a lag ℓ before it; a lag alone has λ = 1/ℓ, E = ℓ.
 
-**Sectors.** On |y| ≤ Y f/y lies between (1 − e^{−Y})/Y and (e^Y − 1)/Y, c its middle and δ half the range, and on |z|
-≤ Z g/z between the same of Z, c_z and δ_z. With middles N₀, a₀, b₀, μ₀, ρ₀ of the ranges of a cell the loop of
-`sliding_loop` has the inputs
+**Sectors.** For |y| ≤ Y, f/y lies between (1 − e^{−Y})/Y and (e^Y − 1)/Y, with midpoint c and half-width δ. For |z| ≤
+Z, g/z lies between the same bounds with Z, with midpoint c_z and half-width δ_z. With the midpoints N₀, a₀, b₀, μ₀, ρ₀
+of the ranges of a cell the loop of `sliding_loop` has the inputs
 
     e = ŝ − (N − N₀)(ay + bz) − N₀((a − a₀)y + (b − b₀)z) − HV(f − cy) + (μ* − μ₀)q,    φ = f − cy,
     h = (ρ/ρ₀ − 1)(cy + c_z·z + φ) + (ρ/ρ₀)(g − c_z·z),
 
 so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δμ|q|, |φ| ≤ δ|y| and, with r = sup|ρ/ρ₀ − 1|, |h| ≤
-r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. Of the slip law (ρ/ρ₀)e^y lies between (1 − r)e^{−Y} and (1 + r)e^Y, c_z its
-middle and δ_z half the range, and with z′ = −ρ₀c_z(y + z) − ρ₀h, into which φ does not come, |h| ≤ δ_z|y + z|. ω is an
-input of its own. Noise of the measured slip, the drift of p* from the plan and what the modes of a layer leave out, R,
-are inputs as in `guarantee.theorem`: q has R more than the loop's, and y and what is made of it what e and μ₀R add to
-them at the same instant, R no more than its weight at the beginning of a part of the period.
+r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. For the slip law (ρ/ρ₀)e^y lies between (1 − r)e^{−Y} and (1 + r)e^Y, with
+midpoint c_z and half-width δ_z. Then z′ = −ρ₀c_z(y + z) − ρ₀h does not contain φ, and |h| ≤ δ_z|y + z|. ω is an input
+of its own. Noise of the measured slip, drift of p* from the plan and the truncation error R of the diffusion modes are
+inputs as in `small_gain`. q is that of the loop plus R. y and its combinations with z include the direct feedthrough of
+e and μ₀R, where R has at most its weight at the beginning of a part of the period.
 
-**After a step.** R is largest at once, where the fault has not felt the step yet. With the middle N₀a₀ + HVc = B, By
-= X + e and |X′| ≤ KV(e^Y − 1 + W) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So as long as θ after a step αy + βz is
-at most what it was before, with what e adds now, and θ(α|X′|/B + βζ): in the parts of the period that begin before R
-has faded to a sixteenth y, ay + bz and cy + c_z·z have the gains of the part that ends with the step, and that
-constant of the first instant of the others more.
+**After a step.** R is largest immediately after a step, before the fault responds to the step. With the midpoint N₀a₀ +
+HVc = B, By = X + e and |X′| ≤ KV(e^Y − 1 + W) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So until θ after a step, αy
++ βz is at most its value before the step, with the feedthrough of the present e, plus θ(α|X′|/B + βζ). In the parts of
+the period that begin before R has decayed to a sixteenth, y, ay + bz and cy + c_z·z have the gains of the part that
+ends with the step. Their bounds are larger by the above constant, with θ the beginning of the first other part.
 
 **Conclusion.** Let the bounds that follow for |y|, |z|, |q| and |u − δ| lie below Y, Z, Q and U. y, z and q are
-continuous and 0 at first, and u is decided by samples before it acts, so none of them ever reaches its bound: it
-would have had to obey the smaller one until then. So the slip rate never exceeds Ve^Y, on every cell. ∎
+continuous and initially 0, and u is determined by samples before it acts. So none of them ever reaches its claim: until
+then it would have obeyed the smaller bound. The slip rate never exceeds Ve^Y, on every cell. ∎
 """
 
 from collections.abc import Mapping, Sequence
@@ -68,7 +68,7 @@ from quakedesign.loop import PeriodicLoop, SlidingModel, at_once, sliding_loop
 from quakedesign.plant.sliding_plant import Range, SlidingPlant
 
 _TERMS = 24  # of Taylor's series
-_LARGEST = 3  # logarithm of a ratio: beyond that nothing is slow sliding
+_LARGEST = 3  # largest logarithm of a ratio in slow sliding
 _FADED = Fraction(1, 16)
 _AT_ONCE = ("log_rate", "ageing", "strength")
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -85,9 +85,9 @@ class SlidingClaims:
     slip_error : UpperBound
         [m].
     push : UpperBound
-        Q: the pressure in the fault less that which it needs at V [Pa].
+        Q: pressure in the fault minus p* [Pa].
     asked : UpperBound
-        U: the same of the pressure at the valve [Pa].
+        U: pressure at the valve minus p* [Pa].
 
     Raises
     ------
@@ -137,9 +137,9 @@ def bounds_from(
     gains: Gains,
     phases: Sequence[Fraction],
 ) -> dict[str, Any] | NoProof:
-    """Bounds that follow from the gains of the loop; an estimate for gains in floats.
+    """Bounds that follow from the gains of the loop; gains in floats give an estimate.
 
-    `phases` are times [s] since a step reached the well, at the beginning of every part that has a gain.
+    `phases` are the times [s] since the last step at the well, at the start of every part of the period.
     """
     model = model_of(task, claims)
     if model is None:
@@ -176,7 +176,7 @@ def loop_of(held: SampledLoop, model: SlidingModel, task: SlidingPlant) -> Perio
     Raises
     ------
     ParameterError
-        For a law that uses the slip rate, a pressure that jumps in the fault, jitter or the rate of a pump.
+        For a law that uses the slip rate, steps of the pressure in the fault, jitter or the rate limit of a pump.
     """
     if held.instants is not None:
         raise ParameterError(
@@ -199,7 +199,7 @@ def loop_of(held: SampledLoop, model: SlidingModel, task: SlidingPlant) -> Perio
 
 
 def _moving(task: SlidingPlant) -> dict[str, Fraction]:
-    """Bounds of what comes of the reference, by its inputs of the loop."""
+    """Bounds of the inputs that the reference causes, by name."""
     return {"drift": task.drift, "reference": task.swing}
 
 
@@ -226,7 +226,7 @@ def model_of(task: SlidingPlant, claims: SlidingClaims) -> SlidingModel | None:
 
 
 def _left(task: SlidingPlant, claims: SlidingClaims) -> str:
-    """Why there is no model."""
+    """Reason why there is no nominal model."""
     if task.normal_stress(claims.push)[0] <= 0:
         return "the pressure may open the fault"
     return "regularised friction may come near 0"
@@ -235,7 +235,7 @@ def _left(task: SlidingPlant, claims: SlidingClaims) -> str:
 def channels_of(
     task: SlidingPlant, held: SampledLoop, claims: SlidingClaims, loop: PeriodicLoop
 ) -> tuple[Channel, ...]:
-    """Inputs of the loop and what bounds them."""
+    """Inputs of the loop, each with its F and c."""
     low, high = task.normal_stress(claims.push)
     rates, states = chords(claims.log_rate), _state_slopes(task, claims)
     off, bent = _off(task), _half(rates)
@@ -283,7 +283,7 @@ def regularisation(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
 
 
 def _least_exponent(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
-    """2m/a of the least friction coefficient m that may be, without regularisation."""
+    """2m/a with m the least possible friction coefficient, without regularisation."""
     (_, a), (_, b), (mu, _) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
     return 2 * (mu - a * claims.log_rate - b * claims.log_state) / a
 
@@ -325,13 +325,13 @@ def _moved(
 
 
 def chords(size: Fraction) -> Range:
-    """(1 − e^{−Y})/Y from below and (e^Y − 1)/Y from above."""
+    """(1 − e^{−Y})/Y from below and (e^Y − 1)/Y from above, the bounds of (e^y − 1)/y."""
     grown = exponential(size)
     return (1 - 1 / _partial(size)) / size, (grown - 1) / size
 
 
 def _state_slopes(task: SlidingPlant, claims: SlidingClaims) -> Range:
-    """Range around c_z: (1 − e^{−z})/z of the ageing law, (ρ/ρ₀)e^y of the slip law."""
+    """Range with midpoint c_z: (1 − e^{−z})/z of the ageing law, (ρ/ρ₀)e^y of the slip law."""
     if task.state_law == "ageing":
         return chords(claims.log_state)
     grown, off = exponential(claims.log_rate), _off(task)
@@ -364,7 +364,7 @@ def _ageing(task: SlidingPlant) -> Range:
 
 
 def _off(task: SlidingPlant) -> Fraction:
-    """r, how far ρ may be from the middle of its range, over that."""
+    """r = sup|ρ/ρ₀ − 1|, ρ₀ the midpoint of the range of ρ."""
     slow, fast = _ageing(task)
     return (fast - slow) / (fast + slow)
 
@@ -390,7 +390,7 @@ def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
 
 
 def settled(loop: PeriodicLoop) -> Fraction:
-    """First of these times at which the truncation error is below 1/16 [s]; 0 without one."""
+    """First such time [s] at which the weight of the truncation error is at most 1/16; 0 if there is none."""
     times = sorted(after_a_step(loop))
     return next((t for t in times for fading in loop.fading.values() if fading.weight(t) <= _FADED), _ZERO)
 

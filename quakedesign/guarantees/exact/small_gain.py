@@ -33,85 +33,86 @@ from quakedesign.plant.fault_plant import FaultPlant
 # ----------------------------------------------------------------------
 # Robust small-gain theorem for the sampled loop: bounds for all t ≥ 0, in exact arithmetic.
 #
-# **Theorem.** Let a loop be linear with inputs w_1 … w_n, first at 0, and g_yi,j gains as those of `norms`: |y(τ)| ≤
-# Σ_i g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a sampled
-# input, over the samples up to t). Let every input in turn be bounded by the outputs, |w_i| ≤ F_i + Σ_y c_iy·|y| at
-# every time, c ≥ 0, and M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 − M)⁻¹F
-# for every t, and the outputs stay below max_j Σ_i g_yi,j·W_i for all t. For W(t) ≤ F + M·W(t), W(t) is finite, because
-# the solution of such a loop is bounded on [0, t], and (1 − M)⁻¹ = 1 + M + M² … has no negative entry. Nothing is
-# assumed about stability. ∎
+# **Theorem.** Let a loop with inputs w_1 … w_n be linear, with initial state 0, and g_yi,j its gains as in `norms`:
+# |y(τ)| ≤ Σ_i g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a
+# sampled input, over the samples up to t). Let the outputs in turn bound every input, |w_i| ≤ F_i + Σ_y c_iy·|y| at
+# every time, c ≥ 0, and let M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 −
+# M)⁻¹F for every t, and the outputs stay below max_j Σ_i g_yi,j·W_i for all t. *Proof.* W(t) ≤ F + M·W(t). W(t) is
+# finite, because the solution of such a loop is bounded on [0, t]. (1 − M)⁻¹ = 1 + M + M² … has no negative entry.
+# Stability is not assumed. ∎
 #
-# **Inputs.** Let v stand for b·(p − p*) [m/s²] and let the middle of the ranges of s, w and β be the model of the
-# nominal loop. Then e2′ = s0·e1 − w0·e2 + β0·v + a with the ``acceleration``
+# **Inputs.** Let v = b·(p − p*) [m/s²], and let the nominal loop have the midpoints of the ranges of s, w and β. Then
+# e2′ = s0·e1 − w0·e2 + β0·v + a with the input ``acceleration``
 #
 #     a = φ − w·r′ − r″ + (s − s0)e1 − (w − w0)e2 + (β − β0)v,
 #
-# so its F is a bound of |φ − w·r′ − r″| and its c are half the ranges; p* drifts by d = b·dp*/dt, the ``drift``.
+# so F of a is a bound of |φ − w·r′ − r″|, and its c are half the ranges. The input ``drift`` is d = b·dp*/dt.
 #
-# **Class rate.** For |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and friction of the slip alone, shift p* by φ/(β·b), with the
-# β of the plant: φ leaves a, v becomes b(p − p*) + φ/β, and d gains (φ/β)′. N̂ being constant, |β′| ≤ μ′·N̂|x2|/b with
-# the largest slope μ′, so |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥ 1. Where friction depends on the slip
-# rate as well, β may jump: p* is shifted by φ/(β0·b) instead, a keeps (1 − β/β0)φ and d gains φ′/β0. A disturbance of
-# this class is one of the class amplitude too, so the smaller of both bounds holds for every output.
+# **Class rate.** Let |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and let friction depend on the slip alone. Shift p* by
+# φ/(β·b), with the β of the plant: a no longer contains φ, v becomes b(p − p*) + φ/β, and (φ/β)′ is added to d. As N̂
+# is constant, |β′| ≤ μ′·N̂|x2|/b with the largest slope μ′. So |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥
+# 1. If friction depends on the slip rate as well, β may jump. Then p* is shifted by φ/(β0·b), (1 − β/β0)φ remains in a,
+# and φ′/β0 is added to d. As class amplitude includes class rate, the smaller of both bounds holds for every output.
 #
-# **Initial state.** Where the loop starts at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of rest, |y(τ)| ≤ h_y,j + Σ_i
-# g_yi,j·W_i(t) by superposition, with h_y,j ≥ |y| of the free response in part j, from every such initial state
-# (`free_response`). So the initial state is one more input, ``start``, with F = 1, no c and the gains h, whose row of M
-# is zero: the spectral radius does not change. The s_i are bounds of e1(0) and e2(0), of both signs, and of the law's
-# response to its first measurement. Nothing else changes before the first sample: p is 0, and so is p* at r = 0, as
-# r(0) = r′(0) = 0. In the class rate φ(0) = 0, so the shift of p* is 0 too. Below, the loop of every β_i has the same
-# initial state. As t = 0 counts, the bounds of e1 and e2 for all t are at least those of the initial state, so that E
-# and R exceed these as well.
+# **Initial state.** Let the loop start at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of at rest. By superposition |y(τ)| ≤
+# h_y,j + Σ_i g_yi,j·W_i(t), where h_y,j bounds |y| of the free response in part j from every such initial state
+# (`free_peaks`). So the initial state is one more input, ``start``, with F = 1, no c and the gains h. Its row of M is
+# zero, so the spectral radius does not change. The s_i are bounds of e1(0) and e2(0), of either sign, and of the law's
+# response to its first measurement. Nothing else changes before the first sample: p = 0, and p* = 0 at r = 0, as r(0) =
+# r′(0) = 0. In class rate φ(0) = 0, so the shift of p* is also 0. Below, the loop of every β_i has the same initial
+# state. As t = 0 is included, the bounds of e1 and e2 are at least those of the initial state, so that E and R exceed
+# these as well.
 #
 # **Noise.** Let a law measure e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples. Then the loop has two
-# more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c. They are any sequences in these
-# bounds. Readings in steps of q have errors of at most q/2.
+# more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c. They are any sequences within
+# these bounds. Measurements quantised in steps of q have errors of at most q/2.
 #
-# **Implicit root.** A law with the solution w of an implicit step is linear except for the sampled input ``root``, w_k
-# + γe1/T_s at the samples, γ the middle of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤ R
-# (`sector`). E and R are the claims themselves. Let the claims follow from these bounds of the inputs. If e was within
-# them at the samples before kT_s, then the inputs up to kT_s, which these samples alone decide, obey the bounds, so e
-# is within the claims up to kT_s, where it is continuous, and the sample at kT_s obeys them too: by induction all do.
-# With noise the root is that of e1 + n1 and e2 + n2: E + N1 and R + N2 take the places of E and R, and ε gains
-# δγN1/T_s. ∎
+# **Implicit step.** A law with the solution w of an implicit step is linear except for the sampled input ``root``, w_k
+# + γe1/T_s at the samples, γ the midpoint of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤
+# R (`holds`). E and R are the claims themselves. Suppose that the claims follow from these bounds of the inputs. If all
+# samples of e before kT_s are within the claims, the inputs up to kT_s obey their bounds, as these samples alone
+# determine them. So e is within the claims up to kT_s and, as e is continuous, so is the sample at kT_s. By induction
+# all samples are. With noise w is the solution for e1 + n1 and e2 + n2: E + N1 and R + N2 replace E and R, and δγN1/T_s
+# is added to ε. ∎
 #
-# **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve's pressure leave p_{k−1} within A
-# of the time at which p_k is due and go to p_k monotonically, within at most Θ and at a rate of at least |p_k −
-# p_{k−1}|/Θ. Let the nominal loop have no timing error. The measured error is then e(kT_s) plus the change of e until
-# the measurement: |n1| ≤ J(|e2| + r′), r′ where the slip is compared with the reference at kT_s, and |n2| ≤ J(|e2′| +
-# |r″|), |e2′| ≤ max|s||e1| + max|w||e2| + max β|v| + |φ − w·r′ − r″|: both are c and F of the inputs of noise. Let j be
-# the valve's pressure less that of the nominal loop. Then b·|j| ≤ |u_k|, u_k = b(p_k − p_{k−1}), the output
-# ``stepped``, and j is not zero only from A before to A + Θ after p_k is due: the valve has p_k early, or p_{k−1} late.
-# The input ``late`` is b·j, which acts as the valve's pressure does, with F = 0 and c = 1 for u_k. Let f be the share
-# of the step that is made when p_k is due. The areas of b|j| before and after that time are E and L times |u_k|: where
-# the step begins late, E = 0 and L ≤ A + Θ/2; where it begins early, E ≤ f·A and L ≤ (1 − f)²·Θ/2. So E/A + L/(A + Θ/2)
-# ≤ 1 always, and ``late`` is a `Pulse`. v = b(p − p*) is that of the nominal loop, with the pressure of the same time
-# or of at most A + Θ before or after, during which p* changes by at most d times that time: the output ``push`` (behind
-# a lag ``asked``) is larger by that.
+# **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve pressure leave p_{k−1} within A
+# of the due time of p_k and move to p_k monotonically, within at most Θ and at a rate of at least |p_k − p_{k−1}|/Θ.
+# The nominal loop has no timing error. The measured error is then e(kT_s) plus the change of e until the measurement:
+# |n1| ≤ J(|e2| + r′), r′ where the slip is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|), |e2′| ≤
+# max|s||e1| + max|w||e2| + max β|v| + |φ − w·r′ − r″|. These bounds give c and F of the noise inputs. Let j be the
+# valve pressure minus that of the nominal loop, and u_k = b(p_k − p_{k−1}), the output ``stepped``. Then b·|j| ≤ |u_k|,
+# and j is nonzero only from A before to A + Θ after the due time of p_k: the valve has p_k early, or p_{k−1} late. The
+# input ``late`` is b·j. It acts as the valve pressure does, with F = 0 and c = 1 for u_k. Let f be the share of the
+# step that is made at the due time of p_k. The areas of b|j| before and after that time are E and L times |u_k|: if the
+# step begins late, E = 0 and L ≤ A + Θ/2; if it begins early, E ≤ f·A and L ≤ (1 − f)²·Θ/2. So E/A + L/(A + Θ/2) ≤ 1
+# always, and ``late`` is a `Pulse`. v = b(p − p*) is that of the nominal loop, with p at the same time or at most A + Θ
+# before or after. In that time p* changes by at most d times it, so the output ``push`` (with a lag ``asked``) is
+# larger by this.
 #
-# An input at t may thus be bounded by outputs up to t + T_s. To see that the theorem still holds, fix t and let the
-# nominal loop continue after t with those inputs alone that shift what was measured, or had arrived, before t to its
-# nominal instant. They obey the same bounds, and after t + T_s there is none. So W(t + T_s) ≤ F + M·W(t + T_s), and
-# W(t) is not larger. An implicit root is that of a measured error, of e at a time up to which the bounds hold: E and R
-# grow by the noise, J·r′ and J·|r″| alone, and ε by δγ(N1 + J·r′)/T_s. A measurement may as well be a mean of e, with
-# any weights, over times within J of kT_s: it is as near to e(kT_s), and within the bounds if e is. ∎
+# An input at t may thus be bounded by outputs up to t + T_s. The theorem still holds: fix t, and let the nominal loop
+# continue after t with no inputs except those that shift to its nominal instant what was measured, or had arrived,
+# before t. They obey the same bounds, and there is none after t + T_s. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is
+# not larger. An implicit step uses a measured error, that is, e at a time up to which the bounds hold: E and R grow by
+# the noise, J·r′ and J·|r″| alone, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a weighted mean of e, with any
+# weights, over times within J of kT_s: it is as near to e(kT_s), and within the bounds if e is. ∎
 #
-# **Slow input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤ κ(2E + r′σ),
-# σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Cut the range of β into parts with middles β_i and half widths δ. Fix t, let
-# β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ + 2κE + κr′σ, and σ ≤
-# e^{ασ}/(eα) for every α > 0. So (β − β_i)v is at most (δ + 2κE)|v|, as before with a smaller c, and ``aged``, an input
-# that enters as a does with c = κr′/(eα) for v, its gains those of the loop with A + α in place of A, whose responses
-# are e^{ασ} times as large. All gains are the largest over the parts. E is the claim on the slip error, which has to
-# exceed the bound that follows: e1 is continuous and below E at first, so it never reaches E. ∎
+# **Slowly varying input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤
+# κ(2E + r′σ), σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Divide the range of β into parts with midpoints β_i and
+# half-widths δ. Fix t, let β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ
+# + 2κE + κr′σ, and σ ≤ e^{ασ}/(eα) for every α > 0. So (β − β_i)v is bounded by two terms: (δ + 2κE)|v|, as before with
+# a smaller c, and ``aged``, an input that enters as a does, with c = κr′/(eα) for v. The gains of ``aged`` are those of
+# the loop with A + α in place of A, whose responses are e^{ασ} times as large. All gains are the largest over the
+# parts. E is the claim on the slip error, which must exceed the resulting bound: e1 is continuous and initially below
+# E, so it never reaches E. ∎
 #
-# **Layer between well and fault.** The pressure in the fault is that of the modes, v, plus their truncation error R,
-# |R| ≤ sup|y| with the output y = ``left_out`` (`loop.diffusion_layer`). Of β(v + R) the loop has β0·v and, with x2 =
-# e2 − β0Y in place of e2 (`loop.diffusion_layer`), the known part of β0·R. So (β − β0)R enters x2′ beside a, with the
-# c of v for y. While the well's pressure changes continuously it is part of a; where the pressure steps, R fades after
-# every step and is an input of its own. In a slow gain, past values of R are treated as those of v, with the same c.
-# There are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its
-# effect on the measurement at the samples, which acts as noise does: e2 is measured, not x2. The bound of e2 is that of
-# x2 plus that of β0Y: the gain of ``awaited`` and its direct feedthrough. ∎
+# **Diffusion path.** The pressure in the fault is that of the modes, v, plus their truncation error R, |R| ≤ sup|y|
+# with the output y = ``left_out`` (`loop.diffusion_layer`). Of β(v + R) the loop contains β0·v and, with x2 = e2 − β0Y
+# in place of e2 (`loop.diffusion_layer`), the known part of β0·R. So (β − β0)R enters x2′ as a does, with the c of v
+# for y. If the well pressure is continuous, this is part of a. If it has steps, R decays after every step and is an
+# input of its own. With a slowly varying gain, past values of R are treated as those of v, with the same c. There are
+# two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its effect on the
+# measurement at the samples, which acts as noise does, as e2 is measured, not x2. The bound of e2 is that of x2 plus
+# that of β0Y: the gain of ``awaited`` and its direct feedthrough. ∎
 
 _ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
@@ -168,7 +169,7 @@ def certified_bounds(
 ) -> Bounds | NoProof:
     """Bounds of the theorem for the nominal loop of a task.
 
-    `noise` has the bounds of those inputs of the loop that are noise, in SI units, `jitter` that of measurements [s].
+    `noise` gives the bounds of the noise inputs in SI units, `jitter` the bound J of measurement times [s].
 
     Raises
     ------
@@ -208,7 +209,7 @@ def bounds_from(
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
-    """Bounds of the theorem from the gains of the nominal loop; an estimate for floats."""
+    """Bounds of the theorem from the gains of the nominal loop; gains in floats give an estimate."""
     channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
     if ("push", "awaited") in gains:
         channels = tuple(through_layer(channels, gains))
@@ -228,7 +229,7 @@ def bounds_from(
 
 
 def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict[str, Any] | None]:
-    """Spectral radius of M from above and, where it is below 1, the bound of every output."""
+    """Upper bound of the spectral radius of M and, if it is below 1, a bound of every output."""
     loops = [
         [
             max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
@@ -251,7 +252,7 @@ def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict
 def spectral_radius(matrix: Sequence[Sequence[Any]]) -> Any:
     """Upper bound of the spectral radius of a non-negative matrix, by bisection to 1e-6.
 
-    It is below v if, and only if, elimination of v − M has positive pivots (Hawkins and Simon 1949).
+    The spectral radius is below v if, and only if, elimination of v − M has positive pivots (Hawkins and Simon 1949).
     """
     low, high = _ZERO, max(sum(row, _ZERO) for row in matrix)
     for _ in range(_HALVINGS):
@@ -289,7 +290,7 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
 
 
 def unshifted(task: FaultPlant) -> Fraction:
-    """Bound of b·(p − p*) less the shifted matched disturbance of class ``rate`` [m/s²]."""
+    """Bound of the shift of b·p* by a disturbance of class ``rate`` [m/s²]; 0 in class ``amplitude``."""
     if task.change is None:
         return _ZERO
     return task.amplitude / ((task.beta[0] + task.beta[1]) / 2 if task.friction.rate_slope else 1)
@@ -365,12 +366,12 @@ class SlowGain:
 
 
 def slow_gains(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
-    """Gains of the nominal loops of all parts, concatenated, with those of ``aged``.
+    """Gains of the nominal loops of all parts, concatenated, including those of ``aged``.
 
     Raises
     ------
     ParameterError
-        When one of the loops, with or without the growth, is not proved to be stable.
+        When one of the loops, with A or with A + α, is not proved to be stable.
     """
     of_parts = [norms(loop) | norms(grown(loop, growth)) for loop in loops]
     return {key: tuple(chain.from_iterable(gains[key] for gains in of_parts)) for key in of_parts[0]}
@@ -386,15 +387,14 @@ def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
 # ----------------------------------------------------------------------
 # Sector bounds of the solution of an implicit step for bounded errors, in ball arithmetic.
 #
-# **Statement.** w solves 0 ∈ w − e2 + q(e1 + T_s·w, w). For |e1| ≤ E and |e2| ≤ R: −γ1·u − ε ≤ w ≤ −γ0·u + ε where u
-# =
-# e1/T_s ≥ 0, and the same mirrored where e1 ≤ 0.
+# **Statement.** Let w solve 0 ∈ w − e2 + q(e1 + T_s·w, w). For |e1| ≤ E, |e2| ≤ R and u = e1/T_s ≥ 0:
+# −γ1·u − ε ≤ w ≤ −γ0·u + ε. The mirrored bounds hold where e1 ≤ 0.
 #
-# **Proof.** F(w) = w − e2 + q is strongly monotone, so w is at most ω wherever F(ω) holds a number that is not
-# negative. For e2 ≤ R and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the
-# lower line is the upper one of −e1: ω = ε + γ1·u, e1 + T_s·ω = T_s(ε − (1 − γ1)u). On a part of the range of u both
-# arguments of q are at least the smaller of their ends, and q never falls, with ⌈0⌋⁰ taken as 1; parts are halved until
-# that shows ω − R + q ≥ 0 on each, or too small. ∎
+# **Proof.** F(w) = w − e2 + q is strongly monotone, so w ≤ ω wherever F(ω) contains a non-negative number. For e2 ≤ R
+# and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the lower bound is the upper
+# bound for −e1: ω = ε + γ1·u, e1 + T_s·ω = T_s(ε − (1 − γ1)u). On a part of the range of u both arguments of q are at
+# least the smaller of their values at its ends, and q is non-decreasing, with ⌈0⌋⁰ taken as 1. Parts are halved until
+# this shows ω − R + q ≥ 0 on each, or until they are too small. ∎
 
 Range = tuple[Fraction, Fraction]
 
@@ -403,7 +403,7 @@ _SECTOR_HALVINGS = 10
 
 
 def holds(root: ImplicitRoot, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
-    """Whether the sector encloses the root for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]."""
+    """Whether the sector encloses the solution for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]."""
     last = slip / step
     low, high = root.slopes
     with ctx.workprec(_BITS):
@@ -414,7 +414,7 @@ def holds(root: ImplicitRoot, step: Fraction, slip: Fraction, rate: Fraction) ->
 
 
 def _above(root: ImplicitRoot, step: Fraction, rate: Fraction, slopes: Range, part: Range, halvings: int) -> bool:
-    """Whether a line stays above the root on a part of the range of u."""
+    """Whether a line is shown to lie above the solution on a part of the range of u."""
     ahead, end = (root.remainder + min(slope * u for u in part) for slope in slopes)
     if _least(root.pull, _below(step * ahead), _below(end)) + ball(end - rate) >= 0:
         return True

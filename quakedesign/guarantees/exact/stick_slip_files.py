@@ -27,7 +27,7 @@ class StickSlipLoopEntries(Entries):
 
 
 class StickSlipFile(TaskEntries):
-    """All of a file but its format and kind."""
+    """Content of a file without its format and kind."""
 
     loop: StickSlipLoopEntries
     set: StickSlipPolytope
@@ -35,7 +35,7 @@ class StickSlipFile(TaskEntries):
 
 
 def stick_slip_entries(claim: StickSlipProof) -> dict[str, Any]:
-    """Content of the file but its format and kind."""
+    """Content of the file for a claim, without format and kind."""
     held, pull = claim.held, power_entries(claim.held.law.pull)
     loop = made(StickSlipLoopEntries, held, held.law, pull=pull or None, longest=held.longest_step)
     return dict(written(StickSlipFile(**task_entries(claim.task), loop=loop, set=claim.reach, claims=claim.claims)))

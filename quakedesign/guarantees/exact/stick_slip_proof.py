@@ -98,12 +98,12 @@ class StickSlipProof(Proof[StickSlipClaims]):
     def covered_healing(self, disturbance: Fraction = Fraction(0)) -> LowerBound:
         """Healing Δμ_h [-] that these claims also cover, for a disturbance bound [m/s²].
 
-        Friction that holds a fault at rest may then exceed that of the slide by up to Δμ_h, after a rest of any length.
-        It adds at most Δ = N̂Δμ_h(σ' − p) to what holds the fault. Let H be the disturbance and G the force without it,
-        constant within a rest. A fault that rests has G + φ ≤ Δ, hence −G ≥ −(H + Δ). If G ≥ −(H + Δ), the rest is a
-        slide at rate 0 under the disturbance −G, which is at most H + Δ; if not, no φ of at most H can release it
-        before the next sample. These are the two cases of the theorem for the disturbance H + Δ, which must be at most
-        that of the claims.
+        Friction that holds a fault at rest may then exceed sliding friction by up to Δμ_h, after a rest of any length.
+        This adds at most Δ = N̂Δμ_h(σ' − p) to the force that holds the fault. Let H be the disturbance and G the force
+        without it, constant within a rest. A fault at rest has G + φ ≤ Δ, hence −G ≥ −(H + Δ). If G ≥ −(H + Δ), the
+        rest is a slide at rate 0 under the disturbance −G, which is at most H + Δ; if not, no φ of at most H can
+        release the fault before the next sample. These are the two cases of the theorem for the disturbance H + Δ,
+        which must be at most that of the claims.
 
         Raises
         ------
@@ -192,7 +192,7 @@ class StickSlipProof(Proof[StickSlipClaims]):
 def stick_slip_guarantee(
     task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope
 ) -> StickSlipProof | NoProof:
-    """Claims that the theorem gives for a polytope, or what of it does not hold."""
+    """Claims that the theorem gives for a polytope, or the condition that fails."""
     try:
         bounds = stick_slip_bounds(task, held, reach)
     except ParameterError as error:

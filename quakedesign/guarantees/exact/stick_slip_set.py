@@ -1,12 +1,12 @@
 """Invariant polytope of the sampled loop on the stick–slip plant, in ball arithmetic.
 
 **Plant.** Let y = x2 ≥ 0 be the slip rate, p*(x1) the pressure that balances the fault at rest at slip x1, b·β(x1) =
-μN̂, and U = p*(x1) − p at a sample with the held pressure p. For the slip ξ since the sample
+μN̂, and U = p*(x1) − p at a sample, p constant up to the next. For the slip ξ since the sample
 
     y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
 
-exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1, whose slope is −κ − N̂μ′(σ′ − p). While the fault
-rests nothing changes. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is
+exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1 has the slope −κ − N̂μ′(σ′ − p). While the fault
+rests, its state is constant. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is
 checked.
 
 **Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion
@@ -14,54 +14,54 @@ is one of the plant without stick under an admissible disturbance, with y ≥ 0.
 block before the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0
 and ξ ≥ 0 at its end, or the *rest* map with a slip D until the last stop.
 
-**Sliding map.** With S0 the middle and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
-linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Before, ξ(t) ≤ (t·y + t²/2·(H −
+**Sliding map.** With S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
+linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
 bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
-**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, partial integration gives D = f(0)y + ∫f·(G + φ)dt up to the
-stop. As G ≤ −H + |S⁻|(D − ξ) before it, and what G lacks of that falls with the slip,
+**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, integration by parts gives D = f(0)y + ∫f·(G + φ)dt up to the
+stop. Before it G ≤ −H + |S⁻|(D − ξ), and the difference of both decreases with the slip. So
 
     D·(1 − |S⁻|T²/2 − δ) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
 
-for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. Besides,
-bβ·U ≥ H + G(D)-part: b·β_max·U ≥ H − |S⁻|D.
+for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. Moreover,
+G(D) ≤ −H gives the condition of rest, b·β_max·U ≥ H − |S⁻|D.
 
-Which D and U there are depends on r′ at the sample. So that ends of r′ decide, the U of the least one counts in this
-condition.
+The possible D and U depend on r′ at the sample. This condition uses the U of the least r′, so that the ends of r′
+suffice.
 
-**Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. Where a facet falls with it and r′
-counts as 0, it may be 0 for r′ up to max|r″|T/2.
+**Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. Where a facet falls with this
+difference and r′ counts as 0, the difference may be 0 for r′ up to max|r″|T/2.
 
-**Input gain.** For β between its ends let ψ be what 1/β lacks of its chord. Where U ≥ 0 let the chord of a factor m1
-of ξ stand for it, which is at most |n3·s|ψ/b larger, and ξ ≥ 0: products with β lack as much as the bβU in that ξ
-takes off. Where U < 0 let the chord of β·m1, over β: all that has U is convex in β. So |n3·s|ψ/b counts with y and H
-alone.
+**Input gain.** For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0 replace a factor m1 of ξ by its
+chord. m1 is at most |n3·s|ψ/b larger, which adds |n3·s|ψ/b times ξ ≥ 0. Products of the chord with β lie below their
+chords by as much as the bβU in that ξ takes off. Where U < 0 replace m1 by the chord of β·m1, over β: all terms with U
+are convex in β. So |n3·s|ψ/b counts with y and H alone.
 
-**Sliding mode.** Its target rate is r′ + w, w the end of its implicit step. That step is shown to be deadbeat, w =
-−e/T, for every slip error and slip rate of the polytope, as measured: then the law is the linear one with return_rate =
+**Sliding mode.** The target rate is r′ + w, w the solution of the implicit step. That step is shown to be deadbeat, w =
+−e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
 1/T, whose states stay in the polytope.
 
-**Law.** `StickSlipLaw`; d = D_level + p*(x1) moves by −σξ [Pa] besides, σ = S_chord/(bβ). State at the samples: z =
-(e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map; each is the largest
-value of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
+**Law.** `StickSlipLaw`; d = D_level + p*(x1) also changes by −σξ [Pa], σ = S_chord/(bβ). State at the samples: z = (e1,
+y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map. Each is the maximum of a
+linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
 
-**Noise.** Measured is the slip x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is exact, and so is whether it is 0. Let
-e1 stand for the slip less the reference plus N, and d be less m·n of that sample, m and c the slip and return gains.
-Then this noise counts in one period alone: v is that of a reference at the rate r′ + c(N − n), in [0, max r′ + 2cN],
-which moves up to 2cNT less than that, and U is m·n larger. Where the innovation is cut off, d gains from −mTv⁺/2 −
-m(rest_slip + 2N) to −mTv⁺/2 of it, never less than without cut-off; otherwise noise leaves d. At first e1 = N, and d =
-0 as x⁻ = 0 and the first innovation, n, is not cut off; d from 0 to m·N is checked.
+**Noise.** The measured slip is x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is measured exactly, including whether it
+is 0. Let e1 be the slip minus the reference plus N, and let d exclude m·n of its own sample, m and c the slip and
+return gains. Then this noise acts in one period alone: v is that of a reference at the rate r′ + c(N − n), in [0, max
+r′ + 2cN], which moves up to 2cNT less than that, and U is m·n larger. Where the innovation is limited, it adds between
+−mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, never less than without limit; otherwise d contains no noise. Initially e1
+= N, and d = 0 as x⁻ = 0 and the first innovation, n, is not limited; d from 0 to m·N is checked.
 
-**Aperiodic sampling.** Each interval between samples is any h from T to T_m, and T is a constant of the law. The bound
-of a facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|m(h − s)ds over [0, h], where g
-is its response to an impulse and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. It
-is required that m ≥ 0 up to T_m, so that V is one for all h, not of the state's own h alone. g is Lipschitz, so V″ ≥ −B
-almost everywhere, and V stays below its chord over Δ plus Δ²B/8: bounds at five intervals decide, with B from |l″|,
-|g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so that both ends decide, and a period that ends at
-rest is one of T_m whose last part nothing releases: the slip until a stop has the bound of T_m.
+**Aperiodic sampling.** Each interval between samples is any h from T to T_m; T is a constant of the law. The bound of a
+facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|m(h − s)ds over [0, h]. Here g is its
+response to an impulse, and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. m ≥ 0 is
+required up to T_m, so that V is one function for all h, not only for the state's own h. g is Lipschitz, so V″ ≥ −B
+almost everywhere, and V is below its chord over Δ plus Δ²B/8: bounds at five intervals suffice, with B from |l″|,
+|g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so both ends suffice. A period that ends at rest is
+one of T_m in whose last part nothing releases the block: the slip until a stop has the bound of T_m.
 
-**Peaks.** Between samples y stays below the larger of y and its value at the end under the largest force, as y″ =
-−wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
+**Peaks.** Between samples y stays below the larger of its values at both ends, the latter under the largest force, as
+y″ = −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -85,12 +85,12 @@ from quakedesign.plant.fault_plant import FaultPlant, Range
 
 BITS = 128
 NODES = 16  # pieces of a period, for integrals of impulse responses
-LINES = 5  # bounds of the slip until a stop, less one
-PIECES = 4  # of a range of intervals between samples
+LINES = 5  # number of bounds of the slip until a stop, minus 1
+PIECES = 4  # equal parts of the range of sampling intervals
 MOST_FACETS, MOST_BASES = 400, 40_000
 _GRAIN = 2.0**-40  # of multipliers
 _FLAT = 1e-12  # volume below which the normals of a vertex count as dependent
-_NEAR = 1e-6  # by which a proposed vertex may lie outside of its polytope, of its size
+_NEAR = 1e-6  # relative distance of a proposed vertex from its polytope
 _ZERO = Fraction(0)
 
 # Slices of e1 at 0 and at max r′/c, and for each combination the slice, whether the target rate v is
@@ -113,22 +113,22 @@ Basis = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StickSlipPolytope:
-    """The invariant set, with what proves that it is one.
+    """Invariant polytope, with the multipliers and bases that prove its invariance.
 
     Attributes
     ----------
     facets : tuple of rows
-        n_l, three entries each [1/m, s/m, 1/Pa]; the first five bound +e1, y, +d, −e1 and −d alone.
+        n_l, three entries each [1/m, s/m, 1/Pa]; each of the first five bounds one of +e1, y, +d, −e1, −d.
     multipliers : tuple of rows
-        Of each facet: multiplier of y ≥ 0 at the end of a period [s/m], 0 or more; whether negative factors of ξ and of
-        y there are left out, as ξ ≥ 0 and y ≥ 0 (0 or 1); the same two where the innovation is cut off, with y = 0 and
-        a multiplier of either sign; share from 0 to 1 with which that cut-off counts at rest.
+        For each facet: multiplier of y ≥ 0 at the end of a period [s/m], 0 or more; whether negative factors of ξ and
+        of y there are set to 0, as ξ ≥ 0 and y ≥ 0 (0 or 1); the same two for a limited innovation, with y = 0 and a
+        multiplier of either sign; weight of the innovation at rest, from 0 to 1.
     sliding : tuple of tuple of Basis
-        For each of the 3 slices vertices, by the numbers of three constraints each: facets, then y ≥ 0, then the ends
-        of the slice.
+        For each of the 3 slices its vertices, each by the indices of three constraints: facets, then y ≥ 0, then the
+        ends of the slice.
     resting : tuple of tuple of Basis
-        For each of the 7 combinations vertices in (e1, y, d, D), by four constraints each: the same, then D ≥ 0, the
-        condition of rest, then bounds of D.
+        For each of the 7 combinations its vertices in (e1, y, d, D), each by four constraints: the same, then D ≥ 0,
+        the condition of rest, then bounds of D.
 
     Raises
     ------
@@ -190,7 +190,7 @@ class SampledStickSlip:
     slip_noise : Fraction
         Bound of the measurement error of the slip [m], at most half of the law's rest_slip. The slip rate is exact.
     longest_step : Fraction
-        Of aperiodic sampling: each interval between samples is from `step` to this [s]; 0 for periodic sampling.
+        Longest interval of aperiodic sampling, with `step` as the shortest [s]; 0 for periodic sampling.
 
     Raises
     ------
@@ -237,7 +237,7 @@ class SampledStickSlip:
 
     @property
     def intervals(self) -> tuple[Fraction, ...]:
-        """Intervals between samples that decide for all [s]."""
+        """Sampling intervals whose check covers all intervals [s]."""
         if not self.longest_step:
             return (self.step,)
         return tuple(self.step + (self.longest_step - self.step) * i / PIECES for i in range(PIECES + 1))
@@ -274,7 +274,7 @@ class StickSlipClaims:
     Attributes
     ----------
     slip_behind, slip_ahead : UpperBound
-        How far the slip is behind and ahead of the reference at most [m].
+        Largest distances of the slip behind and ahead of the reference [m].
     peak_slip_rate : UpperBound
         [m/s].
     least_pressure, largest_pressure : LowerBound, UpperBound
@@ -338,7 +338,7 @@ class Numbers:
     middle: Callable[[np.ndarray], np.ndarray]
 
     def without(self, values: np.ndarray, flags: np.ndarray) -> np.ndarray:
-        """The values, but 0 for flagged ones that are certainly negative."""
+        """Values, with 0 in place of flagged values that are certainly negative."""
         return np.where(flags & (values < 0).astype(bool), self.number(_ZERO), values)
 
 
@@ -409,7 +409,7 @@ def ranges(task: FaultPlant, ahead: Fraction, push: Range, moved: Fraction) -> R
 
     The slip is at most `ahead` [m] beyond the target, and at most `moved` [m] in a period.
 
-    β changes within a period by at most N̂|μ′|/b·`moved`, so that σ is that share larger than s/(bβ) at most.
+    β changes within a period by at most N̂|μ′|/b·`moved`, so that σ exceeds s/(bβ) by at most that share.
 
     Raises
     ------
@@ -444,7 +444,7 @@ def stop_bounds(task: FaultPlant, held: SampledStickSlip, plant: Ranges) -> tupl
     Raises
     ------
     ParameterError
-        For a period that is long against the plant.
+        For a period that is too long for the damping and the slope of friction.
     """
     step, amplitude = held.longest, task.amplitude
     low, high = plant.damping
@@ -463,24 +463,24 @@ def stop_bounds(task: FaultPlant, held: SampledStickSlip, plant: Ranges) -> tupl
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Period:
-    """One interval between samples in numbers of a back end; SI units."""
+    """One sampling interval in the number type of a back end; SI units."""
 
     back: Numbers
     task: FaultPlant
     held: SampledStickSlip
     plant: Ranges
     interval: Fraction
-    of_rate: tuple[Any, Any]  # ξ and y at the end, of y
-    of_force: tuple[Any, Any]  # and of a constant force
-    impulses: tuple[np.ndarray, np.ndarray]  # ξ and y, a time after an impulse, at the nodes
+    of_rate: tuple[Any, Any]  # ξ and y at the end, per initial y
+    of_force: tuple[Any, Any]  # and per constant force
+    impulses: tuple[np.ndarray, np.ndarray]  # ξ and y after an impulse, at the nodes
     bent: tuple[Any, Any]
-    margin: tuple[Any, ...]  # of factors of ξ and y: what their bounds at two intervals may lack between these
+    margin: tuple[Any, ...]  # for factors of ξ and y: excess of a bound between two checked intervals
 
     @classmethod
     def deciding(
         cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, plant: Ranges, rate: Fraction, push: Range
     ) -> "list[Period]":
-        """Periods that decide for all intervals, for a largest slip rate [m/s] and U [Pa]."""
+        """Periods whose check covers all intervals, for bounds of the slip rate [m/s] and of U [Pa]."""
         zero, one = _ZERO, Fraction(1)
         slope, damping = (sum(pair, _ZERO) / 2 for pair in (plant.slope, plant.damping))
         flow = (zero, one), (slope, -damping)
@@ -509,8 +509,8 @@ class Period:
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
         """∫h(t)·t^j dt, j = 0 to 3, with h(t) ≥ |g(T − t)| for an impulse g.
 
-        On a piece h is the chord of its ends plus h²/8·max|g″|. All integrals are of this one function, as what they
-        multiply may be negative alone.
+        On a piece h is the chord of its ends plus h²/8·max|g″|. All integrals use this one function, since a factor of
+        a single integral may be negative.
         """
         number, h = self.back.number, self.interval / NODES
         above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
@@ -540,7 +540,7 @@ def _margin(
     rate: Fraction,
     push: Range,
 ) -> tuple[Any, ...]:
-    """Bounds of Δ²/8·|V″| for factors of ξ and y, Δ from one interval that decides to the next.
+    """Bounds of Δ²/8·|V″| for factors of ξ and y, Δ the distance between checked intervals.
 
     `sizes` are bounds of the impulse responses of ξ and y and of their first two derivatives.
     """
@@ -574,12 +574,12 @@ _WEIGHTS = _weights()
 
 
 def gap(beta: Range) -> Fraction:
-    """Bound of the chord of 1/β over its range less 1/β: (β1 − β0)²/(4β0²β1)."""
+    """Bound of the chord of 1/β over its range minus 1/β: (β1 − β0)²/(4β0²β1)."""
     return (beta[1] - beta[0]) ** 2 / (4 * beta[0] ** 2 * beta[1])
 
 
 # ----------------------------------------------------------------------
-# What each facet becomes in one period: linear functions to be bounded on polytopes.
+# Images of the facets after one period: linear functions to be bounded on polytopes.
 
 
 @dataclass(frozen=True, slots=True)
@@ -591,10 +591,10 @@ class Rows:
     place : int
         Slice or combination.
     which : ndarray of int
-        Numbers of the facets.
+        Indices of the facets.
     factors, constants : ndarray
     cut : bool
-        Whether the innovation of the slip is cut off in the sliding map.
+        Whether the innovation of the slip is limited in the sliding map.
     """
 
     place: int
@@ -607,7 +607,7 @@ class Rows:
 def push_row(
     held: SampledStickSlip, fastest: Fraction, combination: tuple[int, bool, int, int]
 ) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction, tuple[Fraction, Fraction]]:
-    """U as a function of (e1, y, d) and its constant [Pa], and r′ = q1·e1 + q0."""
+    """Factors of (e1, y, d) in U and its constant [Pa], and q1, q0 of r′ = q1·e1 + q0."""
     law = held.law
     q1, q0 = law.return_rate * combination[2], fastest * combination[3]
     return (-law.target_gain * (q1 - law.return_rate), law.rate_gain, Fraction(1)), -law.target_gain * q0, (q1, q0)
@@ -622,8 +622,8 @@ class _Carried:
     push0: Fraction
     of_error: np.ndarray
     constant: np.ndarray
-    rising: np.ndarray  # of r′ itself
-    standstill: np.ndarray  # up to which r′ the reference may stand still, where r′ counts as 0 and n1 > 0
+    rising: np.ndarray  # factor of r′ itself
+    standstill: np.ndarray  # largest r′ at which r may stand still, where r′ counts as 0 and n1 > 0
 
     def moved(self, pushed: np.ndarray | int, which: np.ndarray) -> np.ndarray:
         """Contribution of r′ while the reference stands still; the plant adds a factor of −r′."""
@@ -667,7 +667,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
     ----------
     period : Period
     facets, multipliers : ndarray
-        Of numbers of the back end; see `StickSlipPolytope`.
+        In numbers of the back end; see `StickSlipPolytope`.
     """
     back, held, task, plant = period.back, period.held, period.task, period.plant
     number, law, step = back.number, held.law, held.step
@@ -683,7 +683,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
         )
     ]
     carried = list(_carried(back, task, held, period.interval, facets, list(enumerate(COMBINATIONS))))
-    gap_margin = period.margin[0] * off  # of what 1/β lacks of its chord
+    gap_margin = period.margin[0] * off  # for the chord of 1/β minus 1/β
     for cut in (False, True):
         which = raised if cut else everyone
         if not len(which):
@@ -695,7 +695,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
         for end in plant.chord:
             chords = [number(end / (beta * task.authority)) for beta in task.beta]
             of_slips = [back.without(plain - a3 * chord, flag) for chord in chords]
-            bent = (back.middle(of_slips[0]) != 0) | (back.middle(of_slips[1]) != 0)  # else no slip counts
+            bent = (back.middle(of_slips[0]) != 0) | (back.middle(of_slips[1]) != 0)  # else ξ has no effect
             curved = back.array(bent.astype(float).tolist()) * abs(a3) * number(abs(end))
             for beta, of_slip in zip(task.beta, of_slips, strict=True):
                 whole = period.integrals(of_slip, of_rate)
@@ -739,7 +739,7 @@ def resting_rows(
                 a1, a3 = n1[which], n3[which]
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
                 constants = part.constant[which] + part.moved(0, which)
-                if share is None:  # n3 <= 0: what is cut off may be as much less
+                if share is None:  # n3 <= 0: the limit may reduce the innovation by this
                     constants = constants + (cut_off - a3 * slip) * number(held.law.rest_slip + 2 * held.slip_noise)
                 factors = np.column_stack([part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off])
                 yield Rows(SLICES + part.place, which, factors, constants)
@@ -763,8 +763,8 @@ def polytopes(
 ) -> list[list[Constraint]]:
     """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) if ranges exist.
 
-    The condition of rest depends on r′. That of the least one holds wherever one of another does, so that on what it
-    leaves ends of r′ decide.
+    The condition of rest depends on r′. The condition at the least r′ holds wherever that at another r′ does, so that
+    on its polytope the ends of r′ suffice.
     """
     one = Fraction(1)
     own: list[Constraint] = [(row, one) for row in facets]
@@ -787,7 +787,7 @@ def polytopes(
 
 
 class Verifier:
-    """Bounds of linear functions on a polytope: multipliers from floats, decided exactly."""
+    """Bounds of linear functions on a polytope: multipliers proposed in floats, verified exactly."""
 
     def __init__(
         self,
@@ -826,7 +826,7 @@ class Verifier:
         bases = self.bases[values.argmax(axis=1)]
         shares = np.linalg.solve(self.floats[bases].swapaxes(-1, -2), scaled[..., None])[..., 0]
         for row in np.flatnonzero((shares * self.lengths[bases]).min(axis=1) < -_NEAR * np.abs(scaled).max(axis=1)):
-            top = values[row].max()  # where more constraints meet than name a vertex, another name may be the right one
+            top = values[row].max()  # where more constraints meet than a basis has, another basis may fit
             near = np.flatnonzero(values[row] >= top - _NEAR * abs(top))
             tried = np.linalg.solve(self.floats[self.bases[near]].swapaxes(-1, -2), scaled[row][:, None])[..., 0]
             best = (tried * self.lengths[self.bases[near]]).min(axis=1).argmax()
@@ -836,8 +836,8 @@ class Verifier:
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """Upper bounds of c·z + k, or of 1 + (c − n)·z + k where `which` names facets.
 
-        The second one decides where a period changes nothing, as at rest: there c − n has the sign that e1, y and D do
-        not have, D being at most g·y by the last constraint, and e1 at most its end of the slice.
+        The second bound decides where a period changes nothing, as at rest: there c − n has the sign opposite to that
+        of e1, y and D; D is at most g·y by the last constraint, and e1 at most the end of its slice.
         """
         factors, off = _middles(factors)
         constants, above = _middles(constants)
@@ -858,14 +858,14 @@ class Verifier:
         return np.asarray(largest + constants)
 
     def _rest(self, left: np.ndarray, off: np.ndarray) -> np.ndarray:
-        """Bound of what multipliers leave, within `off`, by the signs of e1, y and D."""
+        """Bound of the remainder of the multipliers, within `off`, by the signs of e1, y and D."""
         left = left * np.array([self.sign, 1, 1, 1][: left.shape[1]])
         left[:, 2] = abs(left[:, 2])
         return np.asarray((np.maximum(left + off, 0) * self.sizes).sum(axis=1))
 
 
 def _middles(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Middles and radii of balls, exact; of rationals themselves and 0."""
+    """Exact midpoints and radii of balls; rationals have the radius 0."""
     if not isinstance(values.flat[0], arb):
         return values, 0 * values
     ends = [(value.mid().fmpq(), value.rad().fmpq()) for value in values.flat]
@@ -879,14 +879,14 @@ def stick_slip_bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlip
     Raises
     ------
     ParameterError
-        With what of it does not hold.
+        With the condition that fails.
     """
     try:
         with ctx.workprec(BITS), np.errstate(all="ignore"):
             return _bounds(task, held, reach)
     except ParameterError:
         raise
-    except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # no float proposes multipliers of such numbers
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # floats cannot propose multipliers for such numbers
         raise ParameterError("numbers of the loop and its polytope must be of a size that floats hold") from None
 
 
@@ -927,8 +927,8 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
 def _bracket(task: FaultPlant, held: SampledStickSlip, plant: Ranges, push: Fraction) -> Fraction:
     """Largest loss [m/s²] in |a| ≤ H + δS·ξ + δw·y if ξ, y and U belong to different β.
 
-    As long as it is below H, |a| has a bound of 0 or more at both ends of β, also where the response of a facet changes
-    its sign between them. For aperiodic sampling all that U takes counts: |a| has one over the longest interval.
+    If this loss is below H, the bound of |a| is not negative at either end of β, also where the response of a facet
+    changes sign between them. For aperiodic sampling all of U counts, over the longest interval.
     """
     step, growth = held.longest, 1 / (1 - plant.slope[1] * held.longest**2 / 2)
     width, damping = (plant.slope[1] - plant.slope[0]) / 2, (plant.damping[1] - plant.damping[0]) / 2

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 _DIGITS = 4
 _ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
-MARGIN = Fraction(1001, 1000)  # so that another implementation with slightly larger bounds proves the same claim
+MARGIN = Fraction(1001, 1000)  # so that a checker with slightly larger bounds proves the same claim
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ class Claims:
 
     @property
     def by_name(self) -> Mapping[str, Bound]:
-        """Those that are claimed, SI."""
+        """Claimed bounds by name, SI."""
         named = {part.name: getattr(self, part.name) for part in fields(self)}
         return {name: bound for name, bound in named.items() if bound is not None}
 
@@ -361,7 +361,7 @@ def guarantee(
     Raises
     ------
     ParameterError
-        For a loop without a steady state, or a slow gain and friction of the slip rate.
+        For a loop without a steady state, or a slowly varying gain with friction of the slip rate.
     """
     if reach is not None:
         bounds = _bounds(task, held, held.loop(task), reach)
@@ -496,7 +496,7 @@ def _seconds(value: Fraction) -> str:
 
 
 # ----------------------------------------------------------------------
-# Peaks of the idealised loop with a pressure without delay: the same theorem in continuous time.
+# Peaks of the idealised loop in continuous time, with a pressure without delay: the same theorem.
 
 WHEN = "in continuous time (pressure without sampling or delay)"
 PREMISES = (

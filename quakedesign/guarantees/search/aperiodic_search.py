@@ -17,22 +17,22 @@ from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
 from quakedesign.guarantees.search.float_bounds import FLOATS, BoundsEstimate, floats, gains_of, short
 from quakedesign.plant.fault_plant import FaultPlant
 
-MOST_SIZE = 3  # entries of the state at a sample: hulls of more take too long
+MOST_SIZE = 3  # largest dimension of the state at a sample: larger hulls take too long
 _SAMPLE_PIECES, _BETWEEN_PIECES = 6, 8
-_FEW, _MANY = 60, 160  # facets
-_DIRECTIONS = 3  # in which points are followed, for a facet
+_FEW, _MANY = 60, 160  # numbers of facets
+_DIRECTIONS = 3  # directions followed per facet
 _TURNS, _TURN, _STILL, _FAR = 400, 8, 1e-3, 1e4
 _ROUNDS, _ANEW, _POLICIES = 8, 2, 40
-_LOOSE = 1.02  # what inputs may have more than is wanted
-_TRACE = 1e-3  # of all others beside one input, so that every entry of the state is moved
-_NONE = 9.0  # small gain where no set is found
-_RAISED = (1.002, 1.01, 1.04)  # what is added from sample to sample, so that digits can be cut
+_LOOSE = 1.02  # largest excess of input bounds over the required ones
+_TRACE = 1e-3  # share of the other inputs beside one, so that every entry of the state moves
+_NONE = 9.0  # small gain reported without a set
+_RAISED = (1.002, 1.01, 1.04)  # enlargements per sample, so that numbers can be rounded
 _SEED = 5
 _DIGITS = 7
 
 
 def unclocked_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoProof:
-    """Guarantee with a set that is found for it, or what speaks against one."""
+    """Guarantee with an invariant set from a search, or the reason why there is none."""
     proof: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves")
     for raised in _RAISED:
         reach = _reach(task, held, raised)
@@ -103,12 +103,12 @@ class _Floats:
 
     @cached_property
     def between(self) -> BetweenSamples:
-        """Rows and inputs in between."""
+        """Flow of rows and inputs between samples."""
         return BetweenSamples(FLOATS, floats(self.flow), floats(self.inputs.T))
 
     @property
     def fits(self) -> bool:
-        """Whether its state at a sample is small enough."""
+        """Whether the state at a sample has few enough entries."""
         return len(self.seen) <= MOST_SIZE
 
     @property
@@ -147,7 +147,7 @@ class _Floats:
         return np.asarray(points * scale)
 
     def _interval(self, time: float, bounds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Map from sample to sample, and what the inputs add, in quarters of the time."""
+        """Map from sample to sample, and contributions of the inputs in quarters of the time."""
         step, quarter = expm(self.flow * time), time / SOONEST
         halves = [expm(self.flow * quarter * (i + 0.5)) for i in range(SOONEST)]
         added = [self.seen @ half @ (self.inputs * bounds[:, None]).T * quarter for half in halves]
@@ -156,7 +156,7 @@ class _Floats:
         return self.seen @ step @ self.lift, pushes[np.abs(pushes).any(axis=1)]
 
     def sides(self, bounds: np.ndarray, facets: int, raised: float = 1) -> "_Sides | None":
-        """The set of so many facets for inputs within bounds; None where none is found."""
+        """Invariant set with a number of facets for bounded inputs; None if the search fails."""
         points = self.reached(bounds, _DIRECTIONS * facets)
         try:
             return points if points is None else _Sides.still(self, _facets(points, facets), bounds, raised)
@@ -166,7 +166,7 @@ class _Floats:
     def columns(self, sides: "_Sides", facets: int) -> np.ndarray:
         """Largest outputs per unit of each input; 0 for inputs without feedback.
 
-        The acceleration of a rate-limited disturbance has another set.
+        The acceleration of a rate-limited disturbance has a set of its own.
         """
         fed, own = self.shares.any(axis=1), sides.largest(self, self.own)
         columns = np.where(fed, 1 / np.where(self.own > 0, self.own, np.inf), 0)[:, None] * own
@@ -215,7 +215,7 @@ def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pus
 
 
 def _reach(task: FaultPlant, held: SampledLoop, raised: float) -> InvariantPolytope | NoProof | None:
-    """A set in numbers of few digits, for inputs that it makes no larger than it is for."""
+    """Invariant set in rounded numbers, which keeps its inputs within their bounds."""
     loop = _Floats.of(task, held)
     if not loop.fits:
         return NoProof(reason="the law has too many states for a set that the loop never leaves")
@@ -236,7 +236,7 @@ def _reach(task: FaultPlant, held: SampledLoop, raised: float) -> InvariantPolyt
             reason = f"small gain {gain:.3g}, which must be below 1, of intervals up to the longest"
             return NoProof(reason=reason, small_gain=gain)
         bounds = np.maximum(more, loop.own) * raised
-        again = loop.force and turn < _ANEW  # what the inputs do to each other's sets is seen by then
+        again = loop.force and turn < _ANEW  # enough turns for the inputs' effects on each other's sets
         following = loop.sides(bounds, _MANY, raised) if again else _Sides.still(loop, sides.facets, bounds, raised)
         if following is None:
             break
@@ -245,7 +245,7 @@ def _reach(task: FaultPlant, held: SampledLoop, raised: float) -> InvariantPolyt
 
 
 def _facets(points: np.ndarray, count: int) -> np.ndarray:
-    """Normals of a hull, as different as possible, scaled so that the set is within 1."""
+    """Normals of a hull, as different as possible, scaled to 1 on the set."""
     both = np.vstack([points, -points])
     white = np.linalg.inv(np.linalg.cholesky(both.T @ both / len(both)))
     normals = ConvexHull(both @ white.T, qhull_options="QJ").equations[:, :-1]
@@ -266,7 +266,7 @@ class _Sides:
 
     @classmethod
     def still(cls, loop: _Floats, normals: np.ndarray, bounds: np.ndarray, raised: float) -> "_Sides | None":
-        """Smallest set with these normals that the loop never leaves; None if it grows."""
+        """Smallest invariant set with these normals; None if it grows."""
         sides, before = cls(normals), np.inf
         for _ in range(_POLICIES):
             now = sides._grown(loop, bounds, raised)
@@ -279,7 +279,7 @@ class _Sides:
         return None
 
     def _grown(self, loop: _Floats, bounds: np.ndarray, raised: float) -> np.ndarray | None:
-        """How far every side has to be moved for the policies that are best now."""
+        """Factors by which the present best policies move every side."""
         along, added, bends = loop.along(self.facets @ loop.seen, loop.at_samples, SOONEST, self._frame, bounds)
         above = np.maximum(np.pad(bends, ((0, 0), (1, 0))), np.pad(bends, ((0, 0), (0, 1))))
         added = (added + above) * raised
@@ -299,11 +299,11 @@ class _Sides:
         return np.asarray(np.abs(np.linalg.inv(self.facets[:size])).sum(axis=1))
 
     def _shares(self, bases: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Of every row, how much of each facet of its basis it is, absolute values."""
+        """Absolute coefficients of every row in the facets of its basis."""
         return np.asarray(np.abs(np.linalg.solve(self.facets[bases].swapaxes(-1, -2), along[..., None])[..., 0]))
 
     def _bases(self, along: np.ndarray) -> np.ndarray:
-        """Of every row the facets that meet where it is largest."""
+        """Facets that meet at the maximum of every row."""
         frame = self._frame
         scaled = self.facets * frame
         both = np.vstack([np.column_stack([sign * scaled, -np.ones(len(scaled))]) for sign in (1, -1)])
@@ -318,7 +318,7 @@ class _Sides:
         return np.asarray((np.maximum(heights[:, 1:], heights[:, :-1]) + bends).max(axis=1))
 
     def exact(self, loop: _Floats, bounds: np.ndarray) -> InvariantPolytope:
-        """Rounded."""
+        """Rounded set with its bases."""
         facets = tuple(tuple(short(float(v), _DIGITS) for v in row) for row in self.facets)
         rounded = _Sides(np.array(facets, dtype=float))
         after, frame = rounded.facets @ loop.seen, rounded._frame

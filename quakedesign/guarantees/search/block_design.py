@@ -1,8 +1,8 @@
 """Laws for several blocks and their wells, designed by estimates of provable bounds.
 
-Linear-quadratic feedback of what is measured, with an estimate of the disturbance from the innovation of the slip
-rates: of all blocks where each has a well, else of averages, one for each well. In a decentralised law each well has
-the same for its own slip and slip rate. A law for pressures that diffuse along the fault has a model of these.
+Linear-quadratic feedback of the measurements, with an estimate of the disturbance from the innovation of the slip
+rates: of all blocks if each has a well, else of one average per well. In a decentralised law all wells have the same
+feedback of their own slip and slip rate. A law for pressures that diffuse along the fault models these.
 """
 
 from collections.abc import Sequence
@@ -24,10 +24,10 @@ _START = (0.0325, 1.6e-4, 0.13, 0.88, 1.2)
 """Weight of the slip rates, of the pressures, share of an innovation, gain of the model over the middle, and how much
 more differences of neighbours weigh than means."""
 _STEPS = (0.5, 0.7, 0.5, 0.1, 0.5)
-_EVALUATIONS = (300, 40000)  # at most, and times the number of blocks cubed
+_EVALUATIONS = (300, 40000)  # largest number, and this times the number of blocks cubed
 _DIGITS = 8
-_SLOWEST = 0.92  # eigenvalue of a period: a loop that forgets later takes longer to prove
-_FORGET, _LEFT = 400, 1e-4  # periods that an estimate follows at most, share that is left
+_SLOWEST = 0.92  # largest eigenvalue of a period: slower loops take longer to prove
+_FORGET, _LEFT = 400, 1e-4  # largest number of periods of an estimate, remaining share
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -50,7 +50,7 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
             return 1e3
         try:
             bounds = estimate(part, _law_of(part, step, values, decentralised))
-        except ValueError:  # a mode that grows beyond floating point, or no solution of the equation of Riccati
+        except ValueError:  # overflow of a growing mode, or no solution of the Riccati equation
             return 1e3
         return bounds[0] if bounds[1] is None else float(np.log(bounds[1][blocks : 2 * blocks].max())) - 100
 
@@ -69,7 +69,7 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
 
 
 def middle(part: LinearPart) -> tuple[np.ndarray, np.ndarray]:
-    """A and B with every sector at its middle."""
+    """A and B with every sector at its midpoint."""
     A, B = np.array(part.A, dtype=float), np.array(part.B, dtype=float)
     for sector in part.sectors:
         entry, row = (np.array(values, dtype=float) for values in (sector.entry, sector.row))
@@ -108,17 +108,17 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
     spread = acting @ np.linalg.inv(weights @ acting) if count < blocks else np.eye(blocks)
     own = np.kron(np.eye(2), weights) @ A[: 2 * blocks, : 2 * blocks] @ np.kron(np.eye(2), spread)
     gain, read = weights @ acting * x[3], weights @ read * x[3]
-    if alone:  # each well knows what it measures itself, and takes the others for a disturbance
+    if alone:  # each well uses its own measurements and treats the others as a disturbance
         own, gain = own * np.kron(np.ones((2, 2)), np.eye(count)), np.diag(np.diag(gain))
         flow, fed, read = block_diag(*[flow] * count), block_diag(*fed.T[:, :, None]), block_diag(*read[:, None])
     still, more, size = np.zeros((count, count)), len(flow), 2 * count
-    largest = 1 / np.abs(gain).max()  # Pa, of a pressure that accelerates by 1 m/s²
+    largest = 1 / np.abs(gain).max()  # pressure for an acceleration of 1 m/s² [Pa]
     whole = np.block([[own, np.vstack([np.zeros_like(read), read * largest])], [np.zeros((more, size)), flow]])
     wells = np.linalg.inv(gain) / largest
     at_once = np.eye(count) + read @ np.linalg.solve(flow, fed) @ wells * largest if more else np.eye(count)
     phi, reach = _with_hold(whole, np.vstack([still, at_once, fed @ wells]), float(step))
     K = _feedback(phi, reach, x * (1, 1, 1, 1, not alone))
-    scale = np.r_[np.ones(size), np.full(more, 1 / largest)]  # of the states, for pressures in Pa
+    scale = np.r_[np.ones(size), np.full(more, 1 / largest)]  # scales of the states, for pressures in Pa
     feedback = rounded(K * scale)
     pushed = _with_hold(own, np.vstack([still, np.eye(count)]), float(step))[1]
     learned = rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
@@ -162,7 +162,7 @@ def rounded(values: np.ndarray, digits: int = _DIGITS) -> tuple[Row, ...]:
 def estimate(
     part: LinearPart, law: MatrixLaw, slowest: float = _SLOWEST, forget: int = _FORGET
 ) -> tuple[float, np.ndarray | None]:
-    """Small gain of a loop without delay in floats, and bounds; None where they do not close.
+    """Small gain and bounds of a loop without delay, in floats; None if a condition of the theorem fails.
 
     None also for an eigenvalue over a period above `slowest`. Responses are summed over at most `forget` periods.
     """

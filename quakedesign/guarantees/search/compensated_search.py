@@ -1,7 +1,7 @@
 """Design of sliding modes in the schemes ``compensated`` and ``stick-slip`` with bounds.
 
-The implicit step of a law is read from the scheme as a sum of signed powers; then scale, weight and
-authority are chosen by their certified bounds.
+The implicit step of a law is derived from the scheme as a sum of signed powers; then scale, weight and authority are
+chosen by their certified bounds.
 """
 
 from bisect import bisect_left
@@ -52,12 +52,12 @@ from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.symbolic import SignedPower
 
 # ----------------------------------------------------------------------
-# The implicit step of a law as a sum of signed powers, read off the expression that the scheme itself evaluates.
+# The implicit step of a law as a sum of signed powers, derived from the expression that the scheme evaluates.
 
 _NAMES = {end_slip: "slip", end_rate: "rate"}
 _DIGITS = 60
-_MOST_DENOMINATOR = 10**18  # of a gain that is read off a power of it
-_WIDTH = Fraction(1, 10**40)  # relative, around numbers that are no fractions
+_MOST_DENOMINATOR = 10**18  # of a gain derived from a power of it
+_WIDTH = Fraction(1, 10**40)  # relative width of intervals around irrational numbers
 
 
 def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -> tuple[Power, ...]:
@@ -72,7 +72,7 @@ def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -
     Raises
     ------
     UnsupportedError
-        For a law with a feed-forward, or whose pressure is no falling sum of signed powers of the errors.
+        For a law with a feed-forward, or whose pressure is not a non-increasing sum of signed powers of the errors.
     """
     pull, feed_forward, _ = _derived(DiscreteLaw.of(controller, 0.0))
     if feed_forward != 0:
@@ -88,7 +88,7 @@ def _derived(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
 
 
 def _terms(expression: sp.Expr) -> tuple[Power, ...]:
-    """Terms of an expression that never falls."""
+    """Terms of a non-decreasing expression."""
     return tuple(_term(part) for part in sp.Add.make_args(sp.expand_mul(expression)))
 
 
@@ -114,21 +114,21 @@ def _enclosed(value: sp.Expr) -> tuple[Fraction, Fraction]:
 
 
 # ----------------------------------------------------------------------
-# A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by what can be guaranteed.
+# A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by certified bounds.
 
 GUARANTEED = "compensated"
 STICK_SLIP = "stick-slip"  # the scheme for the stick–slip plant
-_NAMED = ("weight", "slip_weight", "rest_slip", "authority")  # settings besides the limit at rest
+_NAMED = ("weight", "slip_weight", "rest_slip", "authority")  # settings other than the limit at rest
 WEIGHTS = tuple(Fraction(k, 20) for k in range(2, 11))
-_RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # of B0 to the middle of the input gain
-_ROOM = Fraction(5, 4)  # share of the smallest peak that `tracking` may spend
+_RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # ratios of B0 to the midpoint of the input gain
+_ROOM = Fraction(5, 4)  # largest peak of `tracking` over the smallest
 _SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8", "0.7", "0.6"))
-_REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # of the slip-rate error of a deadbeat step
-_NEARLY = 2  # of these slopes are near enough to a deadbeat step for the choice of a scale
+_REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # shares of a deadbeat slip-rate error
+_NEARLY = 2  # number of these slopes accepted as nearly deadbeat in the choice of a scale
 _MARGIN = Fraction(21, 20)
 _DEADBEAT = ImplicitRoot(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
-_STARTS = (0.2, 0.75), (0.35, 1.0)  # weight, and B0 by the middle of the input gain, for long and for short T_s
-_BESIDE = 0.2, 3.0  # of B0 by the middle
+_STARTS = (0.2, 0.75), (0.35, 1.0)  # weight, and B0 over the midpoint of the input gain, for long and short T_s
+_BESIDE = 0.2, 3.0  # range of B0 over the midpoint
 _EVALUATIONS, _NEAR_ENOUGH, _WORST = 60, 0.9, 9.0
 _ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ of λ = ρ⁶
 
@@ -140,9 +140,9 @@ class Compensation:
     Attributes
     ----------
     controller : SlidingMode
-        A law of samples, see its `sampling`.
+        A sampled law, see its `sampling`.
     proof : FaultProof or NoProof
-        In the scheme ``compensated``, or of the second kind in ``stick-slip``.
+        In the scheme ``compensated``, or on the stick–slip plant in ``stick-slip``.
     """
 
     controller: SlidingMode
@@ -175,7 +175,7 @@ class Compensation:
         return replace(self.controller, sampling=replace(sampling, settings=(*sampling.settings, *more)))
 
     def sentence(self) -> str:
-        """Settings and end of the step, as text."""
+        """Settings and solution of the implicit step, as text."""
         law = self.controller
         gains = ", ".join(f"{name} = {float(v):.6g}" for name, v in law.gains.items())
         numbers = _settings(law)
@@ -230,7 +230,7 @@ def compensated(
     step: Fraction,
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | NoProof:
-    """Guarantee of given settings with the narrowest sector of the root that closes.
+    """Guarantee of given settings with the narrowest provable sector of the implicit step.
 
     Raises
     ------
@@ -274,8 +274,8 @@ def design_compensated(
 ) -> Compensation:
     """Weight, authority and scale of a sliding mode, chosen over certified bounds.
 
-    Where the signed power of the slip error contains the root, the step is deadbeat, e1 + T_s·w = 0, for any gains. So
-    weight and authority are chosen for the deadbeat step, on a grid of `weights`. ``peak``: the smallest certified
+    Where the signed power of the slip error contains the solution, the step is deadbeat, e1 + T_s·w = 0, for any gains.
+    So weight and authority are chosen for the deadbeat step, on a grid of `weights`. ``peak``: the smallest certified
     slip-rate error. ``tracking``: the smallest slip error under a drifting disturbance, among laws whose certified
     slip-rate error is at most 1.25 times the smallest. λ = ρ⁶ is then the smallest scale for which the step is nearly
     deadbeat for all claimed errors.
@@ -306,7 +306,7 @@ def _made(
 
 @dataclass(frozen=True, slots=True)
 class Deadbeat(Kind):
-    """Sliding modes in the scheme ``compensated``; numbers: weight, B0 over its middle."""
+    """Sliding modes in the scheme ``compensated``; numbers: weight, B0 over the midpoint."""
 
     controller: SlidingMode
 
@@ -336,15 +336,15 @@ class Deadbeat(Kind):
         return Closest(least, x, self.held(task, x, step, setup=setup))
 
     def held(self, task: FaultPlant, numbers: np.ndarray, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop:
-        """The loop with a deadbeat step, of any gains."""
+        """Loop with a deadbeat step, for any gains."""
         return _sampled(_DEADBEAT, *_settled(task, numbers), step, setup)
 
     def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
-        """Of the smallest λ for which the step is deadbeat."""
+        """Proof for the smallest λ for which the step is deadbeat."""
         return self.made(task, candidate.held.step, candidate.numbers, setup=candidate.held.setup).without_stick
 
     def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, setup: ExactSetup = PLAIN) -> Compensation:
-        """The controller with these numbers, and what is guaranteed of it."""
+        """Controller with these numbers, and its guarantee."""
         (weight, authority), held = _settled(task, numbers), self.held(task, numbers, step, setup=setup)
         bounds = closeness(task, held)[1]
         noise = setup.slip_noise, setup.rate_noise
@@ -352,7 +352,7 @@ class Deadbeat(Kind):
         return _made(task, self.controller, step, (weight, authority, errors), setup)
 
     def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
-        """That with the smallest peak."""
+        """Loop with the smallest peak."""
         weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, setup=setup)
         law = _made(task, self.controller, step, (weight, authority, errors), setup).controller
         root = ImplicitRoot(pull=implicit_pull(law, step, authority))
@@ -361,7 +361,7 @@ class Deadbeat(Kind):
     def continued(
         self, task: FaultPlant, step: Fraction, longest: Longest | None, setup: ExactSetup = PLAIN
     ) -> Compensation | None:
-        """Design for a T_s [s] up to the longest, of numbers near those; None where none is proved."""
+        """Design for a T_s [s] up to the longest, near given numbers; None without a proof."""
         if longest is None or longest.guarantee.held.step < step:
             return None
         near = self.closest(task, step, longest.numbers, setup=setup)
@@ -418,7 +418,7 @@ _NOT_RECOVERED = (
 
 
 def _sticking(proof: StickSlipProof) -> Compensation | None:
-    """The same on the stick–slip plant."""
+    """Sliding mode whose implicit step a certificate on the stick–slip plant states."""
     held, law = proof.held, proof.held.law
     authority = 1 / (held.step * law.target_gain)
     for base in _with_gains(law.pull, held.step, authority) if law.pull else ():
@@ -442,7 +442,7 @@ def sticking_controller(controller: SlidingMode, held: SampledStickSlip) -> Slid
 
 
 def sticking_loop(controller: SlidingMode, slip_noise: Fraction = Fraction(0)) -> SampledStickSlip:
-    """Law that a sliding mode is in the scheme ``stick-slip``; slip_noise [m].
+    """Sampled law of a sliding mode in the scheme ``stick-slip``; slip_noise [m].
 
     Raises
     ------
@@ -476,7 +476,7 @@ def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, *
     ----------
     task : FaultPlant
     controller : SlidingMode
-        Its base gains count.
+        Gives the base gains.
     step : Fraction
         T_s [s].
     **wanted
@@ -504,7 +504,7 @@ def sorted_terms(terms: tuple[Power, ...]) -> tuple[Power, ...]:
 
 
 def _with_gains(pull: tuple[Power, ...], step: Fraction, authority: Fraction) -> Iterator[SlidingMode]:
-    """Laws that may have an implicit step, with λ = 1 and the divisor B0."""
+    """Candidate laws with a given implicit step, for λ = 1 and the divisor B0."""
     terms: dict[Any, Power] = {term.exponent: term for term in pull}
     root, jump = terms.get(Fraction(1, 3)), terms.get(Fraction(0))
     if root is not None and jump is not None and len(terms) == len(pull) and not isinstance(root.argument, str):
@@ -549,7 +549,7 @@ def _deadbeat(
 def _deadbeat_search(
     task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup
 ) -> list[str]:
-    """The same, as texts."""
+    """Result of `_deadbeat` as texts."""
     seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
@@ -581,7 +581,7 @@ def _smallest_scale(
     errors: tuple[Fraction, Fraction],
     slopes: tuple[Fraction, ...],
 ) -> Fraction | None:
-    """Smallest λ of the ladder whose root lies in the sector up to a deadbeat step."""
+    """Smallest λ of the ladder whose solution lies in the sector up to a deadbeat step."""
     slip, rate = (_MARGIN * v for v in errors)
 
     def deadbeat(slope: Fraction, root: Fraction) -> bool:

@@ -47,7 +47,7 @@ REACH = frozenset({"sampling_time", "delay"})
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SampledDesign:
-    """A law of samples for a fault, and how far laws like it reach.
+    """A sampled law for a fault, and the longest T_s and delay of similar laws with a guarantee.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class SampledDesign:
     longest_delay: Fraction = Fraction(0)
 
     def premises(self) -> tuple[Premise, ...]:
-        """Hardware requirements of the guarantee, and the reach of other designs."""
+        """Hardware requirements of the guarantee, and the longest T_s and delay of other designs."""
         return (
             Premise(
                 name="sampling_time",
@@ -160,7 +160,7 @@ def sampled_sliding_mode(
 
 
 # ----------------------------------------------------------------------
-# What is guaranteed of a sliding mode as a scheme runs it, and why most schemes have nothing.
+# Guarantees of sliding modes in their schemes, and reasons why most schemes have none.
 
 
 def guarantee_of(
@@ -209,7 +209,7 @@ def sliding_mode(
     step : Fraction
         T_s [s].
     gains : tuple of str
-        Base gains (λ = 1); none for those that a design tries first.
+        Base gains (λ = 1); empty for the first ones that a design tries.
     scheme : str
     objective : str
         ``tracking`` or ``peak``.

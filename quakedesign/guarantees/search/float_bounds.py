@@ -31,7 +31,7 @@ _MOST_PERIODS = 4096
 _FORGOTTEN = 1e-4  # relative size of the neglected tail of the response
 _ALIKE = 0.99  # ratio of decays above which two modes are not separated
 _SOON = 1024  # periods
-_ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # places in the range of a slow input gain of the nominal loops
+_ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # positions of nominal loops in the range of a slowly varying gain
 _SPREAD = Fraction(1, 16)  # deviation of the gain from theirs, relative to its range
 _PARTS = SlowGain(parts=8, growth=Fraction(1))  # as in proofs; the input ``aged`` is neglected
 _TURNS, _LEAP = 10, 1.4  # iterations of the slip error to its fixed point, and least factor of a late one
@@ -40,7 +40,7 @@ _FEW = 2
 
 @dataclass(frozen=True, slots=True)
 class BoundsEstimate:
-    """Bounds, and the slip error [m] per drift of p* [m/s³]."""
+    """Estimated bounds, and the slip error [m] per drift of p* [m/s³]."""
 
     bounds: Bounds | NoProof
     drift_gain: float
@@ -100,7 +100,7 @@ def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None
 
 
 def closeness_of_bounds(bounds: Bounds | NoProof) -> tuple[float, Bounds | None]:
-    """Closeness of bounds that are computed already."""
+    """Closeness of given bounds."""
     return _closeness(bounds, _small(bounds))
 
 
@@ -132,7 +132,7 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
 class _FloatMatrix(np.ndarray):
     """Matrix of floats with the operators and methods of `flint.arb_mat` that the algorithm of `norms` needs."""
 
-    __array_priority__ = 1.0  # so that what is concatenated is one
+    __array_priority__ = 1.0  # for the type of concatenations
 
     @classmethod
     def of(cls, rows: Iterable[Iterable[Fraction]]) -> Any:
@@ -157,9 +157,9 @@ def floats(values: np.ndarray) -> Any:
 
 
 def _slowest(period: Any) -> SlowestMode:
-    """A complex pair, or two modes with nearly equal decay, are not separated: they are followed to their end.
+    """Slowest mode; a complex pair, or two modes with nearly equal decay, are summed until they decay instead.
 
-    So are all where all modes decay within a few periods.
+    The same applies if all modes decay within a few periods.
     """
     values, vectors = np.linalg.eig(period.view(np.ndarray))
     first, *rest = np.argsort(-abs(values))
@@ -237,7 +237,7 @@ def spectral_radius(loop: PeriodicLoop) -> float:
 
 
 # ----------------------------------------------------------------------
-# Rationals with few digits for numbers that a design proposes.
+# Rationals with few digits for the numbers of a design.
 
 _DIGITS = 4
 
@@ -251,5 +251,5 @@ def short(value: float, digits: int = _DIGITS) -> Fraction:
 
 
 def rounded(rows: Iterable[Iterable[float]]) -> tuple[tuple[Fraction, ...], ...]:
-    """The same of every entry of a matrix."""
+    """Rationals with few digits near every entry of a matrix."""
     return tuple(tuple(short(float(v)) for v in row) for row in rows)

@@ -75,7 +75,7 @@ def best_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoPro
     if slow is None or proof.proved:
         return proof
     anyhow = guarantee(task, held)
-    return anyhow if anyhow.proved or anyhow.pressed else proof  # a pressure can be lowered, a small gain less so
+    return anyhow if anyhow.proved or anyhow.pressed else proof  # a pressure is easier to reduce than a small gain
 
 
 @overload
@@ -118,7 +118,7 @@ _NARROW = 1.25  # `room` with aperiodic sampling: a larger one increases the bou
 _FEWER = 80  # evaluations with aperiodic sampling
 _CREEPING = 0.1  # weight of slip error per period relative to slip-rate error, against slow convergence
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
-_MOST_GROWTH = 50.0  # logarithm; no sampled law stabilises that, and predictions far beyond it overflow
+_MOST_GROWTH = 50.0  # logarithm of a growth that no sampled law stabilises; predictions far beyond it overflow
 _FAILED = 1e6
 _HOPELESS = 1.2  # small gain at the end of a search beyond which no other start is tried
 _SETTLES = 0.9  # largest decay factor per period of the law alone while the fault is at rest, without its integral
@@ -133,9 +133,9 @@ class Closest:
     Attributes
     ----------
     closeness : float
-        As `closeness` in floats: below 1 where a proof is to be expected, else 1 more than the small gain.
+        As from `closeness` in floats: below 1 if a proof is expected, else 1 more than the small gain.
     numbers : numpy.ndarray
-        Of the law in its family.
+        Parameters of the law in its family.
     held : SampledLoop
     """
 
@@ -145,7 +145,7 @@ class Closest:
 
     @property
     def small_gain(self) -> float:
-        """Of errors that are 0, or those that follow from themselves [-]."""
+        """Small gain at zero errors, or at the fixed point of the errors [-]."""
         return self.closeness if self.closeness < 1 else self.closeness - 1
 
 
@@ -157,9 +157,9 @@ def closest(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> Closest | NoProof:
-    """The law that comes nearest to a guarantee, or one well within it; `NoProof` if there is no law at all.
+    """Law nearest to a guarantee, or well within one; `NoProof` if there is no law at all.
 
-    The search begins near the numbers of another law if given, else near numbers of good laws of the family.
+    The search begins near the parameters of another law if given, else near those of good laws of the family.
     """
     if setup.delay > MOST_DELAY * step:
         return NoProof(reason=f"the delay is longer than {MOST_DELAY} periods")
@@ -180,7 +180,7 @@ def nearby(
 ) -> TrackingProof | NoProof:
     """Design for the least certified slip-rate error near the numbers of another law.
 
-    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it at its end.
+    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it last.
     """
     laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
@@ -243,7 +243,7 @@ def design_held(
         if behind_rock and _hopeless(least):
             break
     if behind_rock and (none := laws.without_bounds(x)) is not None and _hopeless(least):
-        return none  # a proof of that takes a minute
+        return none  # such a proof takes a minute
     seen = laws.seen(x)
     if objective == "tracking" and seen is not None and seen.bounds.proved:
         limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
@@ -266,7 +266,7 @@ def _with_noise(without: TrackingProof, noise: Mapping[str, Fraction]) -> Tracki
     proof = best_guarantee(without.task, held)
     if proof.proved:
         return proof
-    anyhow = guarantee(without.task, held)  # with an input gain that may jump, which noise does not move
+    anyhow = guarantee(without.task, held)  # with an arbitrary input gain, which noise does not affect
     why = anyhow.reason if not anyhow.proved and anyhow.small_gain is None else "nothing is proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     noises = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
@@ -302,7 +302,7 @@ class _Laws:
         return replace(self.template, law=self.family.law(x))
 
     def seen(self, x: np.ndarray) -> BoundsEstimate | None:
-        """Estimate of the law with these numbers; None if they give no law."""
+        """Estimate of the law with these parameters; None if they give no law."""
         judged = slowly_estimated if self.template.diffusion and not self.task.friction.rate_slope else estimated
         judged = unclocked_estimate if self.template.longest_step else judged
         try:
@@ -331,7 +331,7 @@ class _Laws:
         return search_near(("near peak", *self.question), cost, start, evaluations=_FEW, wide=True)[1]
 
     def close(self, x: np.ndarray) -> tuple[float, Bounds | None]:
-        """Closeness to a guarantee, and the bounds where one is to be expected."""
+        """Closeness to a guarantee, and the bounds if one is expected."""
         if self.template.longest_step:
             seen = self.seen(x)
             return (inf, None) if seen is None else closeness_of_bounds(seen.bounds)
@@ -341,7 +341,7 @@ class _Laws:
             return inf, None
 
     def without_bounds(self, x: np.ndarray) -> NoProof | None:
-        """Why a law has no bounds; None where it has, or is none."""
+        """Reason why a law has no bounds; None if it has bounds or does not exist."""
         seen = self.seen(x)
         return seen.bounds if seen is not None and not seen.bounds.proved else None
 
@@ -359,7 +359,7 @@ class _Laws:
         return search_near(("peak", *self.question), cost, start, far=far, **settings)
 
     def least_pressure(self, start: Sequence[float] | np.ndarray) -> tuple[float, np.ndarray]:
-        """Smallest change of the pressure that is estimated near a start, in decibels, and where."""
+        """Smallest estimated change of the pressure near a start, in decibels, with its parameters."""
 
         def cost(x: np.ndarray) -> float:
             seen = self.seen(x)
@@ -380,7 +380,7 @@ class _Laws:
 
     @property
     def room(self) -> float:
-        """What ``tracking`` may spend of the smallest certified slip-rate error, see `design_held`."""
+        """Largest slip-rate error of ``tracking`` over the smallest certified one, see `design_held`."""
         return _NARROW if self.template.longest_step else self.family.room
 
     @property
@@ -459,7 +459,7 @@ def _search(
 
 
 def _peak_cost(estimate: BoundsEstimate | None, period: Fraction) -> float:
-    """Decibels of the slip-rate error; where there is no bound, how far from one."""
+    """Decibels of the slip-rate error; without a bound, a penalty for the distance from one."""
     if estimate is None:
         return 10 * _FAILED
     if not estimate.bounds.proved:
@@ -479,18 +479,18 @@ def _drift_cost(estimate: BoundsEstimate | None, limit: float) -> float:
 
 
 # ----------------------------------------------------------------------
-# How long a sampling time and a delay may be for a designed loop to have a guarantee.
+# Longest sampling time, delay and diffusion time for which a designed loop has a guarantee.
 
 Attempt = Callable[[Fraction], TrackingProof | NoProof]
 _ATTEMPTS = 12
 _NEAR = Fraction(1, 16)  # relative width of the final bracket of the longest time
 _CLOSE = Fraction(1, 16)  # the same where designs are continued
 _LOOSE = Fraction(1, 10)  # the same for delays and other quantities that may be 0, whose designs take longer
-_BACK = Fraction(39, 40)  # of a time whose law is not proved after all
+_BACK = Fraction(39, 40)  # factor of a time whose law fails to be proved
 _EDGE, _AIM = 0.92, 0.985  # small gain accepted as the end of the range, and target of the search for a time
-_POWER = 1.3  # of a time with which the small gain was seen to grow
-_LEAST = 0.01  # small gain that is counted with
-_LONGEST_TIMES_FAR = 2.0  # small gain from which a time is halved
+_POWER = 1.3  # observed exponent of the small gain in the time
+_LEAST = 0.01  # least small gain in an extrapolation
+_LONGEST_TIMES_FAR = 2.0  # small gain above which a time is halved
 
 
 RATE, SATURATION, LONGEST, BOX, AMPLITUDE = "rate_limit", "saturation", "longest_step", "box", "amplitude"
@@ -513,19 +513,19 @@ DesignProblem = tuple[FaultPlant, Fraction, ExactSetup]
 
 
 class Kind(ABC):
-    """A family of laws, as a search for the largest feasible value of a quantity uses it."""
+    """A family of laws for a search for the largest feasible value of a quantity."""
 
     @abstractmethod
     def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, setup: ExactSetup = PLAIN) -> Any:
-        """`Closest` to a guarantee, or `NoProof`; `near` has the numbers of another law."""
+        """`Closest` to a guarantee, or `NoProof`; `near` gives the parameters of another law."""
 
     @abstractmethod
     def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
-        """Proof about a law that is near enough."""
+        """Proof about a law that is close enough to a guarantee."""
 
     @abstractmethod
     def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
-        """The loop of a law with small pressure changes; None without a law."""
+        """Loop of a law with small pressure changes; None without a law."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -535,15 +535,15 @@ class Linear(Kind):
     measured: str = MEASURED[0]
 
     def closest(self, task: FaultPlant, step: Fraction, near: np.ndarray | None, setup: ExactSetup = PLAIN) -> Any:
-        """By a search over the numbers of the family."""
+        """Closest law by a search over the parameters of the family."""
         return closest(task, step, near=near, measured=self.measured, setup=setup)
 
     def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
-        """With a slow input gain where that helps."""
+        """Proof with a slowly varying input gain if that helps."""
         return best_guarantee(task, candidate.held)
 
     def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
-        """That with the smallest change of pressure near the smallest peak."""
+        """Loop with the smallest change of pressure near the smallest peak."""
         laws = _Laws.of(task, step, self.measured, setup)
         if isinstance(laws, NoProof):
             return None
@@ -554,7 +554,7 @@ class Linear(Kind):
 def longest_step(
     task: FaultPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, setup: ExactSetup = PLAIN
 ) -> Longest | None:
-    """Guarantee at nearly the longest T_s that has one; None where none is found.
+    """Guarantee at nearly the longest T_s that has one; None if the search fails.
 
     The law at each T_s is that nearest to a guarantee, searched near the law of the T_s before.
 
@@ -564,14 +564,14 @@ def longest_step(
     measured, setup
         As in `design_held`.
     kind : Kind, optional
-        Of the laws; linear ones unless given.
+        Kind of the laws; linear ones unless given.
     """
     late = sum(map(float, setup.path.values()))
     return _farthest(kind or Linear(measured), lambda step: (task, step, setup), _first_step(task, late), None)
 
 
 def _first_step(task: FaultPlant, late: float = 0.0) -> Fraction:
-    """First T_s [s] of a search, from the fastest pole or the spring, for a late pressure [s]."""
+    """First T_s [s] of a search, from the fastest pole or the spring, for a pressure delay [s]."""
     slip, rate = float(task.slip_chord[1]), float(task.rate_chord[0])
     pole = (sqrt(max(rate**2 + 4 * slip, 0.0)) - rate) / 2 if slip > 0 or rate < 0 else 0.0
     pace = pole if pole > 0 else sqrt(abs(slip)) or 1 / float(task.operation_time)
@@ -586,7 +586,7 @@ def continued(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
-    """Design near a law for a longer T_s, where a search at T_s alone failed; or None."""
+    """Design near a law for a longer T_s, after a search at T_s alone failed; None without one."""
     if longest is None or longest.guarantee.held.step < step:
         return None
     proof = nearby(task, step, longest.numbers, measured=measured, setup=setup)
@@ -608,7 +608,7 @@ def longest_delay(
     kind: Kind | None = None,
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
-    """Guarantee with nearly the longest delay, at most 7 periods; None where none is found."""
+    """Guarantee with nearly the longest delay, at most 7 periods; None if the search fails."""
 
     def problem_with(delay: Fraction) -> DesignProblem:
         return task, step, replace(setup, delay=delay)
@@ -620,7 +620,7 @@ def longest_delay(
 def farthest_rock(
     task: FaultPlant, step: Fraction, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | None:
-    """Guarantee with nearly the largest L²/D of a diffusion path; None where none is found."""
+    """Guarantee with nearly the largest L²/D of a diffusion path; None if the search fails."""
 
     def problem_with(time: Fraction) -> DesignProblem:
         return task, step, replace(setup, diffusion=time)
@@ -683,12 +683,12 @@ def nearest_setup(
 
 
 def _slack(step: Fraction, setup: ExactSetup) -> Fraction:
-    """Longest sampling interval less T_s [s]."""
+    """Longest sampling interval minus T_s [s]."""
     return max(setup.longest_step - step, Fraction(0))
 
 
 def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fraction]:
-    """Half-widths of a box that is smaller."""
+    """Half-widths of a box scaled by a factor."""
     first, second, third = (share * width for width in task.spreads)
     return first, second, third
 
@@ -715,18 +715,18 @@ def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, setup: ExactSetu
 
 
 def _unlimited(pump: Pump) -> Pump | None:
-    """The same pump with any pressure."""
+    """The same pump without pressure limits."""
     return None if pump.rate is None else replace(pump, least=None, largest=None)
 
 
 def _ramped(pump: Pump | None, ramp: Fraction) -> Pump | None:
-    """A pump that makes any change within a time [s], or at once."""
+    """Pump that makes any change within a time [s], or instantaneously."""
     limited = replace(pump or Pump(), rate=_ANY_RATE if ramp else None)
     return None if limited == Pump() else limited
 
 
 def with_lowest_rate(proof: TrackingProof) -> TrackingProof:
-    """The same guarantee of the slowest pump that makes the largest change within the ramp."""
+    """The same guarantee for the slowest pump that makes the largest change within the ramp."""
     held, step = proof.held, proof.claims.largest_step
     if held.pump is None or step is None or not held.ramp:
         return proof
@@ -742,7 +742,7 @@ def _farthest(
     unit: Fraction = Fraction(0),
     attempts: int = _ATTEMPTS,
 ) -> Longest | None:
-    """Proof at nearly the largest value of a quantity for which laws come near to one.
+    """Proof at nearly the largest value of a quantity for which laws come close to a guarantee.
 
     Parameters
     ----------
@@ -890,7 +890,7 @@ def certified_peaks(
     controller : ExtendedLQR
         With either feedback.
     disturbance_class : str
-        ``"amplitude"``: any measurable disturbance as large as the fault's; ``"rate"``: no faster either.
+        ``"amplitude"``: any measurable disturbance within the fault's bound; ``"rate"``: within its rate bound too.
 
     Raises
     ------

@@ -33,10 +33,10 @@ from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_ra
 # ----------------------------------------------------------------------
 # Laws for a fault with a lag or a diffusion path: gains of a discrete Riccati equation on fault and path.
 
-THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # where good laws were seen
+THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # parameters of good laws
 BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
 _MOST_STATES = 20  # of a loop
-_WITHOUT_PATH = 6  # e1, e2, π2, d, the valve, its last step or the well, of a law that does not know the lag
+_WITHOUT_PATH = 6  # e1, e2, π2, d, valve, its last step or the well, of a law without a model of the lag
 
 
 def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> int:
@@ -62,7 +62,7 @@ class PathFeedback:
 
     @classmethod
     def of(cls, model: NominalModel, step: Fraction, setup: ExactSetup, *, observed: bool = False) -> "PathFeedback":
-        """With as many modes of a layer as a law may know, of the slip alone if `observed`."""
+        """Model with as many diffusion modes as a law may contain; for the slip alone if `observed`."""
         gain, short_gain = float(model.gain), short(float(model.gain))
         flow, first = _sampled(model, step, setup, path_modes(step, setup, observed=observed))
         path, count = rounded(flow[2:, 2:]), len(flow) - 2  # states b·q of the pressures q of the path
@@ -115,7 +115,7 @@ def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int)
     size = 2 + lagging + modes
     shares = np.array([float(layer.share(i)) for i in range(modes)])
     rates = np.array([float(layer.rate(i)) for i in range(modes)])
-    flow = np.zeros((size + 1, size + 1))  # the last one is the valve's pressure
+    flow = np.zeros((size + 1, size + 1))  # the last entry is the valve pressure
     well = 2 if lagging else size
     flow[0, 1] = 1
     flow[1, :2] = float(model.slip), -float(model.rate)
@@ -141,21 +141,21 @@ def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int)
 
 
 # ----------------------------------------------------------------------
-# Laws of a few numbers without units for one model, T_s and delay, among which searches choose.
+# Laws with a few dimensionless parameters for one model, T_s and delay, for searches.
 
-_STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a: where good laws were seen
+_STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a of good laws
 _NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
-_GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same where the slip rate is measured late
-_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above what noise allows
-_DECADES = 4.0  # of process noise over that of the measurement, at most, at the start
-_FEWEST_MODES = 2  # of a layer, of a law that knows its path
-_WIDEST = 12.0  # decades, or exponents of weights, at which Riccati equations are still solved well
-_FAINT = 1e-12  # process noise of everything, so that the filter forgets its start
+_GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same for a delayed slip rate
+_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above the noise level
+_DECADES = 4.0  # largest initial process noise over measurement noise
+_FEWEST_MODES = 2  # least number of diffusion modes in a law with a model of its path
+_WIDEST = 12.0  # decades, or exponents of weights, with accurate Riccati solutions
+_FAINT = 1e-12  # process noise of all states, so that the filter forgets its initial state
 
 
 @dataclass(frozen=True, slots=True)
 class LawFamily:
-    """Laws of numbers x: initial values, admissible x, allowance of ``tracking``.
+    """Laws with parameters x: initial values, admissible x, allowance of ``tracking``.
 
     The cost is the slip-rate error plus the slip error over `period` [s], against slow convergence.
     """
@@ -168,7 +168,7 @@ class LawFamily:
 
 
 def measured_by(law: LinearLaw) -> str:
-    """Which of `MEASURED` a law is for."""
+    """Entry of `MEASURED` that a law is for."""
     return MEASURED[2] if law.states[-ORDER:] == names_before() else MEASURED[law.of_slip_alone]
 
 
@@ -187,7 +187,7 @@ def require_setup(setup: ExactSetup) -> None:
 
 
 def why_no_law(step: Fraction, measured: str, setup: ExactSetup) -> str:
-    """Why there are no laws for a loop; empty if there are."""
+    """Reason why there are no laws for a loop; empty if there are."""
     if setup.longest_step and measured != MEASURED[0]:
         return "aperiodic sampling needs slip and slip rate measured"
     if measured == MEASURED[2] and any(getattr(setup, name) for name in _NOT_BY_DIFFERENCES):
@@ -286,7 +286,7 @@ class DelayFeedback:
     ----------
     model : ErrorModel
     arrival : tuple of rows
-        Coefficients of e1, e2 and the waiting commands for both errors at the arrival of the present command.
+        Coefficients of e1, e2 and the delayed commands for both errors at the arrival of the present command.
     input_gain, step : float
         β·b [m²/kg] and T_s [s].
     """
@@ -298,7 +298,7 @@ class DelayFeedback:
 
     @classmethod
     def of(cls, model: NominalModel, step: Fraction, delay: Fraction) -> "DelayFeedback":
-        """With coefficients of four digits."""
+        """Feedback with coefficients of four digits."""
         flow, period, late = _flow(model), float(step), float(delay)
 
         def pushed(duration: float) -> np.ndarray:
@@ -316,21 +316,21 @@ class DelayFeedback:
         return cls(errors_model, arrival, gain, period)
 
     def gains(self, slip: float, rate: float) -> Row:
-        """For k1·β·b·T_s² and k2·β·b·T_s of the errors at the arrival."""
+        """Gains from k1·β·b·T_s² and k2·β·b·T_s for the errors at the arrival."""
         k1, k2 = short(slip / self.input_gain / self.step**2), short(rate / self.input_gain / self.step)
         return tuple(k1 * e1 + k2 * e2 for e1, e2 in zip(*self.arrival, strict=True))
 
 
 # ----------------------------------------------------------------------
-# An e-LQR that holds slow sliding: LQ on the sampled plant through its path, fed by a Kalman observer of the slip.
+# An e-LQR for slow sliding: LQ feedback of the sampled plant with its path, from a Kalman observer of the slip.
 #
-# The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law carries the slow modes
-# of the diffusion path and a level of all disturbances. For any numbers a constant pressure without errors is a steady
-# state of the law: the gain of the level, and its effect on the slip, follow from this condition.
+# The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law contains the slow modes
+# of the diffusion path and a level of all disturbances. For all parameters a constant pressure without errors is a
+# steady state of the law: this condition gives the gain of the level and its effect on the slip.
 
 SLIDING_MODES = 4
 _DIGITS = 9
-_LEAST = 1e-12  # cost of what costs nothing, so that Riccati's equation has one solution
+_LEAST = 1e-12  # least cost of every state, so that the Riccati equation has one solution
 _ZERO, _ONE = Fraction(0), Fraction(1)
 
 
@@ -386,7 +386,7 @@ def sliding_law(
     for i, rate in enumerate(map(float, rates), start=2):
         flow[i, i], flow[i, -1] = -rate, rate
     errors = [[short(v, _DIGITS) for v in row] for row in expm(flow * float(scaled_step))[:2]]
-    for row in errors:  # a level that a constant pressure balances has no effect
+    for row in errors:  # a level balanced by a constant pressure has no effect
         row[size] = (sum(row[2:size], _ZERO) + row[-1]) / model.coefficient
     fades = enumerate((short(exp(-float(rate * scaled_step)), _DIGITS) for rate in rates), start=2)
     path = (unit_row(size + 2, {i: fade, size + 1: 1 - fade}) for i, fade in fades)
@@ -419,7 +419,7 @@ def sliding_law(
 
 
 # ----------------------------------------------------------------------
-# A fault with rate-and-state friction about slow sliding along its task, linearised, and its poles.
+# A fault with rate-and-state friction, linearised about slow sliding along its task, and its poles.
 
 _SLIDING_MODEL_ONE, _NEAR = Fraction(1), Fraction(1, 10)
 

@@ -24,10 +24,10 @@ from quakedesign.guarantees.exact.tracking_proof import MARGIN, above
 from quakedesign.plant.plant_values import Row
 from quakedesign.plant.user_plant import UncertainPlant
 
-_TURNS = 60  # of bounds of sectors that are found
-_WIDER = Fraction(51, 50)  # what each bound has more than the last one needed
-_PIECES = ((36, 16), (96, 8))  # of a flow, by the states of the loop
-_ROOM = 1.002  # so that another way to bound the same integrals closes with the same numbers
+_TURNS = 60  # largest number of turns for the bounds of sectors
+_WIDER = Fraction(51, 50)  # enlargement of each bound over the last requirement
+_PIECES = ((36, 16), (96, 8))  # largest number of states, and pieces of a flow
+_ROOM = 1.002  # margin for a checker with other bounds of the same integrals
 
 
 def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPart:
@@ -87,7 +87,7 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
 
 
 def _first_bounds(plant: UncertainPlant) -> dict[str, Fraction]:
-    """Bounds of the arguments whose slopes are callable, from the box of starts."""
+    """Bounds of the arguments with callable slopes, from the box of initial states."""
     exact, bounds = plant.exact_sectors(lambda _: Fraction(1)), {}
     for name, sector in plant.sectors.items():
         if callable(sector.slopes) and sector.within is None:
@@ -116,7 +116,7 @@ def _claimed(
 
 
 def _numbers(plant: UncertainPlant, part: LinearPart, responses: ResponseBounds) -> Row | NoProof:
-    """W of the theorem, from floats; or the small gain and the sector that makes most of it."""
+    """W of the theorem, from floats; or the small gain and the sector that contributes most."""
     count, names = len(part.outputs), [*plant.sectors, *plant.gains]
     halves = np.array([float(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors])
     if not halves.any():
@@ -141,7 +141,7 @@ def _numbers(plant: UncertainPlant, part: LinearPart, responses: ResponseBounds)
 
 
 def _rounded(value: Fraction, digits: int = 4) -> Fraction:
-    """At least a number that is not negative, with a few digits."""
+    """Non-negative number, rounded up to a few digits."""
     if not value:
         return value
     scale = Fraction(10) ** (digits - 1 - len(str(ceil(value))) if value >= 1 else digits - 1 + _zeros(value))
@@ -153,7 +153,7 @@ def _zeros(value: Fraction) -> int:
 
 
 def pieces_of(loop: PlantLoop) -> int:
-    """Pieces of a flow: few of a large loop, more where a mode is fast."""
+    """Number of pieces of a flow: few for a large loop, more for a fast mode."""
     size, flow = len(loop.flow), np.array(loop.flow, dtype=float)
     fastest = max(abs(np.linalg.eigvals(flow)))
     fast = max(float(time) for _, time in loop.segments) * fastest
@@ -162,7 +162,7 @@ def pieces_of(loop: PlantLoop) -> int:
 
 
 def spectral_radius(loop: PlantLoop) -> tuple[float, np.ndarray]:
-    """Largest size of an eigenvalue of a period, and its eigenvector."""
+    """Spectral radius of a period, and its eigenvector."""
     flow, period = np.array(loop.flow, dtype=float), np.eye(len(loop.flow))
     for jump, time in loop.segments:
         period = expm(flow * float(time)) @ np.array(jump, dtype=float) @ period
@@ -172,7 +172,7 @@ def spectral_radius(loop: PlantLoop) -> tuple[float, np.ndarray]:
 
 
 def _unstable(part: LinearPart, loop: PlantLoop) -> str:
-    """Why the nominal loop is not stable; empty where it is."""
+    """Reason why the nominal loop is not stable; empty if it is."""
     radius, mode = spectral_radius(loop)
     if radius < 1:
         return ""
@@ -182,7 +182,7 @@ def _unstable(part: LinearPart, loop: PlantLoop) -> str:
 
 
 def escaping(plant: UncertainPlant, law: MatrixLaw) -> tuple[float, np.ndarray]:
-    """Growth per sample and shape of the fastest mode, every sector at its high slope."""
+    """Growth per sample and shape of the fastest mode, with every sector at its upper slope."""
     part = linear_part(plant, _first_bounds(plant))
     steep = tuple(replace(s, slopes=(s.slopes[1], s.slopes[1])) for s in part.sectors)
     radius, mode = spectral_radius(replace(part, sectors=steep).loop(law))

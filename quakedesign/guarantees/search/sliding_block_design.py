@@ -1,7 +1,7 @@
 """Laws for blocks in slow sliding from the slip of each block, or its mean per well.
 
 Linear-quadratic feedback of a Kalman filter of slips, states of friction, pressures and a constant pressure error of
-each well, with weights from a search with the estimate of what is proved.
+each well, with weights from a search over estimates of provable bounds.
 """
 
 from dataclasses import replace
@@ -27,22 +27,22 @@ from quakedesign.plant.block_plant import measured_by
 
 _STARTS = ((100.0, 100.0, 1e-2, 1e-9), (10.0, 100.0, 1e-4, 1e-9), (1000.0, 100.0, 1e-4, 1e-6), (100.0, 1.0, 1e-4, 1e-6))
 """Weight of the pressure, of the slip error, and variances of the pressure error and of the measured slip, scaled."""
-_SPREAD = 2.0  # of the first simplex, in logarithms
+_SPREAD = 2.0  # size of the first simplex, in logarithms
 _EVALUATIONS = 60
-_SLOWEST, _FORGET = 0.985, 1000  # eigenvalue of a period, and periods: a loop that forgets later takes long to prove
-_SMALL = 0.004  # logarithm of the state that the search begins with, at least
+_SLOWEST, _FORGET = 0.985, 1000  # largest eigenvalue of a period, and periods: slower loops take long to prove
+_SMALL = 0.004  # least logarithm of the state at the start of the search
 _TURNS = 14
-_PIECES = 8  # of a period, which is short beside the times of the plant
+_PIECES = 8  # pieces of a period, which is short compared with the times of the plant
 _ROOM = 1.03
 _LOST = 100.0
 _DIGITS = 10
-_HALVINGS = 20  # of a range of stresses
+_HALVINGS = 20  # bisections of a range of stresses
 
 
 def sliding_block_guarantee(
     blocks: SlidingBlocks, step: Fraction, *, decentralised: bool = False
 ) -> PlantProof | NoProof:
-    """Design a law for blocks in slow sliding and prove it, or say why none is proved.
+    """Design a law for blocks in slow sliding and prove it, or return the reason for failure.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Frac
     Raises
     ------
     CertificateError
-        When it is about another plant.
+        When the guarantee is about another plant.
     """
     part, size = claim.part, 2 * len(chain.blocks)
     within = [sector.within for sector in part.sectors[:2]]
@@ -109,7 +109,7 @@ def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Frac
         low, high = (half, high) if covers(half) else (low, half)
     blocks = SlidingBlocks(chain=chain, lag=lag, stress=low)
     rate, plant = blocks.log_rate(claims), blocks.plant(claims)
-    assert rate is not None  # as it is covered
+    assert rate is not None  # since the plant is covered
     assert plant is not None
     return lag, low, rate, replace(named(claim, plant), notes=(_slip_rates(blocks, rate),))
 
@@ -155,7 +155,7 @@ def _grown(claims: BlockClaims, by: float) -> BlockClaims:
 
 
 class _WeightSearch:
-    """Laws by four weights, and what an estimate finds of them."""
+    """Laws given by four weights, with their estimated bounds."""
 
     def __init__(self, blocks: SlidingBlocks, step: Fraction, alone: bool) -> None:
         self.blocks, self.step = blocks, step
@@ -176,13 +176,13 @@ class _WeightSearch:
         )
 
     def log_rate(self, x: np.ndarray) -> float:
-        """Y of the claims that close, or how far it is from that."""
+        """Y of self-consistent claims, or a penalty without such claims."""
         _, claims, small = self.closed(x)
         rate = None if claims is None else self.blocks.log_rate(claims)
         return 10 + small if rate is None else float(rate)
 
     def closed(self, x: np.ndarray) -> tuple[MatrixLaw | None, BlockClaims | None, float]:
-        """Law, claims from which smaller bounds follow, and small gain."""
+        """Law, claims that imply smaller bounds, and small gain."""
         claims, law, small, N = self.small, None, _LOST, len(self.blocks.tasks)
         for _ in range(_TURNS):
             part = self._part(claims)
@@ -210,7 +210,7 @@ class _WeightSearch:
         return None if plant is None else linear_part(plant, {})
 
     def _log_rates(self, part: Any) -> np.ndarray:
-        """Rows of ln(v/V) of the blocks, without the stress, with middles of the sectors."""
+        """Rows of ln(v/V) of the blocks, without the stress, with sectors at their midpoints."""
         size = len(part.A)
         rows = [
             sum(np.array(one.row[:size], dtype=float) * float(sum(one.slopes)) / 2 * sign for one, sign in pair)

@@ -1,7 +1,6 @@
 """Search for slow-sliding laws with a proof over a box of friction constants.
 
-The second chapter finds how distant a well, or how fast the sliding, may be, by continuation from an easy
-case.
+The second chapter computes the largest distance of a well, or rate of sliding, by continuation from an easy case.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,7 +37,7 @@ from quakedesign.plant.of_fault import slow_sliding_plant
 from quakedesign.plant.sliding_plant import MOST_CELLS, Cuts, SlidingPlant, parts
 
 # ----------------------------------------------------------------------
-# A law that holds slow sliding, chosen by what can be guaranteed of it, and cells that cover a box of constants.
+# A law for slow sliding, chosen by its provable bounds, and cells that cover a box of constants.
 
 LOG_RATES = (Fraction(1, 2), Fraction(1, 4), Fraction(1, 8))
 """Bounds of |ln(v/V)| in the order in which they are tried: the sectors of a smaller one are narrower."""
@@ -49,20 +48,20 @@ _STARTS = (
 """Logarithms of the weights and of what a, b and D of the law's model are over the fault's: ρL²/D = 1, ρT_s = 0.06."""
 _SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
 _EVALUATIONS = 120
-_HOPELESS = 60  # laws after which a search ends that has found none with bounds
-_POOR, _PATIENCE = 2.0, 40  # cost of the best of so many laws with which a search ends: too far from 1
-_FORGETTING = 0.972  # largest eigenvalue of a period, so that the proof need not sum many
-_GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # over Y, pressures in 2a of the normal stress
+_HOPELESS = 60  # number of laws without bounds after which a search ends
+_POOR, _PATIENCE = 2.0, 40  # a search ends if the best of so many laws has a larger cost
+_FORGETTING = 0.972  # largest eigenvalue of a period, to limit the periods of the proof
+_GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # first claims over Y; pressures in 2a times the normal stress
 _TURNS = 6
 _SHRINKING = 24
 _MEASURED = 2
 _SPARE = 1.02
-_ROOM = 1.05  # of claims over what an estimate gives
-_NEAR = 0.89  # by which an estimate has to be better than its claims, as the proof's sums are larger
+_ROOM = 1.05  # margin of claims over estimates
+_NEAR = 0.89  # largest estimate over its claim, as the sums of the proof are larger
 _FAILED = 50.0
-_SMALL = Fraction(1, 10**4)  # of the normal stress
+_SMALL = Fraction(1, 10**4)  # share of the normal stress
 _DIGITS, _SHORT = 6, 3
-_ENDS = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}  # of the ranges at the worst corner
+_ENDS = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}  # ends of the ranges at the worst corner
 _AXES = tuple(_ENDS)
 _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 
@@ -70,7 +69,7 @@ _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 def proved_sliding(
     task: SlidingPlant, held: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]
 ) -> SlidingProof | NoProof:
-    """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or why there are none."""
+    """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or the reason why there are none."""
     corner = worst_corner(task)
     claims = _claims(corner, held, log_rate)
     if claims is None or (corner != task and _excess(corner, held, claims) >= _NEAR):
@@ -81,7 +80,7 @@ def proved_sliding(
         smaller = replace(by_estimate, claims=_smallest_claims(by_estimate))
         if smaller.check() is Verdict.PROVED:
             return smaller
-        _cut(corner, held, claims, [0], exactly=True)  # no cuts of a box help where this does not do
+        _cut(corner, held, claims, [0], exactly=True)  # if this fails, no cuts of the box help
         return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS - 1], exactly=True))
     except ParameterError:
         return NoProof(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box")
@@ -90,8 +89,8 @@ def proved_sliding(
 def _smallest_claims(proof: SlidingProof) -> SlidingClaims:
     """Fixed point of the map from claims to the bounds that follow from them.
 
-    The map is the estimate times the ratio of bound and estimate on the worst cell. It is monotone in the claims, so
-    that claims which follow from larger ones also follow from themselves.
+    The map is the estimate times the ratio of bound and estimate on the worst cell. It is monotone, so that claims that
+    follow from larger ones also follow from themselves.
     """
     claims = proof.claims
     for _ in range(_MEASURED):
@@ -105,7 +104,7 @@ def _smallest_claims(proof: SlidingProof) -> SlidingClaims:
 
 
 def _followed(proof: SlidingProof, claims: SlidingClaims, room: Mapping[str, float]) -> SlidingClaims:
-    """Claims that follow by the estimate, with room, until they hardly change."""
+    """Claims that follow by the estimate with a margin, iterated until they hardly change."""
     for _ in range(_SHRINKING):
         every = [_estimate(cell, proof.held, claims) for cell in proof.cells]
         if any(one is None for one in every):
@@ -132,7 +131,7 @@ def largest_stress(task: SlidingPlant, held: SampledLoop, *, log_rate: Fraction 
 
 
 def two_digits(value: Fraction) -> Fraction:
-    """At most a positive rational, with two digits."""
+    """Positive rational, rounded down to two digits."""
     scale = Fraction(10) ** (floor(log10(value)) - 1)
     return floor(value / scale) * scale
 
@@ -147,7 +146,7 @@ def designed_sliding(
 ) -> SampledLoop | NoProof:
     """Law with the least estimated bounds at the least stable corner of the box.
 
-    `near` gives the numbers of a law as a further start.
+    `near` gives the parameters of a law as a further start.
     """
     chosen, _ = searched_sliding(task, step, log_rate, setup, near=near)
     if chosen is not None:
@@ -175,7 +174,7 @@ def searched_sliding(
     enough: float = 0.0,
     most: int = _EVALUATIONS,
 ) -> tuple[SampledLoop | None, np.ndarray]:
-    """Law with small estimated bounds, or None, and its numbers.
+    """Law with small estimated bounds, or None, and its parameters.
 
     Parameters
     ----------
@@ -285,7 +284,7 @@ def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
 
 
 def _claims(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingClaims | None:
-    """Self-consistent claims by the estimate, with the given bound of y; None for none."""
+    """Self-consistent claims by the estimate, with the given bound of y; None without any."""
     claims = _guess(task, log_rate)
     for _ in range(_TURNS):
         estimate = _estimate(task, held, claims)
@@ -296,7 +295,7 @@ def _claims(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> Slidin
             break
         try:
             claims = _as_claims({**wider, "log_rate": log_rate})
-        except ParameterError:  # larger than claims may be
+        except ParameterError:  # above the limits of claims
             return None
     else:
         return None
@@ -328,12 +327,12 @@ def _cut(
 ) -> Cuts:
     """Cuts of a box until the claims follow on every cell; `left` limits their number.
 
-    Decided by the estimate, or `exactly`.
+    Decided by the estimate, or exactly with `exactly`.
 
     Raises
     ------
     ParameterError
-        When that takes too many.
+        When the limit is exceeded.
     """
     wide = [axis for axis in _AXES if task.ranges[axis][0] < task.ranges[axis][1]]
     if _excess(task, held, claims) < (_NEAR if wide else 1):
@@ -354,7 +353,7 @@ def _cut(
 
 
 def _excess(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> float:
-    """How much larger than the claims the bounds may be, by the estimate."""
+    """Largest ratio of bound and claim, by the estimate."""
     estimate = _estimate(task, held, claims)
     if estimate is None:
         return _FAILED
@@ -377,30 +376,30 @@ Prove = Callable[[SlidingPlant, SampledLoop, Fraction], SlidingProof | NoProof]
 """Proof for a task, a sampled law in its setup and a bound of |ln(v/V)|."""
 
 PATH = {"diffusion": "L^2/D", "lag": "the lag"}
-_EASY = Fraction(1)  # D_c/V through which laws are found at once
-_FARTHER = Fraction(13, 10), Fraction(9, 8), Fraction(17, 16)  # the next one where no law is found farther
+_EASY = Fraction(1)  # L²/D in D_c/V for which laws are found without continuation
+_FARTHER = Fraction(13, 10), Fraction(9, 8), Fraction(17, 16)  # step factors, the next one after a failure
 _WELL_ROOM = Fraction(3, 4)
-_NEARER = 3  # times that half the path is tried
-_LAWS = 40  # that are tried for a share of the path
-_ENOUGH = 0.5  # of the bound of |ln(v/V)|, by the estimate
-_SLOWER = 1.05  # spare, as damping does not scale with V
+_NEARER = 3  # number of halvings of the path
+_LAWS = 40  # number of laws tried for a share of the path
+_ENOUGH = 0.5  # sufficient estimate over the bound of |ln(v/V)|
+_SLOWER = 1.05  # margin, as damping does not scale with V
 _WELL_DIGITS = 2
 _SUITABLE = 2
-_QUIETER = Fraction(1, 10), Fraction(1, 100), Fraction(0)  # of the slip noise
+_QUIETER = Fraction(1, 10), Fraction(1, 100), Fraction(0)  # shares of the slip noise
 
 
 @dataclass(frozen=True, kw_only=True)
 class WellReach:
-    """How far a well was followed with a law.
+    """Largest share of a path for which a law was found.
 
     Attributes
     ----------
     share : Fraction
-        Of the path [-]; 0 where no law was found.
+        Share of the path [-]; 0 if no law was found.
     held : SampledLoop or None
-        The law there.
+        Law for this share.
     numbers : array or None
-        Its numbers, near which a search may begin.
+        Its parameters, near which a search may begin.
     log_rate : Fraction
         Bound of |ln(v/V)| of its estimate.
     """
@@ -412,7 +411,7 @@ class WellReach:
 
 
 def suitable(task: SlidingPlant, step: Fraction) -> Fraction:
-    """T_s [s] if it is within twice D_c/(20 V), or else that."""
+    """T_s [s] if within a factor of 2 of D_c/(20 V), else D_c/(20 V) with two digits."""
     suits = task.ranges["critical_slip"][0] / task.rate / int(AGEINGS)
     return step if suits / _SUITABLE <= step <= _SUITABLE * suits else two_digits(suits)
 
@@ -449,7 +448,7 @@ def farthest(
         reached = _followed_well(task, step, setup, share, reached, rates)
         if reached.share < share:
             farther.pop(0)
-    if 0 < reached.share < most:  # with room for a proof, whose bounds are larger than their estimate
+    if 0 < reached.share < most:  # with a margin for a proof, whose bounds exceed their estimate
         return _followed_well(task, step, setup, _WELL_ROOM * reached.share, reached, rates)
     return reached
 
@@ -462,7 +461,7 @@ def _followed_well(
     before: WellReach,
     rates: tuple[Fraction, ...],
 ) -> WellReach:
-    """A law for a share of the path, near the one before, or that one where none is found."""
+    """Law for a share of the path, near the previous one, or the previous one if the search fails."""
     for log_rate in rates:
         held, numbers = searched_sliding(
             task, step, log_rate, shortened(setup, share), near=before.numbers, enough=_ENOUGH, most=_LAWS
@@ -480,7 +479,7 @@ def shortened(setup: ExactSetup, share: Fraction) -> ExactSetup:
 def what_would_do(
     fault: Fault, task: SlidingPlant, reach: WellReach, setup: ExactSetup, prove: Prove, *, spread: Fraction
 ) -> str:
-    """Remedies with a proof, as text: a share of the path, or a smaller V.
+    """Remedies that have a proof, as text: a share of the path, or a smaller V.
 
     Parameters
     ----------
@@ -516,7 +515,7 @@ def quieter(setup: ExactSetup) -> tuple[Fraction, ...]:
 
 
 def with_noise(noise: Fraction, setup: ExactSetup) -> str:
-    """Words for a proof with a smaller slip noise than required; empty for the same."""
+    """Text for a proof with a smaller slip noise than required; empty for the same noise."""
     if noise == setup.slip_noise:
         return ""
     return (

@@ -53,27 +53,27 @@ DEADBEAT = tuple(
 _UNCLOCKED = (0.3, 0.3, 0.2, 1.2), (0.3, 0.4, 0.2, 1.2), (0.5, 0.5, 0.3, 1.3), (0.2, 0.2, 0.1, 1.6)
 APERIODIC = {"tracking": _UNCLOCKED, "peak": ((0.3, 0.3, 0.1, 1.425), *_UNCLOCKED)}
 """The same for aperiodic sampling; the gain is larger still by the ratio of the longest interval to T_s."""
-_VERTICES, _SETTLED = 250, 1e-4  # of the reached states that are kept, and change of their extents at the end
-_ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of one: they only propose
-_FACETS = 130  # of the first polytope
+_VERTICES, _SETTLED = 250, 1e-4  # largest number of reached states; relative change of their extents at the end
+_ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of a period, for proposals only
+_FACETS = 130  # facets of the first polytope
 _TRIED_EACH = 3  # turns after which all multipliers are tried again
-_PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)  # in which a policy is followed; turns; those that add facets
-_TINY = 1e-12  # of a height: rounding
-_LITTLE = 1.01  # of a height that one step to where a policy leads may make of it
-_NEARLY = 0.93  # of the factor of y that keeps a facet where it is in a slow slide
+_PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)  # periods per policy; turns; turns that add facets
+_TINY = 1e-12  # rounding, relative to a height
+_LITTLE = 1.01  # largest growth of a height in a step to the fixed point of a policy
+_NEARLY = 0.93  # share of the factor of y that leaves a facet unchanged in a slow slide
 _ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
-_ALIKE, _WIDER = 1 - 1e-8, 1e-5  # cosine of normals that count as one; room of a facet that rest leaves where it is
-_KEPT, _FOLLOWED = 0.6, 14  # growth kept where facets are added; turns after the last before heights only grow
-_MARGINS = 2e-6, 2e-5  # by which the last polytope is larger than the images that it must hold
-_FAR = 30  # times the first extents, from where on a set counts as unbounded
-_RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried: of a size, and of the present ones
+_ALIKE, _WIDER = 1 - 1e-8, 1e-5  # cosine of equal normals; margin of a facet that rest leaves unchanged
+_KEPT, _FOLLOWED = 0.6, 14  # growth retained when facets are added; later turns until heights only grow
+_MARGINS = 2e-6, 2e-5  # margins of the last polytope over its images
+_FAR = 30  # times the first extents: a larger set counts as unbounded
+_RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried, over a size and over present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
-_LOWER, _GUESSES = Fraction(1, 50), 3  # of σ', by which a pressure may be lower than it is guessed; guesses
-_SHRUNK, _LITTLE_LESS = 60, 2e-5  # times that a set is replaced by its image; decrease of its extents that ends it
-_SNAPPED = 1e-3  # of e1's factor: largest factor of the slip that counts as 0
-_INSIDE = 1e-4  # distance from all facets, of the size of a set, of a point that counts as inside
+_LOWER, _GUESSES = Fraction(1, 50), 3  # largest deficit of a pressure below its guess, over σ'; number of guesses
+_SHRUNK, _LITTLE_LESS = 60, 2e-5  # replacements of a set by its image; decrease of its extents that ends these
+_SNAPPED = 1e-3  # largest factor of the slip that counts as 0, over that of e1
+_INSIDE = 1e-4  # least distance of an interior point from all facets, over the size
 _DIGITS = 7
-_ROOM = Fraction(3, 2)  # of extents, where ranges of the plant are taken before the polytope is known
+_ROOM = Fraction(3, 2)  # enlargement of extents for ranges of the plant before the polytope is known
 
 
 def _float_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]:
@@ -98,7 +98,7 @@ def tuned(
     *,
     implicit: bool = False,
 ) -> SampledStickSlip:
-    """Deadbeat feedback for the middle of the damping, with the shares of a tuning.
+    """Deadbeat feedback for the midpoint of the damping, with the shares of a tuning.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def tuned(
     slip_noise : Fraction
         Bound of the measurement error of the slip [m].
     implicit : bool
-        Whether the feedback is that of a deadbeat implicit step, which knows no damping and takes back all of the slip
+        Whether the feedback is that of a deadbeat implicit step, which ignores damping and corrects all of the slip
         error.
     """
     level, slip, back, gain = tuning
@@ -130,11 +130,11 @@ def tuned(
 
 
 # ----------------------------------------------------------------------
-# States that disturbances reach: their convex hull, grown from sample to sample.
+# Convex hull of the states that disturbances reach, grown from sample to sample.
 
 
 def _noises(held: SampledStickSlip) -> list[float]:
-    """Errors of the measured slip of the largest size [m]."""
+    """Extreme errors of the measured slip [m]."""
     size = float(held.slip_noise)
     return [-size, size] if size else [0.0]
 
@@ -161,7 +161,7 @@ class _Start:
 
     @classmethod
     def of(cls, task: FaultPlant, held: SampledStickSlip, plant: Ranges, states: np.ndarray, noise: float) -> "_Start":
-        """With the ends of all ranges; the input gain changes slowest."""
+        """States with the ends of all ranges; the input gain varies slowest."""
         law = held.law
         slip, rate, level = (column[:, None] for column in states.T)
         kinds = product(task.beta, (Fraction(0), task.reference_rates[0]), plant.slope)
@@ -177,7 +177,7 @@ class _Start:
     ) -> np.ndarray:
         """States after an interval, from its slip, final slip rate and state of rest.
 
-        By default the noise of the next sample is the opposite one.
+        By default the noise of the next sample has the opposite sign.
         """
         law, half, later = self.held.law, float(self.held.step) / 2, -self.noise if later is None else later
         innovation = moved + later - self.noise - half * (self.rate + self.predicted)
@@ -196,7 +196,7 @@ class _Reach:
     held: SampledStickSlip
     plant: Ranges
     periods: list[Period]
-    excess: float = 0.0  # of friction at rest above that in slip [m/s²], in runs
+    excess: float = 0.0  # excess of friction at rest over that in slip in simulations [m/s²]
 
     @classmethod
     def of(cls, task: FaultPlant, held: SampledStickSlip) -> "_Reach":
@@ -226,7 +226,7 @@ class _Reach:
         return np.stack(runs, axis=2).reshape(len(states), -1, 3)
 
     def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
-        """Ends of the rest map."""
+        """States after the rest map."""
         stop = np.min(
             [float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.plant)], axis=0
         )
@@ -238,7 +238,7 @@ class _Reach:
                 yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True), interval)[possible]
 
     def _sliding(self, start: "_Start", period: Period) -> Iterator[np.ndarray]:
-        """Ends of the sliding map; only the final slip rate is known to be at least 0."""
+        """States after the sliding map; only the final slip rate is constrained to be at least 0."""
         step, amplitude = float(period.interval), float(self.task.amplitude)
         of_slip, of_rate = period.impulses
         times = step - np.linspace(0, step, len(of_slip))
@@ -252,14 +252,14 @@ class _Reach:
                 pattern = np.where(np.arange(len(of_slip)) < turn, sign, -sign)
                 more = [np.trapezoid(sizes * pattern * impulse, dx=size, axis=-1) for impulse in (of_slip, of_rate)]
                 upward = more[1] > 0
-                scaled = np.where(upward, -plain[1] / np.where(upward, more[1], 1), 2)  # so that it ends at rest
+                scaled = np.where(upward, -plain[1] / np.where(upward, more[1], 1), 2)  # so that y is 0 at the end
                 for factor, rests in ((np.ones_like(scaled), False), (scaled, True)):
                     moved, end = plain[0] + factor * more[0], plain[1] + factor * more[1]
                     sound = (np.abs(factor) <= 1) & (moved >= 0) & (end >= -1e-12 * np.abs(start.rate).max())
                     yield start.ended(moved, np.maximum(end, 0), np.full(moved.shape, rests), step)[sound]
 
     def _run(self, start: "_Start", sign: int, turn: int, interval: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Slip and slip rate after an interval of the plant that sticks, and whether it rests."""
+        """Slip and slip rate after an interval of the stick–slip plant, and whether it rests."""
         size, amplitude = interval / _SUBSTEPS, float(self.task.amplitude)
         damping = float(sum(self.plant.damping)) / 2
         moved, now = np.zeros_like(start.force), start.rate + np.zeros_like(start.force)
@@ -304,7 +304,7 @@ class _Reach:
 
 
 def _at_first(held: SampledStickSlip) -> np.ndarray:
-    """The state at the start from rest, with either sign of the first error."""
+    """Initial state at rest, with either sign of the first error."""
     noise = float(held.slip_noise)
     return np.array([[noise, 0, 0], [noise, 0, noise * float(held.law.slip_gain)]])
 
@@ -320,7 +320,7 @@ def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarra
 
 
 # ----------------------------------------------------------------------
-# A polytope around them.
+# Polytope that contains these states.
 
 
 def _rows(periods: list[Period], facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
@@ -330,7 +330,7 @@ def _rows(periods: list[Period], facets: np.ndarray, multipliers: np.ndarray) ->
 
 
 def _normals(points: np.ndarray, count: int) -> np.ndarray:
-    """The axes but −y, and normals of the hull that are as different as can be."""
+    """The axes except −y, and normals of the hull that differ as much as possible."""
     size = np.abs(points).max(axis=0)
     normals = ConvexHull(points / size, qhull_options="QJ").equations[:, :3]
     white = normals @ np.linalg.cholesky(np.cov((points / size).T) + 1e-12 * np.eye(3))
@@ -396,14 +396,14 @@ def _basis(rows: np.ndarray, ends: np.ndarray, factors: np.ndarray) -> tuple[int
 
 
 def _dyadic(value: float) -> Fraction:
-    """With 40 binary digits: balls of such numbers have no radius."""
+    """Number with 40 binary digits: its ball has radius 0."""
     mantissa, exponent = np.frexp(value)
     return Fraction(int(np.round(mantissa * 2**40))) * Fraction(2) ** (int(exponent) - 40)
 
 
 @lru_cache(maxsize=64)
 def _wide_periods(task: FaultPlant, held: SampledStickSlip, size: tuple[float, ...]) -> list[Period]:
-    """For states of a size."""
+    """Periods with widened ranges for states of a given size."""
     law, (slip, rate, level) = held.law, (_ROOM * short(v, 4) for v in size)
     most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + held.target_noise))
     most = most + law.rate_gain * rate + level + held.push_noise
@@ -423,7 +423,7 @@ class _Images:
 
 @dataclass
 class _Growing:
-    """A polytope {n·z ≤ h} that grows until it holds its images."""
+    """A polytope {n·z ≤ h} that grows until it contains its images."""
 
     task: FaultPlant
     held: SampledStickSlip
@@ -445,16 +445,16 @@ class _Growing:
 
     @property
     def size(self) -> np.ndarray:
-        """Of e1, y and d."""
+        """Largest |e1|, y and |d|."""
         box = 1 / np.abs(self.facets[:5].sum(axis=1))
         return np.array([max(box[0], box[3]), box[1], max(box[2], box[4])])
 
     def periods(self) -> list[Period]:
-        """Periods with slightly widened ranges; sizes in two digits, as ranges are slow."""
+        """Periods with slightly widened ranges; sizes are rounded to two digits, as ranges are slow to compute."""
         return _wide_periods(self.task, self.held, tuple(float(f"{float(v):.1e}") for v in self.size))
 
     def images(self) -> "_Images | None":
-        """Largest value of every normal after a period, with the best multipliers; or None."""
+        """Largest value of every normal after a period, with the best multipliers; None for an empty polytope."""
         periods = self.periods()
         plant = periods[0].plant
         facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
@@ -492,7 +492,7 @@ class _Growing:
         return np.array(tried)
 
     def _tops(self, periods: list[Period], corners: list[Any], tried: np.ndarray) -> np.ndarray:
-        """Largest values by multipliers: sliding, with the innovation cut off, at rest."""
+        """Largest values by multipliers: sliding, with a limited innovation, at rest."""
         choices, count = tried.shape[:2]
         largest = np.full((3, choices * count), -np.inf)
         for rows in _rows(periods, np.tile(self.normals, (choices, 1)), tried.reshape(-1, 5)):
@@ -504,7 +504,7 @@ class _Growing:
         return np.asarray(largest.reshape(3, choices, count).swapaxes(0, 1))
 
     def _images(self, periods: list[Period], corners: list[Any]) -> "_Images":
-        """The largest values, as functions of the heights, and what of the state a facet becomes."""
+        """Largest values as functions of the heights, and the images of the facets as functions of the state."""
         sizes = np.append(self.size, self.size[1] * float(self.held.longest))
         count, steps = len(self.normals), np.array(stop_bounds(self.task, self.held, periods[0].plant), dtype=float)
         images = _Images(np.full(count, -np.inf), np.zeros((count, count)), np.zeros((count, 3)), np.zeros(count))
@@ -536,7 +536,7 @@ class _Growing:
         return images
 
     def _unchanged(self, rows: Rows, chosen: np.ndarray, steps: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Where a function is below that of its facet by the signs of e1, y and D."""
+        """Mask of functions that the signs of e1, y and D place below their facets."""
         left = rows.factors[chosen, :3] - self.normals[rows.which[chosen]]
         if rows.factors.shape[1] > 3:
             left[:, 1] += np.maximum(rows.factors[chosen, 3], 0) * steps[-1, 0]
@@ -571,7 +571,7 @@ class _Growing:
             if late and (solved := self._settled(after.moves, own, changed)) is not None:
                 self.heights = solved
                 continue
-            for _ in range(_PERIODS):  # as long as this policy is followed
+            for _ in range(_PERIODS):  # periods with this policy
                 least = self.heights if late else self.least
                 self.heights = np.where(changed, np.maximum(least, after.moves @ self.heights + own), self.heights)
             tell("a polytope that the loop never leaves", turn / _TURNS)
@@ -608,7 +608,7 @@ class _Growing:
         """Normals for which a resting fault does not raise the height.
 
         Images tend to a normal whose largest factor of ξ is 0. Rounding or another range of slopes makes it positive.
-        Then the bound of the chord of 1/β less 1/β enters, and the heights would grow without bound.
+        Then the bound of the chord of 1/β minus 1/β enters, and the heights would grow without bound.
         """
         law, half = self.held.law, float(self.held.step) / 2
         slip, level = float(law.slip_gain), float(law.level_gain)
@@ -656,7 +656,7 @@ class _Growing:
         return np.asarray(self.multipliers * factors)
 
     def exact(self) -> StickSlipPolytope | None:
-        """In rational numbers of few digits, with the constraints that meet at each vertex."""
+        """Polytope in rational numbers of few digits, with the constraints that meet at each vertex."""
         facets = tuple(tuple(_dyadic(float(v)) for v in row) for row in self.facets)
         periods, bases = self.periods(), list[list[tuple[int, ...]]]()
         sizes = np.append(self.size, self.size[1] * float(self.held.longest))
@@ -698,15 +698,15 @@ class _Growing:
 
 
 # ----------------------------------------------------------------------
-# From a fault to gains with a proof.
+# Gains with a proof for a fault.
 
 
 def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda what, done: None) -> StickSlipProof | NoProof:
-    """Guarantee of a law with a polytope that is searched for it, or what speaks against one."""
+    """Guarantee of a law with a polytope from a search, or the reason why there is none."""
     fresh = list[StickSlipProof | NoProof]()
 
     def search() -> dict[str, Any]:
-        with np.errstate(all="ignore"):  # floats that overflow propose nothing
+        with np.errstate(all="ignore"):  # overflow gives no proposal
             fresh.append(_searched(task, held, tell))
         return {"set": written(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
 
@@ -764,13 +764,13 @@ def design_stick_slip(
     slip_noise : Fraction
         Bound of the measurement error of the slip [m].
     longest_step : Fraction
-        Of aperiodic sampling, as of `SampledStickSlip` [s].
+        Longest interval of aperiodic sampling, as in `SampledStickSlip` [s].
     healing : Fraction
         Δμ_h [-], proved as a larger disturbance, see `StickSlipProof.covered_healing`.
     implicit : bool
-        Whether the law is a deadbeat implicit step; of it one tuning serves both objectives.
+        Whether the law is a deadbeat implicit step; it has one tuning for both objectives.
     tell : callable
-        Called with what is done, and the fraction done [-].
+        Called with the name of the current step and the fraction done [-].
     """
     if not task.amplitude and not healing:
         reason = "the stick-slip theorem needs a disturbance above 0 m/s^2: give amplitude in [disturbance]"
@@ -805,14 +805,14 @@ def _healed(task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: T
 
 
 # ----------------------------------------------------------------------
-# Falsification: the worst case that a search finds.
+# Falsification: worst case found (lower bound).
 
 
 def worst_stick_slip(proof: StickSlipProof, *, periods: int = 60) -> WorstCase:
     """Worst case found from rest, continued from the outermost states of each period.
 
     For each facet of the invariant polytope the search continues from the farthest state in its direction. β is
-    constant in a course. In each period the slope of friction is at either end of its range, and the disturbance
+    constant along a trajectory. In each period the slope of friction is at either end of its range, and the disturbance
     changes its sign at most once. Friction at rest is that in slip, or higher by `healing` under the largest claimed
     pressure, where healing has the least effect.
     """
@@ -823,14 +823,14 @@ def worst_stick_slip(proof: StickSlipProof, *, periods: int = 60) -> WorstCase:
     facets, extremes = np.array(proof.reach.facets, dtype=float), np.zeros(3)
     for high in (False, True):  # which end of β
         first = _at_first(proof.held)
-        states = {noise: first[[int(noise < 0)]] for noise in noises}  # by the errors of their sample
+        states = {noise: first[[int(noise < 0)]] for noise in noises}  # by the measurement errors of their sample
         for _ in range(periods):
             before = dict(states)
             for later in noises:
                 ends = [states[later]]
                 for reach, (noise, starts) in product(reaches, before.items()):
                     after = reach.simulated(starts, noise, later)
-                    half = after.shape[1] // 2  # β is the slower half of the choices
+                    half = after.shape[1] // 2  # the two halves of the choices differ in β
                     ends.append((after[:, half:] if high else after[:, :half]).reshape(-1, 3))
                 points = np.vstack(ends)
                 states[later] = points[np.unique((facets @ points.T).argmax(axis=1))]

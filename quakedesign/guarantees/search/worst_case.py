@@ -33,13 +33,13 @@ from quakedesign.plant.sliding_plant import SlidingPlant
 
 _PIECES = 6
 _SWEEPS = 8
-_MANY, _FEW = 512, 2  # trajectories with random switching times, and their sweeps, which stall at rest
-_COURSES, _LEAST_COURSES = 24, 8  # for each of the two outputs; fewer of long ones
+_MANY, _FEW = 512, 2  # trajectories with random switching times; sweeps of each, which stall at rest
+_COURSES, _LEAST_COURSES = 24, 8  # trajectories for each of the two outputs; least number of long ones
 _CLIMBING, _CLIMBS = 48, 8  # trajectories improved from the best of those, and number of improvements
 _CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are replaced by those of the adjoint, in turn
 _BLOCK = 8  # pieces that change together, at most
-_RESTING, _ROUNDS = 96, 9  # trajectories at rest before a push, and number of their changes; of 128 periods
-_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest begin and longest duration of a push ahead of the reference, in periods
+_RESTING, _ROUNDS = 96, 9  # trajectories of 128 periods that rest, then accelerate; rounds of variation
+_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest begin and longest duration of the first acceleration, in periods
 _NEAR = np.array([[2], [2], [_PIECES]])  # pieces by which start, length and end of the rest change from round to round
 _MOST_RESTED = 128  # periods
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are also evaluated for a loop with initial errors
@@ -92,14 +92,14 @@ def worst_tracking(claim: TrackingProof | ContinuousProof, *, sticks: bool = Fal
     """Worst case found with disturbance, slopes, damping and input gain at their extremes.
 
     The search makes forward and backward sweeps of the maximum principle, six steps per flow, from random costates. A
-    course lasts 64 to 512 periods, depending on the decay of the loop. It maximises the error at the end of the last
-    period, or at a time between its samples, where the error is larger with a delay. In continuous time a period is
-    1/|λ| of the fastest pole. A rate-limited disturbance is optimal for a costate (`_steepest`). With `sticks` friction
-    prevents backward slip, and the reference has its largest rate or 1/20 of it. Further courses then switch after
-    random times, or rest until the reference has made up the proved slip error, and push (`rest_and_push`). Noise and
-    initial states are at their extremes. An implicit step has its exact solution, also outside its sector. With jitter
-    each event is as early or as late as possible; with aperiodic sampling each interval is as short or as long as
-    possible. Pressures step at once, and an averaged measurement is that at the middle of its interval.
+    trajectory lasts 64 to 512 periods, depending on the decay of the loop. It maximises the error at the end of the
+    last period, or at a time between its samples, where the error is larger with a delay. In continuous time a period
+    is 1/|λ| of the fastest pole. A rate-limited disturbance is optimal for a costate (`_steepest`). With `sticks`
+    friction prevents backward slip, and the reference has its largest rate or 1/20 of it. Further trajectories then
+    switch after random times, or rest until the reference has made up the proved slip error, then accelerate
+    (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact solution, also
+    outside its sector. With jitter each event is earliest or latest; with aperiodic sampling each interval is shortest
+    or longest. Pressures step at once, and an averaged measurement is that at the midpoint of its interval.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)
@@ -159,7 +159,7 @@ class _Event:
 
 @dataclass(frozen=True, slots=True)
 class _EventPieces:
-    """One event: its jump, for every vertex e^{Ah} and what constant inputs add, and h [s]."""
+    """One event: its jump, e^{Ah} and contributions of constant inputs for every vertex, and h [s]."""
 
     of: _Event
     jump: np.ndarray
@@ -168,7 +168,7 @@ class _EventPieces:
     length: float
 
     def moved_on(self, vertex: int = 0) -> np.ndarray:
-        """Map of the whole time."""
+        """Map over the whole event."""
         return np.linalg.matrix_power(self.steps[vertex], _PIECES)
 
 
@@ -187,7 +187,7 @@ def _on_time(held: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction]:
     part = delay % held.step
     alone = not off and not part
     if alone:
-        delay, late = delay + late, late / 2 * _NEARLY  # at its time or later
+        delay, late = delay + late, late / 2 * _NEARLY  # at the due time or later
     elif part:
         off = min(off, part / 2, (held.step - part) / 2)
         late = min(late, _NEARLY * (part - off), _NEARLY * (held.step - part - off))
@@ -216,7 +216,7 @@ def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction =
 class _Limit:
     """Limit at rest of the commanded pressure, as b·(p − p*) [m/s²]; b·p* is `rest`.
 
-    A course may start anywhere in the task: p* begins at its initial value or at either end of its range.
+    A trajectory may start anywhere in the task: p* begins at its initial value or at either end of its range.
     """
 
     place: int
@@ -246,7 +246,7 @@ class _Limit:
         commanded = _command_response(claim.task, held)
         fed[: len(commanded)] = commanded
         fed[2:place] = [float(v) / authority for v in law.applied]
-        rests = float(limit.resolution) - back * step  # of the slip error from sample to sample
+        rests = float(limit.resolution) - back * step  # largest change of the slip error between samples at rest
         moved, none = float(claim.task.drift) * step, np.zeros(len(back))
         ends: Any = tuple(float(p) * authority for p in claim.task.rest_pressure)
         least, largest, fastest = limit.range or (Fraction(-(10**30)), Fraction(10**30), Fraction(0))
@@ -259,11 +259,11 @@ class _Limit:
         )
 
     def anew(self) -> "_Limit":
-        """At the start of a course, while this one stays as it is."""
+        """Copy at the start of a trajectory."""
         return replace(self, highest=np.zeros_like(self.highest), last=np.zeros_like(self.last))
 
     def cut(self, state: np.ndarray, sampled: np.ndarray) -> np.ndarray:
-        """States after a sample of some courses; the law receives the applied pressure."""
+        """States after a sample of some trajectories; the law receives the applied pressure."""
         commanded, highest = state[:, self.place], self.highest - self.moved
         stuck = state[:, 0] - self.last <= self.rests
         applied = np.where(stuck, np.maximum(commanded, highest - self.width), commanded)
@@ -329,7 +329,7 @@ class _CourseSearch:
         if periods is None:
             periods = _periods_to_forget(self.parts, len(loop.states))
             courses = 2 * max(courses // 2 * PERIODS // periods, _LEAST_COURSES) if numbers is None else courses
-        numbers = np.arange(courses) if numbers is None else numbers  # of courses, whose kinds follow from them
+        numbers = np.arange(courses) if numbers is None else numbers  # trajectories; the number determines the kind
         paces = np.where(numbers // 2 % 2, 1, _SLOW)
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.rest_limit = None
@@ -337,11 +337,11 @@ class _CourseSearch:
             self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back, numbers)
         self.allowed = np.ones((courses, len(self.parts[0].steps)), dtype=bool)
         slow = isinstance(claim, TrackingProof) and claim.slow_gain is not None
-        if (slow or self.limit is not None) and beta[0] < beta[1]:  # β is slow; it stays at either end
+        if (slow or self.limit is not None) and beta[0] < beta[1]:  # β varies slowly: it remains at one end
             half = len(vertices) // 2
             self.allowed[numbers % 2 == 0, :half] = self.allowed[numbers % 2 == 1, half : len(vertices)] = False
         self.aim, self.kinds = np.zeros((courses, self.size)), numbers // 4 % 4
-        if sticks:  # behind its reference a fault that rests is not what it is ahead of it
+        if sticks:  # a fault at rest behind its reference differs from one ahead of it
             self.aim[self.kinds == 0, 0], self.aim[self.kinds % 2 == 1, 1], self.aim[self.kinds == 2, 0] = 1, 1, -1
         else:
             self.aim[: courses // 2, 0] = self.aim[courses // 2 :, 1] = 1
@@ -357,7 +357,7 @@ class _CourseSearch:
         for left in reversed(range(sweeps)):
             chosen, fixed, jumped = self._forward(last := costates, slopes)
             costates = self._backward(chosen, fixed, jumped)
-            if self.limit is not None and left <= sweeps // 2:  # before, by the sign of its costate
+            if self.limit is not None and left <= sweeps // 2:  # in earlier sweeps, by the sign of its costate
                 slopes = self._slopes(costates, chosen, self.limit)
         return last
 
@@ -394,9 +394,9 @@ class _CourseSearch:
             chosen, fixed, jumped = now
 
     def rest_and_push(self, rounds: int) -> None:
-        """Search over courses that push, rest and push again ahead of the reference.
+        """Search over trajectories that accelerate, rest and accelerate again ahead of the reference.
 
-        Each round changes start and length of the first push and the end of the rest, from the best courses with the
+        Each round varies start and length of the first acceleration and the end of the rest, from the best with the
         same input gain. The adjoint gives no direction here: it is 0 while the fault is at rest.
         """
         random, courses, period = np.random.default_rng(_SEED), len(self.aim), self.steps // self.periods
@@ -411,7 +411,7 @@ class _CourseSearch:
             if turn:
                 reached = self.marks.max(axis=0)
                 best, top = np.where(reached > top, tried, best), np.maximum(top, reached)
-                ranked = np.argsort(-top.reshape(-1, 2), axis=0)  # the input gain is that of even or odd courses
+                ranked = np.argsort(-top.reshape(-1, 2), axis=0)  # even and odd trajectories have different input gains
                 chosen = random.integers(max(len(ranked) // 4, 1), size=ranked.shape)
                 parents = (2 * np.take_along_axis(ranked, chosen, axis=0) + [0, 1]).ravel()
                 tried = best[:, parents] + random.integers(-_NEAR, _NEAR + 1, best.shape)
@@ -480,7 +480,7 @@ class _CourseSearch:
         return chosen, fixed, jumped
 
     def _soon(self, part: _EventPieces, state: np.ndarray, costates: np.ndarray, number: int) -> np.ndarray:
-        """Courses that jump at once, by their costate where the jump may move to the next event."""
+        """Mask of trajectories that jump now, by costate if the jump may move to the next event."""
         if not part.of.soon or number + _PIECES >= len(costates) or (self.punctual and number == 0):
             return np.ones(len(state), dtype=bool)
         following = self.parts[(number // _PIECES + 1) % len(self.parts)]
@@ -509,7 +509,7 @@ class _CourseSearch:
         return np.asarray(after + noise @ self.heard + self._beside_the_line(state[:, :2] + noise))
 
     def _beside_the_line(self, measured: np.ndarray) -> np.ndarray | float:
-        """Solution of the implicit step less its linear approximation in the nominal loop."""
+        """Solution of the implicit step minus its linear approximation in the nominal loop."""
         if self.root is None:
             return 0.0
         line = float(self.root.middle) / self.step * measured[:, 0]
@@ -520,7 +520,7 @@ class _CourseSearch:
         mask = np.zeros(state.shape, dtype=bool)
         if self.back is not None:
             mask[:, 1] = stuck = state[:, 1] < -self.back
-            above = np.maximum(before[:, 1] + self.back, 0)  # slip rate before; it falls to zero, then the fault sticks
+            above = np.maximum(before[:, 1] + self.back, 0)  # slip rate before; it falls to zero, then rest
             moving = above / np.where(stuck, above - state[:, 1] - self.back, 1)
             state[stuck, 0] = (before[:, 0] - length * self.back + length * moving * above / 2)[stuck]
             state[stuck, 1] = -self.back[stuck]
@@ -536,7 +536,7 @@ class _CourseSearch:
         jumped: list[np.ndarray],
         when: np.ndarray | None = None,
     ) -> np.ndarray:
-        """Costates of the aim at the end, or of every course after a piece."""
+        """Costates of the aim at the end, or after a given piece of every trajectory."""
         last = self.ends if when is None else when
         costate, costates = np.zeros(self.aim.shape), []
         for number in reversed(range(len(chosen))):
@@ -551,7 +551,7 @@ class _CourseSearch:
 
 
 def _let_go(stuck: np.ndarray) -> np.ndarray:
-    """Of every course the piece in which its longest rest ends, or the last one."""
+    """Piece in which the longest rest of every trajectory ends, or the last piece."""
     rested, longest = np.zeros(stuck.shape[1]), np.zeros(stuck.shape[1])
     last = np.full(stuck.shape[1], len(stuck) - 1)
     for number, rests in enumerate(stuck):
@@ -564,13 +564,13 @@ def _let_go(stuck: np.ndarray) -> np.ndarray:
 def _steepest(rates: np.ndarray, moved: np.ndarray, most: np.ndarray, limit: float) -> np.ndarray:
     """Slopes in [-1, 1] that maximise the sum of `rates`·φ + `moved`·slope over the pieces.
 
-    φ is 0 at first, changes by slope·`most` over a piece and stays within the limit, on a grid of the smallest change.
+    φ is initially 0, changes by slope·`most` over a piece and stays within the limit, on a grid of the smallest change.
     """
     if not limit or not most.min():
         return np.zeros(rates.shape)
     size = int(min(np.ceil(limit / most.min()), _LEVELS))
     grid = np.linspace(-limit, limit, 2 * size + 1)
-    share = limit / size / most  # slope of a step to the next level; none is taken where that is above 1
+    share = limit / size / most  # slope of a step to the next level; no step if it exceeds 1
     worth, ways = np.zeros((rates.shape[1], len(grid))), np.zeros((*rates.shape, len(grid)), dtype=np.int8)
     for number in reversed(range(len(rates))):
         rate = moved[number][:, None] * share[number]
@@ -598,7 +598,7 @@ def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
 
 
 def _with_disturbance(task: FaultPlant, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
-    """Flow, and columns of all inputs at full size; a rate-limited disturbance is a state."""
+    """Flow, and columns of all inputs at their bounds; a rate-limited disturbance is a state."""
     flow = np.array(loop.flow, dtype=float)
     push, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
     force, slow = float(task.reference_force), drift * float(task.drift)
@@ -632,7 +632,7 @@ def _flowing(flow: np.ndarray) -> _Event:
 
 
 def _pieces(vertices: list[np.ndarray], inputs: np.ndarray, event: _Event, *, none: bool = False) -> _EventPieces:
-    """Pieces of an event; `none` adds a vertex at which no time passes if that is free."""
+    """Pieces of an event; `none` adds a vertex with duration 0 if the duration is free."""
     length, size = float(event.duration) / _PIECES, len(inputs)
     responses = [moved(flow, inputs, length) for flow in vertices]
     if none:
@@ -659,8 +659,8 @@ def _widened(jump: Any, size: int) -> np.ndarray:
 # ----------------------------------------------------------------------
 # Falsification of a guarantee of slow sliding: worst case found, a lower bound of the errors.
 
-_SLIDING_PIECES, _FINE_PIECES = 4, 16  # of a part of the period
-_SLOPES = (1.0, 1.15)  # of e^y − 1 over y, in the linear loop that a course is found for
+_SLIDING_PIECES, _FINE_PIECES = 4, 16  # pieces of a part of the period
+_SLOPES = (1.0, 1.15)  # (e^y − 1)/y of the linear loop that gives a trajectory
 _NEWTON = 4
 _AXES = ("direct_effect", "evolution_effect", "critical_slip")
 
@@ -728,7 +728,7 @@ def _remembered(maps: list[tuple[Any, Any, Any]]) -> int:
 class SlidingPieces:
     """Plant at a corner in pieces of its periods: exact pressures, Runge–Kutta steps.
 
-    After some slip of the reference [m] the normal stress is lower by p*.
+    After a given slip of the reference [m] the normal stress is lower by p*.
     """
 
     def __init__(
