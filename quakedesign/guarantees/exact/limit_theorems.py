@@ -149,8 +149,8 @@ class SlidingPush:
 # then slip exceeds E = (μ* − μ_res)/m, where friction has its residual value, under every controller, even if it knows
 # φ and the plant from the onset; also on the stick–slip plant. *Proof.* For 0 ≤ x1 ≤ E: x2′ ≥ s·x1 − w·x2 + N̂(μ* −
 # m·x1)p_f + H, an equality unless the fault is at rest. The third term is at least c·min(p_f, 0), c = N̂μ*, and
-# min(p_f, 0) is at least v, the path's response to u = min(p, 0). So z = (λ + w)x1 + x2 is at least z0, z0′ = λz0 + cv +
-# H, z0(0) = 0. Let ζ be z0 plus the future effect of u up to now, which is not positive: z ≥ ζ, ζ′ = λζ + cG(λ)u + H.
+# min(p_f, 0) is at least v, the path's response to u = min(p, 0). So z = (λ + w)x1 + x2 ≥ z0, z0′ = λz0 + cv + H, z0(0)
+# = 0. Let ζ be z0 plus the future effect of u up to now, which is not positive: z ≥ ζ, and ζ′ = λζ + cG(λ)u + H.
 # Until T ζ grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 at all later t: ζ grows exponentially. x1′ = z −
 # (λ + w)x1 with z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 remains true, and x1 exceeds E. ∎
 #
