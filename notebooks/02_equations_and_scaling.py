@@ -14,7 +14,7 @@
 # %% [markdown]
 # # From the force balance to instability and scaling
 #
-# This page derives the equations from one force balance, and the verdicts by exact arithmetic.
+# This page derives the equations from one force balance, and decides stability in exact arithmetic.
 
 # %%
 import dataclasses

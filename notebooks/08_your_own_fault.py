@@ -17,8 +17,8 @@
 # # Your own fault, from a record
 #
 # **A laboratory has sheared the gouge of a reservoir fault at two rates. Can the fault slip slowly instead of in earthquakes, and what can be guaranteed?** This page goes from
-# a CSV file of velocity steps to a fault file, then to stability, the earthquake cycle and the performance limits of every controller. A controller with a guarantee for
-# all friction that the record allows, a campaign and figures for a paper follow.
+# a CSV file of velocity steps to a fault file, then to stability, the earthquake cycle and the performance limits of every controller. Then come a controller with a
+# guarantee for all friction that the record allows, a campaign, and figures for a paper.
 #
 # The record here is synthetic, with noise, so that the result can be checked; replace it by your own file. The same steps apply to a record of slip weakening
 # (`--law exponential-slip-weakening`).

@@ -267,7 +267,7 @@ ROWS = (
     ErrataRow(
         number=15,
         printed="real-fault gains reject 3.2e-4 sin(0.69t): “finite-time”",
-        correct="L̄ is violated 200 to 290 times (2-CTA) and 120 to 175 times (2-DIA)",
+        correct="L̄ is exceeded 200- to 290-fold (2-CTA) and 120- to 175-fold (2-DIA)",
         kind="numeric reproduction",
         check=row_15,
     ),
