@@ -32,7 +32,7 @@ _EXPERIMENTS = {
 
 @checked_dataclass(frozen=True, kw_only=True)
 class ParameterEstimate:
-    """One parameter with its profile likelihood at 95 %.
+    """One parameter with its 95 % profile-likelihood interval.
 
     Attributes
     ----------

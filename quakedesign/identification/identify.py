@@ -233,7 +233,7 @@ def identify(
     trend: str = "auto",
     seed: int = 0,
 ) -> Identification:
-    """Friction parameters of a laboratory record, each with its profile likelihood at 95 %.
+    """Friction parameters of a laboratory record, each with its 95 % profile-likelihood interval.
 
     A law with state is fitted by simulation of the experiment: a spring connects a block without inertia to the load
     point, whose rate is piecewise constant. A law that weakens with slip is fitted at the measured slip, or without one

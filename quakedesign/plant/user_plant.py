@@ -74,7 +74,7 @@ class Sector:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class UncertainPlant:
-    """A linear plant with sectors, gains and disturbances, whose peaks `guarantee` proves for a sampled law.
+    """A linear plant with sectors, gains and disturbances; `guarantee` bounds its peaks under a sampled law.
 
     All numbers may be floats, texts or rationals, and are exact from then on.
 

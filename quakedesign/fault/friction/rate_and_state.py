@@ -39,7 +39,7 @@ class RateAndState(FrictionLaw):
     reference_coefficient : float
         μ_0 [-], friction of steady sliding at the reference rate, positive.
     direct_effect, evolution_effect : float
-        a and b [-], positive; a < b weakens with rate.
+        Direct effect a and evolution effect b [-], positive; friction with a < b weakens with rate.
     critical_slip : float
         d_c [m], slip over which the state evolves, positive.
     reference_rate : float
@@ -47,8 +47,8 @@ class RateAndState(FrictionLaw):
     slowest_rate, fastest_rate : float
         v_s and v_f [m/s], ends of the working range, 0 < v_s ≤ v_0 ≤ v_f.
     stress_sensitivity : float
-        α [-], not negative: a change of the effective normal stress σ adds −(αθ/(bσ))σ' to θ' (Linker and Dieterich
-        1992, J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds below are for a constant σ.
+        α [-], not negative: the effective normal stress σ adds −(αθ/(bσ))·dσ/dt to dθ/dt (Linker and Dieterich 1992,
+        J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds of friction are for a constant σ.
 
     Raises
     ------

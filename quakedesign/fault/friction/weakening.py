@@ -120,7 +120,7 @@ class LinearSlipWeakening(SlipWeakening):
     Attributes
     ----------
     critical_slip : float
-        Slip d_c from which on friction is kinetic [m], positive.
+        Slip d_c beyond which friction is kinetic [m], positive.
     """
 
     name: ClassVar[str] = "linear-slip-weakening"
