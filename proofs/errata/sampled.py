@@ -242,7 +242,8 @@ ROWS = (
     ErrataRow(
         number=22,
         printed="lab e-LQR gains sampled at 1 ms",
-        correct="with zero-order hold the spectral radius is 1.026 at kinetic friction (limit 0.989 ms) and 2.01 at static friction (limit 0.70 ms)",
+        correct="with zero-order hold the spectral radius is 1.026 at kinetic friction (limit 0.989 ms) and 2.01 at "
+        "static friction (limit 0.70 ms)",
         kind="numeric reproduction",
         check=row_22,
     ),

@@ -210,7 +210,7 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
     assert run("check", file) == 0
     assert run("simulate", PATH, "--duration", "1 hour", "--out", out) == 0
     told = capsys.readouterr().out
-    assert "what is proved is of the plant without stick" in " ".join(told.split())
+    assert "bounds, which are proved of the plant without stick" in " ".join(told.split())
     assert (out / "blocks.png").stat().st_size > 20_000
     facts = json.loads((out / "results.json").read_text())
     assert facts["guarantee"]["verdict"] == "proved"
