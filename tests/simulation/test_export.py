@@ -309,7 +309,7 @@ def test_an_integral_that_pushes_beyond_what_was_applied_stays_as_it_was_before(
             "another T_s",
             {"delay": F(1, 50), "lag": F(2), "diffusion": F(300)},
             F(1, 2),
-            ["another T_s", "a delay of 0.02 s, a lag of 2 s, rock of L^2/D = 300 s between", "once every 0.25 s"],
+            ["another T_s", "a lag of 2 s, diffusion with L^2/D = 300 s between", "once every 0.25 s"],
         ),
         ("", {}, F(1, 2), ["to be called periodically, once every 0.25 s"]),
         (None, None, None, []),
@@ -411,7 +411,7 @@ def test_nothing_is_left_of_a_failed_export(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("settings", "named"),
     [
-        ({"scheme": "continuous"}, "samples"),
+        ({"scheme": "continuous"}, "sampled scheme"),
         (
             {"scheme": simulation_scheme("explicit", actuator=Actuator(stages=(Lag(time_constant=0.1),)))},
             "between samples",

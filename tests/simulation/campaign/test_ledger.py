@@ -15,7 +15,7 @@ from quakedesign.errors import OutputError, SimulationError
 from quakedesign.files import FAMILY, PREFIX
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation.campaign.ledger import Ledger, _told, differences, plain
+from quakedesign.simulation.campaign.ledger import Ledger, _listed, differences, plain
 
 INPUTS = {"seed": 1, "controller": {"gains": {"k1": "7"}}}
 
@@ -190,7 +190,7 @@ def test_differences_name_what_one_of_the_two_has_alone():
     ],
 )
 def test_five_differences_are_told(names, told):
-    assert _told(names) == told
+    assert _listed(names) == told
 
 
 def test_a_campaign_is_known_by_its_inputs_in_any_order(tmp_path):
