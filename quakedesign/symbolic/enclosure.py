@@ -518,8 +518,8 @@ def upper_bound(
     result = -heap[0][0]
     if result == float("inf"):
         raise ParameterError(
-            f"no finite bound was found in {pieces} subdivisions of the box. An expression that is defined all over it "
-            "is expected. Narrow the ranges."
+            f"no finite bound was found in {pieces} subdivisions of the box. The expression may be undefined in it. "
+            "Narrow the ranges."
         )
     return Fraction(result)
 

@@ -158,7 +158,7 @@ def test_dilation_takes_any_positive_factor():
 
 
 def test_a_state_without_weight_is_named():
-    with pytest.raises(ParameterError, match="None was given for y"):
+    with pytest.raises(ParameterError, match="Received none for y"):
         homogeneous(TWISTING, {x: 2})
 
 

@@ -163,7 +163,7 @@ def limit(
         part = value(term, {**loop.parameters, **parameters})
         for state, exponent, kind in term.factors:
             power = exponent * loop.states[state]
-            require(power.denominator == 1, f"⌈{state}⌋^{exponent} is no polynomial on a cell.")
+            require(power.denominator == 1, f"⌈{state}⌋^{exponent} is not polynomial on a cell.")
             part *= abs(point[state]) ** power.numerator * (signs[state] if kind == "s" else 1)
         total += part
     return total
