@@ -200,7 +200,7 @@ def _domain(question: DomainProblem, level: Fraction, method: str, limit: str) -
 
 
 _FROM_ERRORS = {
-    "the control itself, through viscosity and rate weakening (e2')": (plant.acceleration_error,),
+    "the control, through viscosity and rate weakening (e2')": (plant.acceleration_error,),
     "the slip-rate error, through spring and weakening friction": (plant.e2, plant.e1),
 }
 _GIVEN = {"the disturbance": (plant.phi, plant.phi_t), "the moving reference": (stage,)}
@@ -239,7 +239,7 @@ def _split_limit(question: DomainProblem, level: Fraction) -> str:
     box = parameter_ranges(fault) | question.sets.errors(level).ranges()
     straight = expression.xreplace({slope: sp.Integer(0)})
     calm = straight.xreplace(dict.fromkeys((plant.phi_1, plant.phi_2), sp.Integer(0)))
-    less = "" if controller.feedforward.name == "none" else " less its feed-forward"
+    less = "" if controller.feedforward.name == "none" else " minus its feed-forward"
     causes = {
         f"{rest}{less}": calm,
         "friction": expression - straight,

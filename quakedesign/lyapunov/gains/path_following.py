@@ -427,7 +427,7 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
     if not solution or not all(v.is_Rational for v in solution):
         raise ParameterError(
             f"the terms of {loop.law} must determine how its gains scale. Received {solution or 'a contradiction'}. "
-            "Leave out gains without effect."
+            "Omit gains without effect on the loop."
         )
     exponents = {name: fraction_of(v) for name, v in zip(unknown, solution, strict=True)}
     return {name: exponents[name] for name in (*loop.gains, *loop.states)}

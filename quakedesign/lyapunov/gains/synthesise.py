@@ -96,7 +96,7 @@ class LargestDecay(Objective):
 
     name: ClassVar[str] = "decay"
     unit: ClassVar[str] = "1/s"
-    meaning: ClassVar[str] = "one over the certified settling time from where every error is at most the bound on |h'|"
+    meaning: ClassVar[str] = "inverse of the certified settling time from errors of at most the bound on |h'|"
     paced: ClassVar[bool] = True
 
     def speed(self, level: float) -> float | None:
@@ -156,7 +156,7 @@ class LargestRange(Objective):
 
     name: ClassVar[str] = "beta"
     unit: ClassVar[str] = "-"
-    meaning: ClassVar[str] = "ratio of the ends of the range of β to its geometric middle"
+    meaning: ClassVar[str] = "ratio of the ends of the range of β to its geometric mean"
 
     middle: Fraction = Fraction(1)
     first: float = 1.01
@@ -201,7 +201,7 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
     require_known(name, _OBJECTIVES, "objective", UnknownNameError)
     chosen = _OBJECTIVES[name]
     if chosen.bounded and not (bound is not None and bound > 0):
-        raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give one.")
+        raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give bound.")
     make = partial(chosen, bound=bound if chosen.bounded else None)
     if chosen is not LargestRange:
         return make()

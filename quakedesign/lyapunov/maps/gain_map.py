@@ -189,7 +189,7 @@ def _answer(sheet: Sheet, question: str, arguments: tuple[object, ...]) -> Any:
 # Certified region of two gains: a grid screened with one compiled problem; its edges and a sample proved exactly.
 
 SHARES = tuple(Fraction(s, 100) for s in (25, 50, 75, 90, 99))
-"""Levels of L̄ as shares of the necessary limit of the base gains, unless levels are given."""
+"""Default levels of L̄, as shares of the necessary limit of the base gains."""
 _NEIGHBOURS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 
 
@@ -337,16 +337,14 @@ def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[F
     """
     first, last = rational(low, what), rational(high, what)
     if not first < last:
-        raise ParameterError(f"{what} must rise. Received {low} to {high}.")
+        raise ParameterError(f"{what} must ascend. Received {low} to {high}.")
     shares = [i / (points - 1) for i in range(1, points - 1)]
     a, b = float(first), float(last)
     inner = [a * (b / a) ** s if first > 0 else a + (b - a) * s for s in shares]
     digits = 3 + max(0, round(log10(points)) - 1)
     values = (first, *(Fraction(f"{v:.{digits}e}") for v in inner), last)
     if any(u >= v for u, v in pairwise(values)):
-        raise ParameterError(
-            f"{what} is too narrow for {points} points. Received {low} to {high}. Ask for fewer points."
-        )
+        raise ParameterError(f"{what} is too narrow for {points} points. Received {low} to {high}. Use fewer points.")
     return values
 
 
@@ -358,7 +356,7 @@ def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tu
         return ordered
     limit = necessary_limit(loop, subject)
     if not limit:
-        raise ParameterError("levels of L̄ are needed, since the base gains give no limit. Give --lipschitz.")
+        raise ParameterError("levels of L̄ are required, since the base gains give no limit. Give --lipschitz.")
     return tuple(share * limit for share in SHARES)
 
 

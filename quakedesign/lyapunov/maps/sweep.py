@@ -117,13 +117,13 @@ def _template(row: FormRow, loop: Loop, scale: Sequence[Fraction]) -> Statement:
 # multipliers. All numbers are floating point: a sweep screens without proof.
 
 ACCURACY = 1e-10
-"""Tolerance of the solver by default."""
+"""Default tolerance of the solver."""
 SURE = 5e-10
-"""Margins above this count as found; the solver's answers are about as accurate as that."""
+"""Margins above this are taken as positive; it is about the accuracy of the solver."""
 CLEAR = 1e-6
-"""Margins above this decide what is chosen once for many points, such as a degree, on every processor alike: kernels of
-linear algebra move margins near zero by up to 2e-9."""
-_TOO_FAR = "the gains are too far apart for a search in floating point."
+"""Margins above this decide choices for many points, such as a degree, alike on every processor: kernels of linear
+algebra change margins near zero by up to 2e-9."""
+_TOO_FAR = "the magnitudes of the gains differ too much for a search in floating point."
 _MOST_SCALES = 64  # number of scales with cached coefficients
 
 
@@ -172,7 +172,7 @@ class Sweep:
         self.monomials = signed_monomials(loop.states, degree, loop.domain)
         self.rows = rows_of(loop, self.monomials) if self.monomials else ()
         if not any(row.rate for row in self.rows):
-            raise CertificateError(f"there are no Lyapunov functions of degree {degree} to try for {loop.law}.")
+            raise CertificateError(f"there are no candidate functions V of degree {degree} for {loop.law}.")
         self.products = sorted({names for row in self.rows for _, _, names, _ in row.parts})
         order = {names: i for i, names in enumerate(self.products)}
         parts = [part for row in self.rows for part in row.parts]
@@ -219,7 +219,7 @@ class Sweep:
             When the magnitudes of its numbers differ too much for floating point.
         """
         if not self.covers(loop):
-            raise ValueError("the point has another structure. Compile a sweep for it.")
+            raise ValueError("the loop differs in structure from that of the sweep. Compile a sweep for it.")
         values, units = values_of(loop), frame or self.frame(loop)
         solution = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy, anew=anew)
         self.solves += 1

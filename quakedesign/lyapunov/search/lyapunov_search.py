@@ -372,7 +372,7 @@ def keep(loop: Loop, degree: int, certificate: Certificate | None) -> None:
 # Search for a Lyapunov function of given gains, completed in exact arithmetic. One pipeline for every law.
 
 _WORTH_A_PROOF = 1e-9
-"""Margins above this are worth a proof in exact arithmetic, which decides."""
+"""Margins above this are tried in exact arithmetic, which decides."""
 _DIGITS = (1 << 14, 1 << 20, 1 << 30)
 _HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # higher degrees gain less than rounding or time cost
 

@@ -199,7 +199,7 @@ def test_the_linear_certificate_does_not_claim_the_moving_reference_or_the_sine(
 
 def test_a_linear_certificate_of_another_fault_is_refused(real):
     design = qd.design(real, "elqr", continuous=True)
-    with pytest.raises(CertificateError, match="another fault"):
+    with pytest.raises(CertificateError, match="differ from those on this fault"):
         linear_premises(replace(real, density=2600.0), design.controller, design.certificate)
 
 
@@ -315,7 +315,7 @@ def test_the_closer_one_of_two_methods_counts_on_a_level_set(
     )  # fmt: skip
     found = _level_set(question)
     assert (found.name, found.required, found.certified) == ("level_set", required, certified)
-    assert found.note.startswith("rigorous on the level set of V that holds the start: |e1| <= 1 m, |e2| <= 2 m/s")
+    assert found.note.startswith("rigorous on the level set of V that contains the start: |e1| <= 1 m, |e2| <= 2 m/s")
     assert found.note.endswith("; with nominal feed-forward")
     assert ("fraction of the decrease of V" in found.note) is (required == F(3, 8))
     assert found.holds is (required <= 1)

@@ -132,6 +132,6 @@ def test_another_structure_is_refused():
 
 
 def test_a_degree_without_candidates_is_refused():
-    with pytest.raises(CertificateError, match="no Lyapunov functions of degree 1"):
+    with pytest.raises(CertificateError, match="no candidate functions V of degree 1"):
         Sweep(loop("cta")[0], 1)
     assert law("cta").name == "cta"
