@@ -36,7 +36,7 @@ from quakedesign.linear.linear_problem import (
     transpose,
 )
 from quakedesign.lyapunov import Verdict
-from quakedesign.sos.solve.conic import hand_back, handing_back
+from quakedesign.sos.solve.conic import collecting, record
 
 # ----------------------------------------------------------------------
 # The sampled law that runs, whatever its parameters do in time: one quadratic V and Wirtinger's inequality, exact.
@@ -139,7 +139,7 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
 
 def proposed(programme: Callable[..., list[Rows]], *question: object) -> list[Rows]:
     """What a programme proposes, or has proposed before; it is solved where somebody waits for it."""
-    if handing_back():
+    if collecting():
         return programme(*question)
     return list(search_once(lambda: programme(*question), programme.__module__, *question))
 
@@ -172,7 +172,7 @@ def solved(program: Any, margin: Any) -> bool:
     """Whether a solver proposes something with a margin; where it breaks down, once more with firmer factorisations."""
     import cvxpy as cp
 
-    hand_back(program)
+    record(program)
     for settings in ({}, {"static_regularization_constant": 1e-7}):
         try:
             with warnings.catch_warnings():

@@ -418,10 +418,10 @@ def _operation(e: sp.Expr) -> Operation:
 
 
 def _without_ball(what: str) -> Operation:
-    def refuse(values: list[arb]) -> arb:
+    def reject(values: list[arb]) -> arb:
         raise UnsupportedError(f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, Min or Max.")
 
-    return refuse
+    return reject
 
 
 def _ball_power(exponent: sp.Expr) -> Operation:

@@ -50,7 +50,7 @@ from quakedesign.lyapunov.search.lyapunov_search import (
 )
 from quakedesign.lyapunov.search.settling_time import fastest_settling
 from quakedesign.parallel import Crew, Here, crew_or_here
-from quakedesign.sos.solve.conic import handing_back
+from quakedesign.sos.solve.conic import collecting
 
 # ----------------------------------------------------------------------
 # Objectives: order of levels, requirements of a level on a loop, the final proof and its value.
@@ -418,7 +418,7 @@ def synthesise(
     require_count(_MOST_STARTS, starts=starts)
     require_count(MOST_WORKERS, workers=workers)
     first = list(islice(begin_with(problem, seed), starts * _DRAWS))
-    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+    with Here() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         best = _best(problem, _climbed(problem.setting, first, starts, crew))
     mine = _synthesis(problem, *best) if best else None
     return _beside(problem, mine) if compare else mine

@@ -26,7 +26,7 @@ from quakedesign.lyapunov.maps.sweep import CLEAR, Frame, Path, Sweep, prove
 from quakedesign.lyapunov.search.certify import Number, closed_loop, necessary_limit
 from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees
 from quakedesign.parallel import Crew, Here, crew_or_here
-from quakedesign.sos.solve.conic import handing_back
+from quakedesign.sos.solve.conic import collecting
 
 # ----------------------------------------------------------------------
 # Computation of the points of a map, by workers that cache their compiled sweeps.
@@ -100,7 +100,7 @@ class Screener:
         sweep = self._sweep(loop)
         if sweep is None:
             return False
-        answer = None if handing_back() else self._follow(sweep, loop)
+        answer = None if collecting() else self._follow(sweep, loop)
         return _solved(sweep, loop) if answer is None else answer
 
     def _follow(self, sweep: Sweep, loop: Loop) -> bool | None:
@@ -285,7 +285,7 @@ def gain_map(
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
-    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+    with Here() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         began, screeners = perf_counter(), Screeners(sheet, crew)
         limits, screened, solves = _screen(sheet, screeners, tell)
         middle = perf_counter()

@@ -41,7 +41,7 @@ from quakedesign.lyapunov.exact.obligations import (
 )
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import constant, monomial, product
-from quakedesign.sos.solve.conic import handing_back
+from quakedesign.sos.solve.conic import collecting
 from quakedesign.sos.solve.decide import strict_proof
 from quakedesign.sos.solve.joint import Demand, Proposal, joint_program
 from quakedesign.symbolic.term_expressions import signed_monomials
@@ -342,7 +342,7 @@ def cached(search: Search) -> Search:
 
         if path.exists():
             text = path.read_text(encoding="utf-8")
-        elif handing_back() or not in_use():
+        elif collecting() or not in_use():
             return search(loop, degree, subject)
         else:
             text = search_once(searched, "lyapunov", loop, degree)

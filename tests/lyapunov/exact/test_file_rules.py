@@ -53,11 +53,11 @@ CASES = {
     ),
     "multiplier of too few": (
         lambda: hand.edited(hand.oscillator(), ("witnesses", 0, "multiplier", {"0": "1"})),
-        "wrong key",
+        "not as many as its loop",
     ),
     "multiplier of too many": (
         lambda: hand.edited(hand.relay(), ("witnesses", 0, "multiplier", {"0,0,0": "1"})),
-        "wrong key",
+        "not as many as its loop",
     ),
     "times on reals": (lambda: hand.edited(hand.decay(), ("witnesses", 0, "squares", 0, "times", [1])), "from 0 to 0"),
     "basis repeated": (

@@ -154,7 +154,7 @@ def test_a_solver_decides_where_no_path_does(monkeypatch):
 
 def test_problems_are_solved_by_cvxpy_while_they_are_handed_back(monkeypatch):
     sheet = sheet_of("super-twisting")
-    monkeypatch.setattr(workers, "handing_back", lambda: True)
+    monkeypatch.setattr(workers, "collecting", lambda: True)
     monkeypatch.setattr(Path, "feasible", lambda self, loop: pytest.fail("a path was asked"))
     assert Screener(sheet).row(sheet.rows[0][:2])[1] >= 2
 

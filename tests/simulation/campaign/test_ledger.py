@@ -37,7 +37,7 @@ def test_bits_come_back(tmp_path):
 def test_another_campaign_is_refused_by_name(tmp_path):
     filled(tmp_path)
     other = {"seed": 2, "controller": {"gains": {"k1": "7", "k2": "5"}}}
-    with pytest.raises(SimulationError, match=r"differs in controller\.gains\.k2, seed"):
+    with pytest.raises(SimulationError, match=r"Received others for controller\.gains\.k2, seed"):
         Ledger.open(tmp_path, other)
     assert len(Ledger.open(tmp_path, INPUTS).read()) == 2
     assert not Ledger.open(tmp_path, other, renew=True).read()
@@ -46,7 +46,7 @@ def test_another_campaign_is_refused_by_name(tmp_path):
 def test_other_files_are_not_touched(tmp_path):
     (tmp_path / "thesis.txt").write_text("years")
     for renew in (False, True):
-        with pytest.raises(OutputError, match=r"holds thesis\.txt"):
+        with pytest.raises(OutputError, match=r"contains thesis\.txt"):
             Ledger.open(tmp_path, INPUTS, renew=renew)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
@@ -75,7 +75,7 @@ def test_force_does_not_delete_the_same_campaign(tmp_path):
 
 def test_a_manifest_that_is_none(tmp_path):
     (tmp_path / "campaign.json").write_text("[1")
-    with pytest.raises(SimulationError, match="differs in everything"):
+    with pytest.raises(SimulationError, match="Received others for everything"):
         Ledger.open(tmp_path, INPUTS)
 
 
