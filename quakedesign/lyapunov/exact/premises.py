@@ -198,15 +198,15 @@ def _variants(
     return tuple(_variant(DomainProblem(fault, law, certificate, margins), bounded=bounded) for law in laws)
 
 
-def _variant(question: DomainProblem, *, bounded: bool) -> Variant:
-    fault, law, certificate = question.fault, question.controller, question.certificate
+def _variant(problem: DomainProblem, *, bounded: bool) -> Variant:
+    fault, law, certificate = problem.fault, problem.controller, problem.certificate
     premises = [
         control_coefficient(fault, law.divisor, certificate.loop.uncertain["beta"]),
         _along_reference(fault, law, certified_lipschitz(certificate)),
     ]
     if bounded:
-        premises.append(_level_set(question))
-    domain = certified_domain(question) if bounded else None
+        premises.append(_level_set(problem))
+    domain = certified_domain(problem) if bounded else None
     return Variant(feedforward=law.feedforward, premises=tuple(premises), domain=domain)
 
 
@@ -245,17 +245,17 @@ def _along_reference(fault: Fault, controller: SlidingMode, certified: Fraction 
     return matched_rate_premise(fault, controller, "along_reference", Errors(), certified, note)
 
 
-def _level_set(question: DomainProblem) -> Premise:
+def _level_set(problem: DomainProblem) -> Premise:
     """Premise on the level set of the initial state: method *whole* or *split*, whichever has the smaller ratio."""
-    fault, law = question.fault, question.controller
-    level = question.sets.level(initial_perturbation(fault, law.divisor))
-    errors = question.sets.errors(level)
+    fault, law = problem.fault, problem.controller
+    level = problem.sets.level(initial_perturbation(fault, law.divisor))
+    errors = problem.sets.errors(level)
     start = f"rigorous on the level set of V that contains the start: |e1| <= {UpperBound(errors.slip):.2g} m, "
     start += f"|e2| <= {UpperBound(errors.rate):.2g} m/s"
-    parts, rate = question.split(level), question.whole(level)
+    parts, rate = problem.split(level), problem.whole(level)
     share = sum(parts.values(), Fraction(0)) if parts else None
     if share is None or rate <= share:
-        return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(question.certificate), start)
+        return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(problem.certificate), start)
     return Premise(
         name="level_set",
         required=share,

@@ -158,7 +158,7 @@ class Screeners:
     def __init__(self, sheet: Sheet, crew: Crew) -> None:
         self._sheet, self._crew = sheet, crew
 
-    def answers(self, question: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
+    def answers(self, method: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
         """Results of one method of `Screener` for many arguments, in any order.
 
         Raises
@@ -166,7 +166,7 @@ class Screeners:
         SimulationError
             When processes die repeatedly; a single killed process is replaced.
         """
-        tasks = [(self._sheet, question, one) for one in arguments]
+        tasks = [(self._sheet, method, one) for one in arguments]
         return (answer for _, answer in self._crew.answers(_answer, tasks))
 
 
@@ -179,10 +179,10 @@ class _Cached(threading.local):
 _cached = _Cached()
 
 
-def _answer(sheet: Sheet, question: str, arguments: tuple[object, ...]) -> Any:
+def _answer(sheet: Sheet, method: str, arguments: tuple[object, ...]) -> Any:
     if _cached.screener is None or _cached.screener.sheet != sheet:
         _cached.screener = Screener(sheet)
-    return getattr(_cached.screener, question)(*arguments)
+    return getattr(_cached.screener, method)(*arguments)
 
 
 # ----------------------------------------------------------------------

@@ -45,7 +45,7 @@ def test_the_rows_are_the_demands_of_the_search(name):
             for n in names:
                 c = c * values[n]
             found[j][exponents] = found[j].get(exponents, F(0)) + c
-        factor = 1 / family.pace if row.rate else F(1)
+        factor = 1 / family.rate_scale if row.rate else F(1)
         return tuple(tuple(sorted((e, c * factor) for e, c in p.items() if c)) for p in found)
 
     wanted = {tuple(tuple(sorted(p.items())) for p in d.parts) for d in family.demands}
@@ -103,7 +103,7 @@ def test_the_sign_of_the_margin_does_not_depend_on_units_or_on_what_was_solved_b
     beyond = closed_loop("cta", LOOPS["cta"][0], lipschitz="1.3")
     for one, sign in ((at, 1), (beyond, -1)):
         for scale in ((1, 1, 8), (1, 1, 16), (1, 2, 8)):
-            frame = Frame(scale=tuple(map(F, scale)), pace=sweep.frame(one).pace)
+            frame = Frame(scale=tuple(map(F, scale)), rate_scale=sweep.frame(one).rate_scale)
             assert np.sign(sweep.solve(one, frame).margin) == sign
     assert sweep.solve(at).margin == pytest.approx(Sweep(at, degree).solve(at).margin, rel=1e-4)
 
