@@ -212,7 +212,7 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
 def _binary(sources: dict[str, str]) -> tuple[dict[str, bytes], str]:
     """Compiled interface for this platform, if a compiler works."""
     if platform.system() not in _PLATFORMS or platform.machine() not in {"x86_64", "AMD64"}:
-        return {}, "sources only: this platform has no name in FMI 2.0 that is built here"
+        return {}, "sources only: no binary of FMI 2.0 is built for this platform"
     name, suffix = _PLATFORMS[platform.system()]
     try:
         with temporary_folder() as folder:

@@ -227,10 +227,10 @@ def test_the_same_certificate_gives_the_same_bytes_in_another_process():
 
 NO_THEOREM = ("guarantee", "sliding", "uncertain_plant", "stick_slip_aperiodic")
 KINDS = {
-    "motzkin_not-sos": "not-sos",
-    "guarantee_lab-fault": "a guarantee",
-    "sliding_crustal-patch": "a slow_sliding",
-    "uncertain_plant_pendulum": "a uncertain_plant",
+    "motzkin_not-sos": "kind not-sos",
+    "guarantee_lab-fault": "kind guarantee",
+    "sliding_crustal-patch": "kind slow_sliding",
+    "uncertain_plant_pendulum": "kind uncertain_plant",
 }
 
 

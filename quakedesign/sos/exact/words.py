@@ -90,7 +90,7 @@ def _reason(answer: Answer) -> list[str]:
                 f"{n} = {exact_text(v)}" for n, v in zip(statement.variables, proof.coordinates, strict=True)
             )
             return [f"negative at {point}", f"value {_shown(evaluate(answer.statement.polynomial, proof.coordinates))}"]
-    return ["neither a rational proof nor a rational refutation was found; this says nothing about the polynomial"]
+    return ["neither a rational proof nor a rational refutation was found; the polynomial remains undecided"]
 
 
 def _shown(value: Fraction) -> str:

@@ -171,9 +171,9 @@ def test_an_equilibrium_by_hand():
 @pytest.mark.parametrize(
     ("loop", "equilibrium", "reason"),
     [
-        (resting(domain="reals"), rest(), "cells without lifts"),
-        (resting(lifts={"n": ()}), rest(), "cells without lifts"),
-        (resting(roots={"r": ("d", (F(1), F(1)))}), rest(), "cells without lifts"),
+        (resting(domain="reals"), rest(), "the domain cells, without lifts"),
+        (resting(lifts={"n": ()}), rest(), "the domain cells, without lifts"),
+        (resting(roots={"r": ("d", (F(1), F(1)))}), rest(), "the domain cells, without lifts"),
         (resting(), rest(0, {"+": F(0), "-": F(1)}, d=-1), "away from the origin"),
         (resting(), replace(rest(), point={}), "away from the origin"),
         (resting(), replace(rest(), point={"x": F(1), "y": F(1)}), "away from the origin"),

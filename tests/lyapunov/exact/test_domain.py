@@ -317,7 +317,7 @@ def test_joint_starts_are_bounded(found):
 
 def test_where_the_decrease_is_not_polynomial_the_claimed_decay_serves(found, known, monkeypatch):
     def refuse(*_):
-        raise CertificateError("no polynomial on a cell.")
+        raise CertificateError("not polynomial on a cell.")
 
     monkeypatch.setattr(robustness_module, "_against_decrease", refuse)
     assert robustness(found.certificate) is None

@@ -111,7 +111,7 @@ CASES = {
     "33 parameters": (lambda: hand.edited(hand.relay(), ("field", "x", 0, 1, ["k"] * 33)), "length <= 32"),
     "a root of a state": (
         lambda: hand.rooted_relay() | {"roots": {"s": ["x", "7/5", "3/2"]}},
-        "a root must be of a gain",
+        "a root must be that of a gain",
     ),
     "a state without a field": (
         lambda: hand.oscillator() | {"field": {"x": hand.oscillator()["field"]["x"]}},

@@ -328,7 +328,7 @@ def test_conditions_differ_from_each_other_and_from_variables(conditions, fine):
 
 def test_equal_signs_on_a_cell_are_refused_by_name():
     double = {"n": SUM["n"], "m": tuple(replace(t, coefficient=2 * t.coefficient) for t in SUM["n"])}
-    with pytest.raises(CertificateError, match="the signs n, m say"):
+    with pytest.raises(CertificateError, match="the signs n, m are equal"):
         _ = lifted(double, ("n", 0, "s"), ("m", 0, "s")).cells
     assert lifted(double, ("n", 1, "s"), ("m", 0, "s")).cells
 

@@ -364,7 +364,7 @@ def test_a_refusal_shows_24_characters_on_either_side(start, length, shown):
     text = 4 * ALPHABET
     token = expansion.Token("name", text[start : start + length], start)
     with pytest.raises(PolynomialError) as caught:
-        expansion.refuse(text, token, "another", "Write it.")
+        expansion.reject(text, token, "another", "Write it.")
     assert str(caught.value) == f"another expected at character {start + 1}. Received {shown} there. Write it."
 
 
@@ -395,7 +395,7 @@ def test_what_is_just_allowed_is_read_and_what_is_just_beyond_refused(allowed, r
 
 def test_a_refusal_writes_what_cannot_be_printed_and_nothing_else_differently():
     with pytest.raises(PolynomialError) as caught:
-        expansion.refuse("é\\'\n\x1b\u2028", expansion.Token("other", "é", 0), "another", "Write it.")
+        expansion.reject("é\\'\n\x1b\u2028", expansion.Token("other", "é", 0), "another", "Write it.")
     assert str(caught.value) == "another expected at character 1. Received ⟦é⟧\\'\\n\\x1b\\u2028 there. Write it."
 
 
