@@ -95,7 +95,7 @@ class Ledger:
             ledger._clear()
         elif changed:
             raise SimulationError(
-                f"the campaign in {folder} must have the same settings to be resumed. Received others for "
+                f"the campaign in {folder} must have the same settings to be resumed. Received changes of "
                 f"{_listed(changed)}. Choose a new folder, or replace the campaign by force."
             )
         ledger._create()

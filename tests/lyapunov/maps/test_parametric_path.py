@@ -83,7 +83,7 @@ def test_both_bounds_hold_wherever_a_step_has_them(monkeypatch):
 
 
 def test_a_bound_counts_only_where_it_holds_and_beyond_what_its_equations_are_missed_by():
-    given = {"tau": 1.0, "moves": (), "least": -0.5, "most": 0.5, "missed": 1e-6}
+    given = {"tau": 1.0, "moves": (), "least": -0.5, "most": 0.5, "residual": 1e-6}
     found = lambda **other: paths._Step(**given | other).feasible  # noqa: E731
     assert found(multipliers=np.array([-1e-3]), bound=2.0) is True
     assert found(multipliers=np.array([-1e-3]), bound=2.0, most=1.5) is None
