@@ -15,7 +15,7 @@ from time import perf_counter
 
 import quakedesign as qd
 from quakedesign.lyapunov.gains.path_following import scaled_norm
-from quakedesign.lyapunov.gains.synthesise import OBJECTIVES, question, synthesise
+from quakedesign.lyapunov.gains.synthesise import OBJECTIVES, problem_of, synthesise
 from quakedesign.synthesis.simulated_error import sampling, synthesise_sampled
 
 DEGREES = {
@@ -34,7 +34,7 @@ def proved(law: str, objective: str, degrees: tuple[int, ...]) -> Iterator[Row]:
 
     For objectives with a bound on the norm, the gains to beat set it, so that every row is about equal norms.
     """
-    asked = question(law, objective, lipschitz=1, gain_range=(1, 1), degrees=degrees)
+    asked = problem_of(law, objective, lipschitz=1, gain_range=(1, 1), degrees=degrees)
     starts = STARTS.get((law, objective), 1)
     found = None
     for place, loop in enumerate(asked.published):

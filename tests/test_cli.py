@@ -407,7 +407,7 @@ def test_a_certificate_without_disturbance_does_not_cover_a_fault(capsys, tmp_pa
     assert run(capsys, "certify", "cta", *gains, "--lipschitz", "0", "--out", str(out))[0] == 0
     code, said, _ = run(capsys, "check", str(out), "--fault", "lab-fault")
     assert code == 1
-    assert "must hold 0 inside" in said
+    assert "must contain 0 in its interior" in said
 
 
 def test_a_path_that_no_system_accepts_is_one_line(capsys):

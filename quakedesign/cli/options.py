@@ -602,12 +602,12 @@ def surroundings(
     If none are given, they are the stages for which a sampled law is designed, with the substeps that these need, and
     the noise of its certificate.
     """
-    from quakedesign.simulation.run_settings import own_path
+    from quakedesign.simulation.run_settings import designed_path
 
     chain, seen = actuator.build(step, seed), sensors.build(step, seed)
     if chosen is None:
         return run.substeps, chain, seen
-    meant, substeps = own_path(chosen.controller, None, run.substeps)
+    meant, substeps = designed_path(chosen.controller, None, run.substeps)
     return substeps, chain.completed(meant) if meant else chain, seen if seen.noisy else chosen.noise(seed)
 
 

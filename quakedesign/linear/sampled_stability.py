@@ -36,7 +36,7 @@ from quakedesign.linear.linear_problem import (
     transpose,
 )
 from quakedesign.lyapunov import Verdict
-from quakedesign.sos.solve.conic import hand_back, handing_back
+from quakedesign.sos.solve.conic import collecting, record
 
 # ----------------------------------------------------------------------
 # The sampled law with arbitrarily time-varying parameters: one quadratic V and Wirtinger's inequality, exact.
@@ -137,7 +137,7 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
 
 def proposed(programme: Callable[..., list[Rows]], *question: object) -> list[Rows]:
     """Solution proposed by a programme, cached; it is solved only where the caller waits for it."""
-    if handing_back():
+    if collecting():
         return programme(*question)
     return list(search_once(lambda: programme(*question), programme.__module__, *question))
 
@@ -170,7 +170,7 @@ def solved(program: Any, margin: Any) -> bool:
     """Whether a solver finds a solution with a margin; after a breakdown, retried with firmer factorisations."""
     import cvxpy as cp
 
-    hand_back(program)
+    record(program)
     for settings in ({}, {"static_regularization_constant": 1e-7}):
         try:
             with warnings.catch_warnings():

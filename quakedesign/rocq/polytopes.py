@@ -39,7 +39,7 @@ def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
     """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
     task, loop, reach = claim.task, claim.held, claim.reach
     if loop.longest_step:
-        raise UnsupportedError("Rocq verifies the stick-slip loop for periodic sampling alone. Use the two checkers")
+        raise UnsupportedError("Rocq verifies only periodic sampling. Received aperiodic sampling. Use check.py.")
     with ctx.workprec(BITS):
         push, moved = _outward(*pushes(task, loop, reach)), task.reference_rates[0] * loop.step
         bounds = ranges(task, reach.box[0] + moved, push, reach.box[1] * loop.step)
@@ -133,7 +133,7 @@ def _terms(period: Period) -> str:
             return f"{terms} {n}"
         x, y, terms = y / terms, (s * x - w * y) / terms, terms + 1
     raise UnsupportedError(
-        "T_s is too long against the plant for polynomials of its impulse responses in a file for coqc"
+        f"T_s = {float(step):g} s is too long for Rocq: impulse responses exceed {_MOST_TERMS} terms. Use check.py."
     )
 
 

@@ -84,7 +84,7 @@ def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> d
     for path in paths:
         target = folder / f"{module_name(path.stem)}.v"
         if target in targets.values():
-            raise OutputError(f"files for coqc must differ in name. Received {target} twice. Write one by one.")
+            raise OutputError(f"files for coqc must differ in name. Received {target} twice. Use two folders.")
         if target.exists() and not force:
             raise OutputError(
                 f"file for coqc must be new. Received {target}, which exists. Give --force to replace it."
@@ -122,7 +122,7 @@ def library(names: Sequence[str] = _LIBRARY) -> list[str]:
     for place in places:
         if place.is_dir():
             return [(place / name).read_text(encoding="utf-8") for name in names]
-    raise UnsupportedError(f"the Rocq library must be in {places[0]}. Found nothing. Install the package again.")
+    raise UnsupportedError(f"the Rocq library must be in {places[0]}. Received none. Install quakedesign again.")
 
 
 def _stick_slip(raw: object) -> Iterator[str]:
@@ -138,7 +138,7 @@ def _polynomial(raw: object) -> Iterator[str]:
     elif isinstance(proof, SumOfSquares):
         yield from _nonnegative(statement, proof)
     else:
-        raise UnsupportedError(f"{_KINDS} Received not-sos. Use check.py.")
+        raise UnsupportedError(f"{_KINDS} Received kind not-sos. Use check.py.")
 
 
 def _negative(statement: Statement, proof: Point) -> Iterator[str]:
@@ -167,7 +167,7 @@ def _nonnegative(statement: Statement, proof: SumOfSquares) -> Iterator[str]:
 def _attraction(raw: object) -> Iterator[str]:
     claim = read_attraction_file(raw)
     if not isinstance(claim.proof, LyapunovProof):
-        raise UnsupportedError(f"{_KINDS} Received a point that refutes an attraction. Use check.py.")
+        raise UnsupportedError(f"{_KINDS} Received a refutation of an attraction. Use check.py.")
     yield f"(* variables 0, 1, ...: {', '.join(claim.variables)} *)"
     yield "(* V, and minus its derivative where V is at most the level *)"
     parts = ((claim.positive, claim.proof.positive), (claim.decrease, claim.proof.decrease))
@@ -204,7 +204,7 @@ def _part(statement: Statement, proof: SumOfSquares | Witness, check: str, tail:
 
 def _loop(raw: object) -> Iterator[str]:
     if isinstance(raw, dict) and ("kind" in raw or "refutation" in raw):
-        raise UnsupportedError(f"{_KINDS} Received a {raw.get('kind', 'refutation')}. Use check.py.")
+        raise UnsupportedError(f"{_KINDS} Received kind {raw.get('kind', 'refutation')}. Use check.py.")
     evidence = evidence_of(raw)
     names = []
     for number, (name, text) in enumerate(_obligations(evidence)):

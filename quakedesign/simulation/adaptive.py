@@ -31,7 +31,7 @@ def require_smooth(recorder: Recorder, method: str) -> None:
             "dormand-prince or rk4."
         )
     if type(recorder.scheme).rates is Scheme.rates:
-        raise ParameterError(f"{text} the scheme {recorder.scheme.name}, which holds the pressure in steps. {remedy}")
+        raise ParameterError(f"{text} the scheme {recorder.scheme.name}, with zero-order hold. {remedy}")
     if loop.controller is not None and not _lipschitz(loop):
         raise ParameterError(f"{text} the discontinuous law {loop.controller.name}. {remedy}")
 
@@ -80,7 +80,7 @@ def smooth_march(
             except StoppedError as error:
                 if count == 1:
                     raise SimulationError(
-                        f"{method.name} cannot go on after t = {now.counter * recorder.step:.6g} s ({error}). "
+                        f"{method.name} stopped at t = {now.counter * recorder.step:.6g} s ({error}). "
                         "Loosen rtol, or use a fixed step: method dormand-prince."
                     ) from None
                 count = max(1, count // _FEWER)

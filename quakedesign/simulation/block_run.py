@@ -19,7 +19,7 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 
 MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 SUBSTEPS = 8
-"""Steps of one period; halving them moves errors in proportion."""
+"""Default substeps of one period; errors are proportional to their length."""
 _POINTS = 1000
 _MOST_PERIODS = 5 * 10**7
 
@@ -122,7 +122,7 @@ class _Period:
         chain, fault, law = self.chain, self.chain.fault, self.law
         N = len(chain.blocks)
         parts = [ca.SX.sym(name, size) for name, size in self.sizes]
-        x, v, z, q, _, count, worst, rate, peak, rest, room = parts
+        x, v, z, q, _, count, worst, rate, peak, rest, margins = parts
         step, h = float(law.step), float(law.step) / self.substeps
         pressures, flow = np.array(chain.pressures, dtype=float), np.array(chain.flow, dtype=float)
         slow, columns = len(flow), pressures.shape[1]
@@ -143,19 +143,19 @@ class _Period:
         static = friction(ca.SX.zeros(N), ca.SX.zeros(N))
         for k in range(self.substeps):
             time = began + k * h
-            pushed = kicked.constant + kicked.amplitude * ca.sin(kicked.frequency * time + phases)
+            disturbance = kicked.constant + kicked.amplitude * ca.sin(kicked.frequency * time + phases)
             after = ca.mtimes(through[:slow], ca.vertcat(q, p))  # zero-order hold of p
             acting, q = ca.mtimes(pressures, ca.vertcat((q + after) / 2, p)), after
             strength = fault.authority * friction(x, v) * (stress - acting)
             drive = fault.authority * static * stress - fault.specific_stiffness * x + ca.mtimes(pulls, x)
-            drive += pushed + kicked.slip_growth * x + (kicked.rate_growth - fault.specific_damping) * v
+            drive += disturbance + kicked.slip_growth * x + (kicked.rate_growth - fault.specific_damping) * v
             v = ca.fmax(v + h * (drive - strength), 0)
             x = x + h * v
             r, moved = reference(chain, time + h)
             worst, rate = ca.fmax(worst, ca.fabs(x - r)), ca.fmax(rate, ca.fabs(v - moved))
             peak, rest = ca.fmax(peak, v), rest + (v <= 0) / self.substeps
-            room = ca.fmin(room, ca.vertcat(ca.mmin(drive + strength), ca.mmin(stress - acting)))
-        last = [x, v, z, q, p, count + 1, worst, rate, peak, rest, room]
+            margins = ca.fmin(margins, ca.vertcat(ca.mmin(drive + strength), ca.mmin(stress - acting)))
+        last = [x, v, z, q, p, count + 1, worst, rate, peak, rest, margins]
         return ca.Function("period", [ca.vertcat(*parts)], [ca.vertcat(*last)])
 
     @property
@@ -171,7 +171,7 @@ class _Period:
             ("p", m),
             ("count", 1),
             *of_blocks,
-            ("room", 2),
+            ("margins", 2),
         )
 
 
@@ -207,7 +207,7 @@ def simulate_blocks(
         For friction with healing, for substeps outside 1 to 1000, and for a run that overflows.
     """
     if any(block.friction.rest_excess for block in chain.blocks):
-        raise ParameterError("a run of several blocks has no healing. Received friction with it. Set healing to 0.")
+        raise ParameterError("a run of several blocks has no healing. Received a healing law. Set healing to 0.")
     step, periods = float(law.step), whole_periods(chain, law.step, duration)
     if not 1 <= substeps <= 1000:
         raise ParameterError(f"substeps must be 1 to 1000. Received {substeps}.")
@@ -219,18 +219,18 @@ def simulate_blocks(
     ends = np.cumsum([0, *(size for _, size in period.sizes)])
     place = {name: slice(*ends[i : i + 2]) for i, (name, _) in enumerate(period.sizes)}
     now = np.zeros(ends[-1])
-    now[place["room"]] = np.inf
+    now[place["margins"]] = np.inf
     seen = []
     for size in sizes:
         now[place["peak"]] = 0
         now = np.array(many[size](now)).ravel()
         seen.append(now.copy())
         if not np.isfinite(now[place["x"]]).all():
-            raise ParameterError("a run must stay finite. Received one that overflows. Change the law.")
+            raise ParameterError("a run must stay finite. Received one that overflows. Reduce the gains of the law.")
     kept = np.array(seen)
     times = kept[:, place["count"]].ravel() * step
     task = chain.fault.reference
-    least = kept[-1, place["room"]]
+    least = kept[-1, place["margins"]]
     return BlockRun(
         times=times,
         slip=kept[:, place["x"]],

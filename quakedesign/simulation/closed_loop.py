@@ -490,13 +490,13 @@ class ClosedLoop(Metered):
 
         if times == 1:
             return once(self, lambda plant, passed, now: motion(plant, passed, now, given), *start)
-        carried = *start, ca.SX(0), given, _column(self.factors)
-        before, so_far, number, told, factors = (ca.SX.sym("z", part.shape[0]) for part in carried)
+        initial = *start, ca.SX(0), given, _column(self.factors)
+        before, so_far, number, inputs, factors = (ca.SX.sym("z", part.shape[0]) for part in initial)
         loop = self.with_factors(tuple(ca.vertsplit(factors)))
-        moved = once(loop, lambda plant, passed, now: motion(plant, number + passed, now, told), before, so_far)
-        after = ca.vertcat(*moved, number + 1, told, factors)
-        substep = ca.Function("substep", [ca.vertcat(before, so_far, number, told, factors)], ca.cse([after]))
-        end = substep.fold(times, {"never_inline": True})(ca.vertcat(*carried))
+        moved = once(loop, lambda plant, passed, now: motion(plant, number + passed, now, inputs), before, so_far)
+        after = ca.vertcat(*moved, number + 1, inputs, factors)
+        substep = ca.Function("substep", [ca.vertcat(before, so_far, number, inputs, factors)], ca.cse([after]))
+        end = substep.fold(times, {"never_inline": True})(ca.vertcat(*initial))
         first, last = before.shape[0], before.shape[0] + so_far.shape[0]
         return end[:first], end[first:last]
 
@@ -591,8 +591,8 @@ class ClosedLoop(Metered):
     @property
     def shaking(self) -> dict[sp.Symbol, sp.Expr]:
         """φ̂_e and the far end's load [m/s²] in x1, x2 and t, inserted last: in a sum a tiny constant would be lost."""
-        push = self.load.push(self.fault) * (symbol("stiffness") if self.factors else 1)
-        return {phi: self.disturbance + push}
+        loading = self.load.push(self.fault) * (symbol("stiffness") if self.factors else 1)
+        return {phi: self.disturbance + loading}
 
     @property
     def disturbance(self) -> sp.Expr:

@@ -365,14 +365,14 @@ FUNCTIONS: dict[int, Callable[..., ca.SX]] = {
     ca.OP_FMIN: fmin,
     ca.OP_FLOOR: floor,
 }
-"""What stands for CasADi's operations of these codes."""
+"""Names of the portable functions that replace CasADi's operations, by their codes."""
 
 
 # ----------------------------------------------------------------------
 # Instructions of CasADi Functions of scalar operations, and the functions that they call.
 
 _WRITTEN_OUT = 60
-"""Instructions of an elementary function, on the average of a step."""
+"""Instructions of an elementary function, averaged over a step."""
 
 
 class NotPortableError(ValueError):
@@ -612,7 +612,7 @@ def declared(
 
 
 @cache
-def in_place_of_the_library() -> str:
+def portable_library() -> str:
     """Text before CasADi's C that replaces calls of the C library by the portable functions."""
     names = {FUNCTIONS[code].__name__: code for code in FUNCTIONS if code != ca.OP_POW}
     called = {"power": "pow"}
@@ -627,16 +627,16 @@ FLAGS = (
     *("-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
     *("-fPIC", "-fvisibility=hidden", "-shared"),  # only hidden functions are inlined
 )
-"""None of them changes a digit."""
+"""Compiler options that leave all results bitwise unchanged."""
 RADIX = 64
 LEVELS = 3
 _LONGEST_COMPILATION = 120
 _WORTH = 100_000_000
-"""Instructions of a whole run from which on a compiler, which takes some 0.3 s, saves time."""
+"""Least number of instructions of a run for which compilation, which takes 0.3 s, saves time."""
 
 
 STEP = "quakedesign_step"
-"""Name of a step function: in a library that is loaded, that of a function of the C library would be taken for it."""
+"""Name of a step function; it differs from all names of the C library, which take precedence when a library loads."""
 
 MachineCode = Callable[[Any, int], int]
 
@@ -671,7 +671,7 @@ def prepare(step: ca.Function, compiled: bool | None, steps: int) -> Backend:
         If compilation is requested and not possible.
     """
     if compiled is False:
-        return _virtual_machine(step, "asked for")
+        return _virtual_machine(step, "requested")
     if compiled is None and steps * expanded_size(step) < _WORTH:
         return _virtual_machine(step, "the run is shorter than a compilation")
     try:
@@ -713,7 +713,7 @@ def _source(step: ca.Function) -> str:
         "arguments": step.sz_arg(),
         "results": step.sz_res(),
     }
-    return in_place_of_the_library() + str(generator.dump()) + c_file("steps.c", **sizes)
+    return portable_library() + str(generator.dump()) + c_file("steps.c", **sizes)
 
 
 def compiler() -> tuple[str, ...]:
@@ -738,10 +738,10 @@ def compiler() -> tuple[str, ...]:
 @lru_cache(maxsize=32)
 def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
     """Compile and load the loop of a C source; the library stays in memory after its file is deleted."""
-    asked = text.encode(), repr((*command, *FLAGS, *_identity(command[0]))).encode()
+    key = text.encode(), repr((*command, *FLAGS, *_identity(command[0]))).encode()
     with temporary_folder() as folder:
         library = folder / "kept.so"
-        library.write_bytes(once("code", lambda: shared_library(text, folder, command).read_bytes(), *asked))
+        library.write_bytes(once("code", lambda: shared_library(text, folder, command).read_bytes(), *key))
         advance: Any = ctypes.CDLL(str(library)).advance
     advance.argtypes, advance.restype = [ctypes.c_void_p, ctypes.c_longlong], ctypes.c_int
     return cast(MachineCode, advance)
@@ -759,8 +759,8 @@ def compilation() -> str:
 def _identity(program: str) -> tuple[str, int, int]:
     """Path, size and modification time of a program, which differ between compilers."""
     path = Path(program).resolve()
-    told = path.stat()
-    return str(path), told.st_size, told.st_mtime_ns
+    status = path.stat()
+    return str(path), status.st_size, status.st_mtime_ns
 
 
 def shared_library(text: str, folder: Path, command: tuple[str, ...], flags: tuple[str, ...] = ()) -> Path:
@@ -784,7 +784,7 @@ def _run(call: list[str], folder: Path) -> None:
         call, stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, env=where, start_new_session=True
     ) as process:
         try:
-            said = process.communicate(timeout=_LONGEST_COMPILATION)
+            output = process.communicate(timeout=_LONGEST_COMPILATION)
         except BaseException:
             if hasattr(os, "killpg"):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -792,13 +792,13 @@ def _run(call: list[str], folder: Path) -> None:
                 process.kill()
             raise
     if process.returncode:
-        raise subprocess.CalledProcessError(process.returncode, call, *said)
+        raise subprocess.CalledProcessError(process.returncode, call, *output)
 
 
 def _reason(error: Exception) -> str:
     if isinstance(error, subprocess.CalledProcessError):
-        said = error.stderr.decode(errors="replace").strip().splitlines()
-        return f"the C compiler failed: {said[0] if said else f'exit code {error.returncode}'}"
+        lines = error.stderr.decode(errors="replace").strip().splitlines()
+        return f"the C compiler failed: {lines[0] if lines else f'exit code {error.returncode}'}"
     return (str(error) or type(error).__name__).splitlines()[0]
 
 
@@ -807,20 +807,20 @@ def _reason(error: Exception) -> str:
 
 LANES = 16
 LANE_FLAGS = ("-fno-tree-pre", "-fno-thread-jumps")
-"""What lets a compiler choose between values instead of branching; none of it changes a digit."""
+"""Options with which a compiler selects values instead of branching; results are bitwise unchanged."""
 _WIDE = {"__AVX512F__": ("-mavx512f", "-mprefer-vector-width=512"), "__AVX2__": ("-mavx2",)}
-_LONGEST_QUESTION = 10
+_LONGEST_QUERY = 10
 
 
 @lru_cache(maxsize=4)
 def processor_flags(command: tuple[str, ...]) -> tuple[str, ...]:
     """Compiler flags for the widest vectors of this processor; empty if the compiler does not report them."""
-    question = [*command, "-march=native", "-dM", "-E", "-x", "c", "-"]
+    query = [*command, "-march=native", "-dM", "-E", "-x", "c", "-"]
     try:
-        told = subprocess.run(question, input="", capture_output=True, text=True, timeout=_LONGEST_QUESTION, check=True)
+        reply = subprocess.run(query, input="", capture_output=True, text=True, timeout=_LONGEST_QUERY, check=True)
     except (OSError, subprocess.SubprocessError, UnicodeError):
         return ()
-    macros = told.stdout.split()
+    macros = reply.stdout.split()
     return next((flags for macro, flags in _WIDE.items() if macro in macros), ())
 
 

@@ -14,7 +14,7 @@ extern "C" {
 /* Memory before the first call. */
 void controller_reset(double* memory);
 
-/* One sample: measurement${told} in, memory updated, pressure [Pa] out.${about} */
+/* One sample: measurement${inputs} in, memory updated, pressure [Pa] out.${about} */
 void controller_step(const double* measurement, ${applied}double* memory, double* pressure);
 
 #ifdef __cplusplus

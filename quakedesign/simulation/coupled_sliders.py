@@ -181,9 +181,9 @@ class CoupledSliders:
         found = ca.Function("rates", [y, load], [ca.densify(self.field(y, load))])
         if N > MOST_EXPANDED:
             return found
-        state, told = ca.SX.sym("y", y.size1()), ca.SX.sym("load", load.size1())
-        field = ca.cse([found(state, told)])[0]
-        return ca.Function("rates", [state, told], [field, ca.jacobian(field, state)])
+        state, loading = ca.SX.sym("y", y.size1()), ca.SX.sym("load", load.size1())
+        field = ca.cse([found(state, loading)])[0]
+        return ca.Function("rates", [state, loading], [field, ca.jacobian(field, state)])
 
     def resisting(self, y: "np.ndarray") -> "np.ndarray":
         """Nμ + Hv [Pa] of every block."""
@@ -349,14 +349,14 @@ def simulate_sliders(
     prestress = tuple(sliders.resisting(start)) if sliders.mass else ()
     scales = np.array([*slips, *[1.0] * (2 * N), *[_SMALL] * n])
     level = math.log(onset_rate) if math.isfinite(onset_rate) else math.inf
-    told = tuple(inputs[0][1]) if inputs else ()
-    problem = SmoothProblem(sliders.rates(len(told)), scales, slice(N, 2 * N), level)
+    held = tuple(inputs[0][1]) if inputs else ()
+    problem = SmoothProblem(sliders.rates(len(held)), scales, slice(N, 2 * N), level)
     breaks = {float(time) for time, _ in inputs if 0 < time < duration}
     breaks |= {i * _LONGEST for i in range(1, math.ceil(duration / _LONGEST))}
     y, pieces, crossings, evaluations = start, list[tuple[np.ndarray, np.ndarray]](), [], 0
     for now, end in pairwise((0.0, *sorted(breaks), duration)):
-        told = next((tuple(u) for time, u in reversed(inputs) if time <= now), told)
-        load = (loading_rate, 0.0, 0.0, *prestress, *told)
+        held = next((tuple(u) for time, u in reversed(inputs) if time <= now), held)
+        load = (loading_rate, 0.0, 0.0, *prestress, *held)
         ramp = Ramp(now, load, (0.0,) * len(load))
         instants = np.array([now, *(time for time in times if now < time < end), end])
         part = problem.integrate(y, ramp, instants, every_step=not len(times), method=method, rtol=rtol)
@@ -471,11 +471,11 @@ def simulate_held_blocks(
     y = sliders.start([V] * N, [float(one.steady_state(V)[0]) for one in sliders.laws])
     prestress = sliders.resisting(y)
     y = sliders.stressed(y, stress * np.sin(phases))
-    time, told, state = ca.MX.sym("t"), ca.MX.sym("told", m), ca.MX.sym("y", len(y))
+    time, held, state = ca.MX.sym("t"), ca.MX.sym("told", m), ca.MX.sym("y", len(y))
     planned = per_slip * course.slip(time)
-    load = ca.vertcat(0, planned, ca.jacobian(planned, time), ca.DM(prestress) if inertia else ca.MX(0, 1), told)
-    pushed = stress * ca.sin(turn * time + ca.DM(phases)), stress * turn * ca.cos(turn * time + ca.DM(phases))
-    rates = ca.Function("rates", [time, state, told], [ca.densify(sliders.field(state, load, *pushed))])
+    load = ca.vertcat(0, planned, ca.jacobian(planned, time), ca.DM(prestress) if inertia else ca.MX(0, 1), held)
+    stresses = stress * ca.sin(turn * time + ca.DM(phases)), stress * turn * ca.cos(turn * time + ca.DM(phases))
+    rates = ca.Function("rates", [time, state, held], [ca.densify(sliders.field(state, load, *stresses))])
     slips = [float(one.critical_slip) for one in sliders.laws]  # type: ignore[attr-defined]
     scales = [*slips, *[1.0] * (2 * N), *[MPA] * m]
     flow = adaptive_integrators()["cvodes"].flow(rates.expand(), scales, _SHARES, rtol=_TIGHT)

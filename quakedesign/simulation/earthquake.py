@@ -100,8 +100,8 @@ def _with_peak(earthquake: LoopTrajectory, fault: Fault, growth: float) -> LoopT
     peak = earthquake.metrics.peak_slip_rate  # None if the run diverges
     if peak is not None and peak <= STILL * event_nudge(fault) / growth:
         raise SimulationError(
-            f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but its simulation does not move: its peak is "
-            f"{peak!r} m/s. Rounding may drown its friction; check the numbers of the law."
+            f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but it stays at rest in simulation: the peak is "
+            f"{peak!r} m/s. Rounding may hide its friction; check the parameters of the friction law."
         )
     return replace(earthquake, criterion=OutcomeCriterion.of(fault, peak))
 

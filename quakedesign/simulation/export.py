@@ -39,27 +39,27 @@ SOURCE, HEADER = "controller.c", "controller.h"
 _WIDTH = 110
 _USE = """
 Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS
-numbers{told}, updates CONTROLLER_MEMORY numbers, and writes {written} to hold until the next call (zero-order hold).
+numbers{inputs}, updates CONTROLLER_MEMORY numbers, and writes {written} to hold until the next call (zero-order hold).
 {limited} The reference of
-the fault is computed from the number of calls. The functions keep nothing between calls but the memory they are given,
+the fault is computed from the number of calls. The functions have no state between calls except the memory argument,
 allocate nothing, and may be called from several threads with different memories. Numbers that
-are not finite are not caught: check measurement and pressure.
+are not finite are not detected: check measurement and pressure.
 """
 _USE_OF_ONE = {
-    "told": " and the pressure [Pa] that was applied since the last call",
+    "inputs": " and the pressure [Pa] that was applied since the last call",
     "written": "the fluid pressure [Pa]",
-    "limited": "Where pump or valve limit the pressure, pass the applied one: the law then does not wind up, as in "
-    "simulate --saturation; else pass a null pointer.",
+    "limited": "If pump or valve limit the pressure, give the applied pressure to prevent windup of the law, as in "
+    "simulate --saturation; else give a null pointer.",
 }
 _PLAN = "planned pressure"  # fact that only laws of blocks in slow sliding have
 _USE_OF_WELLS = {
-    "told": "",
-    "written": "the fluid pressure [Pa]{beside} of CONTROLLER_PRESSURES wells",
-    "limited": "{plan}Where pump or valve limit a pressure, the law winds up: they must allow the proved pressures.",
+    "inputs": "",
+    "written": "the fluid pressure [Pa] of CONTROLLER_PRESSURES wells{beside}",
+    "limited": "{plan}If pump or valve limit a pressure, the law winds up: proved pressures must be within the limits.",
 }
 _ADDED = """Add the planned pressure (below) to each, continuously in time and not in steps: the proof assumes that the
-plan reaches the fault unchanged, while the pressure written here passes through the lag of the proof. """
-_TOLD_TO_IT = " and the pressure [Pa] applied since the last call"
+planned pressure reaches the fault unchanged, and that the pressure written here passes the proved lag. """
+_APPLIED_INPUT = " and the pressure [Pa] applied since the last call"
 _APPLIED = """
    applied may be a null pointer: then it was the pressure of the last call. Before the first call it is 0."""
 _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
@@ -121,8 +121,8 @@ def header_text(exported: ControllerStep) -> str:
     kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
     facts = (f"{name}: {value}" for name, value in exported.facts.items())
     parts = [part for remark in exported.remarks for part in (*_wrapped(remark), "")]
-    own = {"beside": "", "plan": ""} if _PLAN not in exported.facts else {"beside": " beside the plan", "plan": _ADDED}
-    of_wells = {name: text.format(**own) for name, text in _USE_OF_WELLS.items()}
+    added = {"beside": ", in addition to the planned pressure,", "plan": _ADDED} if _PLAN in exported.facts else {}
+    of_wells = {name: text.format(**{"beside": "", "plan": ""} | added) for name, text in _USE_OF_WELLS.items()}
     lines = [
         *parts,
         "A sampled controller for a fault, in SI units.",
@@ -134,11 +134,11 @@ def header_text(exported: ControllerStep) -> str:
         *measured,
         *kept,
     ]
-    comment = _comment([*lines, "", "Where it comes from:", *facts])
+    comment = _comment([*lines, "", "Provenance:", *facts])
     sizes = {"step": repr(exported.step), "measurements": len(exported.measurement), "memory": len(exported.start)}
-    entries = dict.fromkeys(("applied", "told", "about"), "")
+    entries = dict.fromkeys(("applied", "inputs", "about"), "")
     if exported.limited:
-        entries = {"applied": "const double* applied, ", "told": _TOLD_TO_IT, "about": _APPLIED}
+        entries = {"applied": "const double* applied, ", "inputs": _APPLIED_INPUT, "about": _APPLIED}
     return comment + c_file(
         "controller.h", **sizes, pressures=len(exported.pressures), limited=int(exported.limited), **entries
     )
@@ -212,7 +212,7 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
 def _binary(sources: dict[str, str]) -> tuple[dict[str, bytes], str]:
     """Compiled interface for this platform, if a compiler works."""
     if platform.system() not in _PLATFORMS or platform.machine() not in {"x86_64", "AMD64"}:
-        return {}, "sources only: this platform has no name in FMI 2.0 that is built here"
+        return {}, "sources only: no binary of FMI 2.0 is built for this platform"
     name, suffix = _PLATFORMS[platform.system()]
     try:
         with temporary_folder() as folder:
@@ -267,7 +267,7 @@ def _zipped(members: dict[str, bytes]) -> bytes:
 
 FILES = (HEADER, SOURCE, UNIT)
 HELD = "held_0"  # memory entry: the pressure of the last sample
-_TOLD = ("gains", "sampling")  # written in another form
+_LISTED_APART = ("gains", "sampling")  # written in another form
 
 
 def controller_step(
@@ -424,14 +424,14 @@ def require_free(folder: Path, force: bool) -> None:
             f"the folder of an export must be new. Received {folder}, which exists. Give --force to replace it."
         )
     if os.path.exists(folder) and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= set(FILES)):
-        raise OutputError(f"only a folder with {', '.join(FILES)} is replaced. Received {folder}. Choose another.")
+        raise OutputError(f"only a folder with {', '.join(FILES)} is replaced. Received {folder}. Choose a new folder.")
     require_room(folder)
 
 
 def _software(scheme: Scheme) -> Sampled:
     """Scheme without noise, transducer and substeps; rejects a scheme that a controller cannot execute."""
     if not isinstance(scheme, Sampled):
-        raise ParameterError(f"a controller is exported with a scheme that samples. Received {scheme.name}.")
+        raise ParameterError(f"a controller is exported with a sampled scheme. Received {scheme.name}. Use explicit.")
     if scheme.actuator.flowing:
         names = ", ".join(stage.name for stage in scheme.actuator.flowing)
         raise ParameterError(
@@ -457,10 +457,10 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     applied, entries = ca.SX.sym("applied"), iter(ca.vertsplit(memory))
     counter = next(entries)
     own = [next(entries) if c else ca.SX(v) for v, c in zip(values, changing, strict=True)]
-    push, *before = entries if count else (ca.SX(0),)
-    asked, own[names.index(HELD)] = own[names.index(HELD)], applied
+    change, *before = entries if count else (ca.SX(0),)
+    commanded, own[names.index(HELD)] = own[names.index(HELD)], applied
     for i in range(count):  # anti-windup, which `Sampled` does within a sample, where it knows the limit
-        own[i] = ca.if_else((asked - applied) * push > 0, before[i], own[i])
+        own[i] = ca.if_else((commanded - applied) * change > 0, before[i], own[i])
     state = ca.vertcat(measurement, ca.SX(2 - measured, 1), *own)
     moved = _after(loop, scheme, counter, state, step)
     later = [counter + 1, *(moved[i] for i, c in enumerate(changing) if c)]
@@ -479,7 +479,7 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
     own = controller.sampling
     path = {"a delay of": own.delay, "a lag of": own.lag, "a diffusion path of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
-    behind = f"designed for {between} between controller and fault: the pressure is that commanded at the valve"
+    behind = f"designed for {between} between controller and fault: the pressure is the command to the valve"
     by_a_clock = (
         f"to be called periodically, once every {float(own.step):.6g} s, since the reference counts the calls; "
         "aperiodic sampling, for which it is proved, includes this"
@@ -492,7 +492,7 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
 
 def _facts(fault: Fault, controller: Controller, scheme: Sampled) -> dict[str, str]:
     gains = {f"gain {n}": f"{v} {controller.gain_units[n]}" for n, v in controller.gains.items()}
-    rest = {f.name: _text(getattr(controller, f.name)) for f in fields(controller) if f.name not in _TOLD}
+    rest = {f.name: _text(getattr(controller, f.name)) for f in fields(controller) if f.name not in _LISTED_APART}
     entries = {"fault": fault.name, "law": controller.title, "source": controller.source, **gains, **rest}
     entries |= {"scheme": scheme.name} | {name: str(value) for name, value in scheme.settings.items()}
     return entries | library_versions("quakedesign", "casadi")

@@ -191,7 +191,7 @@ NO_STATUS(Integer, fmi2Integer)
 NO_STATUS(Boolean, fmi2Boolean)
 NO_STATUS(String, fmi2String)
 EXPORTED fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind asked, fmi2Real* value) {
-  if (asked != fmi2LastSuccessfulTime) return refuse(c, "only the last successful time is told");
+  if (asked != fmi2LastSuccessfulTime) return refuse(c, "only the last successful time is available");
   *value = ((Unit*)c)->state.time;
   return fmi2OK;
 }

@@ -54,8 +54,8 @@ def perturbation(text: str) -> "sp.Expr":
         tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise _refusal(text, text) from None
-    if sum(1 for _ in ast.walk(tree)) > MOST_NODES:
-        raise ParameterError(f"a perturbation must be short, {MOST_NODES} terms at most. Received more. Shorten it.")
+    if (nodes := sum(1 for _ in ast.walk(tree))) > MOST_NODES:
+        raise ParameterError(f"a perturbation must be short, {MOST_NODES} terms at most. Received {nodes}. Shorten it.")
     expression = _value(tree.body, text.strip())
     if not all(part.is_real and part.is_finite for part in sp.preorder_traversal(expression) if part.is_number):
         raise _refusal(text, text)
@@ -139,8 +139,8 @@ class PressureCourse:
     def __post_init__(self) -> None:
         if not 0 < len(self.times) == len(self.pressures) <= MOST_POINTS:
             raise ParameterError(
-                f"a course of pressure must have 1 to {MOST_POINTS} instants, each with a pressure. "
-                f"Received {len(self.times)} and {len(self.pressures)}. Leave out those on a straight line."
+                f"a course of pressure must have 1 to {MOST_POINTS} instants, each with a pressure. Received "
+                f"{len(self.times)} times and {len(self.pressures)} pressures. Omit instants on a straight line."
             )
         if not all(map(is_finite, (*self.times, *self.pressures))):
             wrong = next(value for value in (*self.times, *self.pressures) if not is_finite(value))
@@ -148,7 +148,7 @@ class PressureCourse:
         thrice = any(late <= early for early, late in zip(self.times, self.times[2:], strict=False))
         if thrice or any(late < early for early, late in pairwise(self.times)):
             raise ParameterError(
-                "times of a course of pressure must not descend, and stand twice only where it steps. "
+                "times of a course of pressure must ascend, with at most two equal times, for a step. "
                 f"Received {shown(list(self.times))} s. Sort them."
             )
 

@@ -64,7 +64,7 @@ def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters:
     if parameters:
         return _free_plant(fault, controller, tuple(parameters))
     if controller is not None and controller.sampling_time is not None:
-        raise UnsupportedError("a law of samples has no loop in continuous time. Use simulate, or export it.")
+        raise UnsupportedError("a sampled law has no closed loop in continuous time. Use simulate, or export the law.")
     loop = ClosedLoop(fault, controller)
     if controller is None:
         return loop.plant
@@ -84,7 +84,7 @@ def _free_plant(fault: Fault, controller: Controller | None, names: tuple[str, .
     known = (*plant.PARAMETERS, *fault.friction.quantities())
     if controller is not None:
         raise ParameterError(
-            f"free parameters need a fault without a controller. Received the controller {controller.name}. Omit one."
+            f"free parameters need a fault without a controller. Received the controller {controller.name}. Omit it."
         )
     for name in names:
         if name not in known or names.count(name) > 1:
@@ -202,8 +202,8 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     later = ca.vertcat(after, kept, pressure)
     if ca.depends_on(later, unknown):  # r'', future values of r and r', or B0
         raise UnsupportedError(
-            "a system without a fault knows neither its input gain nor what comes next. Received a law for the scheme "
-            f"{sampling}, which needs them. Use simulate, or export it."
+            "a controller without its fault has neither the input gain nor future references. Received a law whose "
+            f"scheme {sampling} uses them. Use simulate, or export the law."
         )
     used = [i for i in range(len(names)) if ca.depends_on(later, state[i]) and not ca.is_equal(later[i], state[i])]
     fixed = [i for i in range(len(names)) if i not in used]
@@ -293,13 +293,13 @@ def to_statespace(
             "Omit these."
         )
     if setup.delay and setup.step is None:
-        raise ParameterError("a delay needs a step, as a plant in discrete time. Received a delay alone. Give step.")
+        raise ParameterError("a delay needs a step, for discrete time. Received a delay without step. Give step.")
     if vertex:
         A, B = _vertex(fault, tuple(vertex))
     else:
         linear = to_iosystem(fault).linearize([at, 0.0], [pressure])
         A, B = linear.A, linear.B
-    seen, pushed = ["slip", "slip_rate"], ["disturbance"] * disturbance
+    seen, disturbances = ["slip", "slip_rate"], ["disturbance"] * disturbance
     before = Sampling(step=setup.step or Fraction(1), lag=setup.lag, diffusion=setup.diffusion)
     path = _linear(_flow_system(Actuator.meant_for(before)), ("p",))
     n = path.nstates
@@ -307,7 +307,7 @@ def to_statespace(
     B = np.column_stack([np.vstack([B @ path.D, path.B]), np.eye(2 + n)[:, [1] * disturbance]])
     states = [*seen, *(f"path{i + 1}" for i in range(n))]
     plant = control.ss(
-        A, B, np.eye(2, 2 + n), np.zeros((2, B.shape[1])), name=fault.name, inputs=["p", *pushed], outputs=seen,
+        A, B, np.eye(2, 2 + n), np.zeros((2, B.shape[1])), name=fault.name, inputs=["p", *disturbances], outputs=seen,
         states=states,
     )  # fmt: skip
     return plant if setup.step is None else _held(plant, setup.step, setup.delay)
@@ -367,7 +367,7 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     import control
 
     law = _linear(to_iosystem(controller.while_moving), ("slip", "slip_rate"))
-    late, flowing = _between(controller, actuator)
+    late, flowing = _delay_and_stages(controller, actuator)
     plant, before = to_statespace(fault, at), _linear(_flow_system(flowing), ("p",))
     plant = plant * before if before.nstates else plant  # an actuator without states has gain 1
     if controller.sampling is not None:
@@ -425,20 +425,20 @@ def loop_margins(loop: Any) -> LoopMargins:
         )
     if (loop.ninputs, loop.noutputs) != (1, 1):
         raise ParameterError(
-            f"loop must have one input and one output. Received {loop.ninputs} and {loop.noutputs}. Choose one of each."
+            f"loop must have one input and one output. Received {loop.ninputs} and {loop.noutputs}. Select loop[i, j]."
         )
 
     def stable(factor: float) -> bool:
         poles = control.feedback(factor * loop, 1).poles()
         return bool(np.all(np.abs(poles) < 1) if loop.dt else np.all(poles.real < 0))
 
-    answers = _Answers.of(loop)
+    response = _FrequencyResponse.of(loop)
     return LoopMargins(
         stable=stable(1.0),
         gain_reduction=_edge(stable, 1 / _GAINS),
         gain_margin=_edge(stable, _GAINS),
-        phase_margin=answers.phase_margin,
-        modulus_margin=answers.modulus_margin,
+        phase_margin=response.phase_margin,
+        modulus_margin=response.modulus_margin,
     )
 
 
@@ -456,14 +456,14 @@ def _edge(stable: Callable[[float], bool], factors: "np.ndarray") -> float | Non
 
 
 @dataclass(frozen=True)
-class _Answers:
+class _FrequencyResponse:
     """L on the stability boundary jω, or e^{jω} up to half the sampling frequency, at places x = ln ω."""
 
     loop: Any
     places: "np.ndarray"
 
     @classmethod
-    def of(cls, loop: Any) -> "_Answers":
+    def of(cls, loop: Any) -> "_FrequencyResponse":
         """Frequency response from far below the poles and zeros to far above them."""
         roots = np.concatenate([loop.poles(), loop.zeros()])
         known = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
@@ -493,7 +493,7 @@ class _Answers:
         return min((abs(float(np.degrees(np.angle(-self.at(x))))) for x in crossings), default=None)
 
 
-def _between(controller: Controller, actuator: Actuator | None) -> tuple[Fraction, Actuator]:
+def _delay_and_stages(controller: Controller, actuator: Actuator | None) -> tuple[Fraction, Actuator]:
     """Delay [s] and continuous-time stages between a law and its fault."""
     own = controller.sampling
     if actuator is None:

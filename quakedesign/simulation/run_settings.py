@@ -56,7 +56,7 @@ class RunSetting:
         pace = _positive("step", fault.sampling_time if step is None else step)
         steps = int(rational(length) / rational(pace) + _ALMOST_A_STEP)
         if not 1 <= steps <= MOST_STEPS:
-            raise ParameterError(f"duration must hold 1 to {MOST_STEPS:.0e} steps. Received {steps}. Change the step.")
+            raise ParameterError(f"duration must be 1 to {MOST_STEPS:.0e} steps. Received {steps}. Change the step.")
         require_whole(1, samples=samples)
         start = min(task, length) / 4 if settled_from is None else settled_from
         if not 0 <= start < length:
@@ -107,7 +107,7 @@ def trajectory(
         kept = kept[:, kept[0] * setting.step < watched["diverged"]]
     if not kept.size:
         raise SimulationError(
-            "the loop must have finite values at the start. Received values that are not. Check gains and disturbance."
+            "the loop must have finite initial values. Received infinite or undefined ones. Check gains and load."
         )
     took = {"preparation_seconds": began[1] - began[0], "stepping_seconds": ended - began[1]}
     loop = recorder.loop
@@ -127,7 +127,7 @@ def trajectory(
         columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
     columns["integrals"] = kept[4 : 4 + len(loop.integrals)]
     described = recorder.scheme.described
-    further = {name: (columns.pop(name), *said) for name, said in described.items()}
+    further = {name: (columns.pop(name), *description) for name, description in described.items()}
     return LoopTrajectory(
         **columns,
         actuation=further,
@@ -170,12 +170,12 @@ def sampled_scheme(
         return simulation_scheme(scheme, **settings)
     if settings:
         raise ParameterError(
-            f"a scheme that is no name has its own {', '.join(settings)}. Received both. Set them in the scheme."
+            f"a Scheme object has its own settings. Received also {', '.join(settings)}. Set them in the scheme."
         )
     return scheme
 
 
-def own_path(
+def designed_path(
     controller: Controller | None, actuator: Actuator | None, substeps: int = 1
 ) -> tuple[Actuator | None, int]:
     """Actuator and substeps of a named scheme: as given, else those for which a sampled law is designed."""
@@ -186,7 +186,7 @@ def own_path(
     return meant, max(substeps, min(meant.substeps(float(sampling.step)), MOST_SUBSTEPS))
 
 
-def by_no_clock(
+def with_aperiodic_clock(
     controller: Controller | None, scheme: str | Scheme, step: float | None, numbers: dict[str, Any]
 ) -> tuple[float | None, dict[str, Any]]:
     """Step [s] and numbers of a run; with aperiodic sampling a fraction of the shortest interval, and the intervals.
@@ -237,16 +237,16 @@ def run(
     wanted = instants(setting.steps, setting.samples)
     file = Checkpoint.of(checkpoint, step, start, wanted) if checkpoint else None
     steps = setting.steps * recorder.scheme.settings.get("substeps", 1)
-    asked = stepping.run_question(step, start, wanted, compiled, steps)
-    if file is None and (answer := stepping.recall_run(asked)) is not None:
-        (kept, told), ready = answer, perf_counter()
+    key = stepping.run_key(step, start, wanted, compiled, steps)
+    if file is None and (answer := stepping.recall_run(key)) is not None:
+        (kept, reported), ready = answer, perf_counter()
     else:
         backend = prepare(step, compiled, steps)
         ready = perf_counter()
         kept = march(Advancer.of(backend, start), wanted, recorder.index("diverged"), progress, file)
-        told = {"backend": backend.name, "backend_reason": backend.reason}
-        stepping.keep_run(asked, kept, told)
-    return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | told, (began, ready))
+        reported = {"backend": backend.name, "backend_reason": backend.reason}
+        stepping.store_run(key, kept, reported)
+    return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | reported, (began, ready))
 
 
 def run_adaptive(
@@ -279,13 +279,13 @@ def _step(recorder: Recorder, method: type[Integrator]) -> ca.Function:
 def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveIntegrator]) -> Json:
     controller, load = recorder.loop.controller, recorder.loop.load
     varied = {f"variation_{name}": value for name, value in zip(names(), recorder.loop.factors, strict=False)}
-    pushed: Json = {"drift": load.drift} if load.drift else {}
-    pushed |= {} if load.perturbation is None else {"perturbation": str(load.perturbation)}
+    loading: Json = {"drift": load.drift} if load.drift else {}
+    loading |= {} if load.perturbation is None else {"perturbation": str(load.perturbation)}
     clock = getattr(recorder.scheme, "clock", None)
     if clock:
-        pushed |= {f"{end}_interval": getattr(clock, end) * recorder.step for end in ("shortest", "longest")}
+        loading |= {f"{end}_interval": getattr(clock, end) * recorder.step for end in ("shortest", "longest")}
     starts = zip(("initial_slip", "initial_slip_rate"), recorder.initial, strict=True)
-    pushed |= {name: value for name, value in starts if value}
+    loading |= {name: value for name, value in starts if value}
     return (
         {
             "fault": recorder.loop.fault.name,
@@ -297,7 +297,7 @@ def _provenance(recorder: Recorder, method: type[Integrator] | type[AdaptiveInte
         }
         | recorder.scheme.settings
         | varied
-        | pushed
+        | loading
         | library_versions("casadi", "numpy", "quakedesign")
     )
 

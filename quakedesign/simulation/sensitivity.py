@@ -280,7 +280,7 @@ def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
     if "diverged" in run.events:
         return dict.fromkeys([*errors, "matched_error"] if matched else errors, infinite)
     if None in errors.values():
-        raise SimulationError("a study needs runs that are longer than the time from which errors count.")
+        raise SimulationError(f"a study needs runs of over {metrics.settled_from:g} s. Received {run.time[-1]:g} s.")
     if matched:
         settled = run.time > metrics.settled_from
         assert run.matched_perturbation is not None

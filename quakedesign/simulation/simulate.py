@@ -20,12 +20,12 @@ from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrato
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run_settings import (
     RunSetting,
-    by_no_clock,
+    designed_path,
     loop_class,
-    own_path,
     run,
     run_adaptive,
     sampled_scheme,
+    with_aperiodic_clock,
 )
 from quakedesign.simulation.slow_sliding import PLANTS, simulate_sliding
 from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, Tide
@@ -193,7 +193,7 @@ def simulate(
             )
         require_tolerance(rtol)
         way, period, own = own_way(controller, scheme, step, "continuous")
-        period, own = by_no_clock(controller, way, period, own)
+        period, own = with_aperiodic_clock(controller, way, period, own)
         setting = RunSetting.of(fault, period, duration, samples, settled_from)
         if variation:
             variation.require_within(fault)
@@ -201,9 +201,9 @@ def simulate(
         criterion = OutcomeCriterion.of(fault, natural_peak(fault))
         loop = loop_class(plant)(fault, controller, load=load or Load(), factors=factors)
         require_nonnegative(initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
-        path, parts = own_path(controller, actuator, substeps) if isinstance(way, str) else (actuator, substeps)
-        carried = sampled_scheme(way, parts, path, measurement, **own)
-        recorder = Recorder(loop, carried, setting.step, (float(initial_slip), float(initial_slip_rate)))
+        path, parts = designed_path(controller, actuator, substeps) if isinstance(way, str) else (actuator, substeps)
+        chosen_scheme = sampled_scheme(way, parts, path, measurement, **own)
+        recorder = Recorder(loop, chosen_scheme, setting.step, (float(initial_slip), float(initial_slip_rate)))
         chosen = any_integrator(method)
         if issubclass(chosen, AdaptiveIntegrator):
             return run_adaptive(

@@ -41,12 +41,12 @@ class SlidingRun(LoopTrajectory):
     """
 
     theta: "np.ndarray" = signal("state of friction", "s")
-    asked: "np.ndarray" = signal("pressure commanded in addition to that of the reference", "Pa")
+    asked: "np.ndarray" = signal("feedback pressure commanded in addition to the planned pressure", "Pa")
     stress: "np.ndarray" = signal("shear stress disturbance", "Pa")
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
         """Values, long name and SI unit of every signal of this run, by name."""
-        return super().signals() | {"slip_error": (self.slip - self.reference, "slip less that of the reference", "m")}
+        return super().signals() | {"slip_error": (self.slip - self.reference, "slip error", "m")}
 
 
 def simulate_sliding(
@@ -121,9 +121,9 @@ def simulate_sliding(
     path = PressurePath(lag=lag, diffusion=diffusion, stages=tuple(stages))
     varied = variation or SlidingVariation()
     loop = _Loop.of(fault, path, tide or Tide(), varied, inertia, pressure_per_slip)
-    around = Instruments.of(path, transducer, float(step))
-    rows, events = _followed(loop, law, around, length, method, progress)
-    time, slip, _, log_rate, log_state, asked, pressure = rows.T.copy()
+    instruments = Instruments.of(path, transducer, float(step))
+    rows, events = _followed(loop, law, instruments, length, method, progress)
+    time, slip, _, log_rate, log_state, commanded, pressure = rows.T.copy()
     rate, reference, reference_rate = np.exp(log_rate), loop.reference.slip(time), loop.reference.rate(time)
     friction = loop.slider.readings.map(len(time))(rows[:, 1:5].T, pressure)[0].full().ravel()
     late = time > setting.settled_from
@@ -151,7 +151,7 @@ def simulate_sliding(
         seconds=perf_counter() - began,
     )
     run = SlidingRun(
-        name=f"{fault.name}, held in slow sliding",
+        name=f"{fault.name}, controlled slow sliding",
         time=time,
         slip=slip,
         slip_rate=rate,
@@ -180,7 +180,7 @@ def simulate_sliding(
         }
         | library_versions("casadi", "numpy", "quakedesign"),
         theta=np.exp(log_state),
-        asked=asked,
+        asked=commanded,
         stress=loop.tide.at(time),
     )
     if samples is None:
@@ -238,30 +238,30 @@ class _Loop:
 
     def rates(self) -> ca.Function:
         """CasADi Function (t, y, (held pressure, time of its change, modes)) → dy/dt."""
-        time, y, told = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("told", 2 + len(self.decay))
-        pressure = self.pressure(time, told[0], time - told[1], told[2:], ca.exp)
+        time, y, held = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("told", 2 + len(self.decay))
+        pressure = self.pressure(time, held[0], time - held[1], held[2:], ca.exp)
         turn = 2 * math.pi / self.tide.period
         load = self.tide.amplitude * turn * ca.cos(turn * time + self.tide.phase) / self.slider.stiffness
         field = self.slider.rates(y, ca.vertcat(load, pressure, ca.jacobian(pressure, time)))[0]
-        return ca.Function("rates", [time, y, told], [ca.densify(field)])
+        return ca.Function("rates", [time, y, held], [ca.densify(field)])
 
 
 def _followed(
-    loop: _Loop, law: LinearLaw, around: Instruments, length: float, method: str, progress: Callable[[float], None]
+    loop: _Loop, law: LinearLaw, instruments: Instruments, length: float, method: str, progress: Callable[[float], None]
 ) -> tuple["np.ndarray", dict[str, float]]:
     """Rows of (time, y, commanded pressure, pressure), and the event that ends them: opening or divergence."""
     sizes = [float(loop.slider.law.critical_slip)] * 2 + [1.0, 1.0]  # type: ignore[attr-defined]
     flow = adaptive_integrators()[method].flow(loop.rates(), sizes, _SHARES, rtol=_RTOL)
     own, fed, output = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output))
     z, y, held, modes = np.zeros(len(output)), loop.start, 0.0, np.zeros(len(loop.decay))
-    rows, step = [[0.0, *y, 0.0, 0.0]], around.step
+    rows, step = [[0.0, *y, 0.0, 0.0]], instruments.step
     for k in range(math.ceil(length / step)):
         now = k * step
-        error = around.read(y[0]) - loop.reference.slip(now)
-        asked = float(output @ z) + float(law.feedback[0]) * error
+        error = instruments.read(y[0]) - loop.reference.slip(now)
+        commanded = float(output @ z) + float(law.feedback[0]) * error
         z = own @ z + fed[:, 0] * error
-        acting = around.pump(asked, loop.planned(now))
-        for begin, lasting, changed in around.sections(now, held, acting):
+        acting = instruments.pump(commanded, loop.planned(now))
+        for begin, lasting, changed in instruments.sections(now, held, acting):
             before, after = (loop.pressure(begin, p, 0.0, modes) for p in (held, changed))
             if after >= loop.slider.normal_stress:
                 return np.array(rows), {"opening": begin}
@@ -271,7 +271,7 @@ def _followed(
             except StoppedError:
                 return np.array(rows), {"diverged": begin}
             for passed, values in zip(lasting * np.array(_SHARES), found.T, strict=True):
-                rows.append([begin + passed, *values, asked, loop.pressure(begin + passed, held, passed, modes)])
+                rows.append([begin + passed, *values, commanded, loop.pressure(begin + passed, held, passed, modes)])
             y, modes = found[:, -1], held + (modes - held) * np.exp(-loop.decay * lasting)
         progress(min(1.0, (now + step) / length))
     return np.array(rows), {}

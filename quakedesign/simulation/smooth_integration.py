@@ -23,7 +23,7 @@ from quakedesign.simulation.integrators import Flow, StoppedError, adaptive_inte
 # are not used, since those of a stiff problem are lost in rounding.
 
 AGREEMENT = 0.02
-"""Share of the size of a variable that a straight line may miss."""
+"""Largest error of linear interpolation, as a share of the size of a variable."""
 SHARES = np.arange(1, 65) / 64
 """Middle and end of every piece of an interval."""
 _PIECES, _LONGER = len(SHARES) // 2, 4
@@ -234,9 +234,9 @@ class SmoothProblem:
             more = {"jac": self._jacobian(load)} if method == "radau" else {}
             return field, {"method": METHODS[method], **more}
         time, y, size = ca.SX.sym("t"), ca.SX.sym("y", self.rates.size1_in(0)), len(load.value)
-        pushed = ca.SX.sym("load", 2 * size + 1)
-        now = pushed[:size] + pushed[size : 2 * size] * (time - pushed[2 * size])
-        rates = ca.Function("rates", [time, y, pushed], [ca.densify(self.rates(y, now)[0])])
+        ramp = ca.SX.sym("load", 2 * size + 1)
+        now = ramp[:size] + ramp[size : 2 * size] * (time - ramp[2 * size])
+        rates = ca.Function("rates", [time, y, ramp], [ca.densify(self.rates(y, now)[0])])
         pieces, whole = (
             adaptive_integrators()[method].flow(rates, self.scales, shares, rtol=rtol) for shares in (SHARES, [1.0])
         )

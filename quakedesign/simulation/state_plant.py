@@ -118,8 +118,8 @@ class SpringSlider:
         acceleration = acceleration.subs(self.numbers)
         moving = (rate, loading_rate - rate)
         if not self.mass:
-            carried = zip((slip, stretch, *states, plant.p), (*moving, *state_rates, pressure_rate), strict=True)
-            change = sum((acceleration.diff(x) * dx for x, dx in carried), start=sp.Integer(0))
+            rates = zip((slip, stretch, *states, plant.p), (*moving, *state_rates, pressure_rate), strict=True)
+            change = sum((acceleration.diff(x) * dx for x, dx in rates), start=sp.Integer(0))
             acceleration = -change / acceleration.diff(rate)
         return (*moving, acceleration, *state_rates)
 
@@ -194,7 +194,7 @@ class SpringSlider:
             if abs(width) > _WIDEST:
                 raise SimulationError(
                     f"the forces must balance after a step of the pressure to {pressure:.6g} Pa. Received a slip rate "
-                    "that leaves all sizes. Give a smaller step, or inertia."
+                    f"that changes by more than a factor e^{_WIDEST:g}. Give a smaller step, or inertia."
                 )
         return float(brentq(excess, *sorted((y[2], y[2] + width)), xtol=1e-14, rtol=1e-15))
 
@@ -224,7 +224,7 @@ def spring_acceleration() -> sp.Expr:
 TIDE = 12.42 * 3600.0  # s, period of the largest tide, M2
 MODES = 24  # of the diffusion path; the law's model has fewer
 FRICTION = ("direct_effect", "evolution_effect", "critical_slip")
-"""Constants of friction that a spread is about: a, b and D_c."""
+"""Varied constants of friction: a, b and D_c."""
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -307,8 +307,8 @@ class PressurePath:
             return cls(lag=meant.lag, diffusion=meant.diffusion, stages=stages)
         if [type(stage) for stage in flowing] not in ([Lag], [Diffusion], [Lag, Diffusion]):
             raise ParameterError(
-                "the pressure of slow sliding takes a lag, a diffusion path, or both. Received "
-                f"{', '.join(stage.name for stage in flowing)}. Leave out the others."
+                "the pressure path of slow sliding is a lag, a diffusion path, or a lag and then a diffusion path. "
+                f"Received {', '.join(stage.name for stage in flowing)}. Omit all other stages."
             )
         by_name = {stage.name: stage for stage in flowing}
         lag, rock = by_name.get("lag"), by_name.get("diffusion")
@@ -363,9 +363,9 @@ class Instruments:
         """Measured slip [m]."""
         return float(self._reading(slip))
 
-    def pump(self, asked: float, planned: float) -> float:
+    def pump(self, commanded: float, planned: float) -> float:
         """Pressure [Pa] of the hold less the planned one, from the commanded pressure less the planned one."""
-        return float(self._pumped(float(self._late(asked)) + planned)) - planned
+        return float(self._pumped(float(self._late(commanded)) + planned)) - planned
 
     def sections(self, now: float, before: float, after: float) -> list[tuple[float, float, float]]:
         """Starts and lengths [s] of the sections of constant pressure between two samples, with the pressures."""
@@ -388,9 +388,9 @@ def _held(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tu
         return None
     chain, start = Actuator(stages=tuple(stages)), tuple(v for stage in stages for v in stage.start)
     numbers = [ca.SX(v) for stage in stages for v in stage.numbers]
-    memory, asked = ca.SX.sym("memory", len(start)), ca.SX.sym("asked")
-    held, _, after = chain.hold(numbers, ca.vertsplit(memory), asked, step)
-    return ca.Function("held", [memory, asked], [held, ca.vertcat(*after)]), start
+    memory, commanded = ca.SX.sym("memory", len(start)), ca.SX.sym("asked")
+    held, _, after = chain.hold(numbers, ca.vertsplit(memory), commanded, step)
+    return ca.Function("held", [memory, commanded], [held, ca.vertcat(*after)]), start
 
 
 def _remembering(element: tuple[ca.Function, tuple[float, ...]] | None) -> Callable[[float], Any]:

@@ -52,8 +52,8 @@ class Checkpoint:
         kept : sequence of int
             Numbers of the steps to store.
         """
-        told = (step.serialize(), *(float(x).hex() for x in start), *map(str, kept), version("casadi"))
-        return cls(Path(path), hashlib.sha256("\n".join(told).encode()).hexdigest())
+        inputs = (step.serialize(), *(float(x).hex() for x in start), *map(str, kept), version("casadi"))
+        return cls(Path(path), hashlib.sha256("\n".join(inputs).encode()).hexdigest())
 
     def read(self) -> "list[np.ndarray]":
         """Vectors stored so far; none without a file.
@@ -77,7 +77,7 @@ class Checkpoint:
             fingerprint, vectors = "", np.empty((0, 0))
         if fingerprint != self.fingerprint:
             raise SimulationError(
-                f"checkpoint {self.path} must be that of this very run. Received that of another run, or another file. "
+                f"checkpoint {self.path} must be that of the same run. Received that of another run, or another file. "
                 "Delete it, or choose another name."
             )
         return list(vectors)
@@ -206,10 +206,10 @@ def march(
 # Long runs are cached on the user's disk, see `quakedesign.cache`: code and initial vector determine the result.
 
 LONG = 100_000_000
-"""Instructions of a run from which on it is worth a place."""
+"""Least number of instructions of a cached run."""
 
 
-def run_question(
+def run_key(
     step: "ca.Function", start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
 ) -> tuple[bytes, ...]:
     """Everything that determines the results of a run of a casadi.Function; empty for a run that is not cached."""
@@ -218,18 +218,18 @@ def run_question(
     return step.serialize().encode(), np.array(start).tobytes(), np.array(instants).tobytes(), compilation().encode()
 
 
-def recall_run(question: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
+def recall_run(key: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
     """Cached vectors, one a column, and backend with its reason as in the provenance of a run; None if not cached."""
-    if not question or (content := cache.recall("run", *question)) is None:
+    if not key or (content := cache.recall("run", *key)) is None:
         return None
     with np.load(BytesIO(content), allow_pickle=False) as kept:
         entries = {name: str(kept[name]) for name in kept.files if name != "vectors"}
         return kept["vectors"], entries | {"backend_reason": f"{entries['backend_reason']}; from the cache"}
 
 
-def keep_run(question: tuple[bytes, ...], vectors: "np.ndarray", told: dict[str, str]) -> None:
+def store_run(key: tuple[bytes, ...], vectors: "np.ndarray", entries: dict[str, str]) -> None:
     """Cache a run for `recall_run` if it was compiled."""
-    if question and told["backend"] == "compiled":
+    if key and entries["backend"] == "compiled":
         content = BytesIO()
-        np.savez(content, allow_pickle=False, vectors=vectors, **{name: np.array(text) for name, text in told.items()})
-        cache.keep("run", content.getvalue(), *question)
+        np.savez(content, allow_pickle=False, vectors=vectors, **{name: np.array(entries[name]) for name in entries})
+        cache.keep("run", content.getvalue(), *key)

@@ -399,7 +399,7 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
     require_positive(loading_rate=rate)
     if not 0 <= share < 1:
         raise ParameterError(
-            f"share of the cycle must be at least 0 and less than 1. Received {share!r}. Give 0.9, say."
+            f"share of the cycle must be at least 0 and less than 1. Received {share!r}. Give for example 0.9."
         )
     if not derive(fault).unstable:
         raise ParameterError(

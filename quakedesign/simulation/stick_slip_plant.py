@@ -70,15 +70,15 @@ class StickSlipLoop(ClosedLoop):
         """Shear stress [Pa]: μ max(σ' − p, 0) in slip, or the stress that balances the load at rest (SX)."""
         closed = ca.fmax(self.fault.effective_normal_stress - pressure, 0)
         strength, held = friction * closed, (friction + self.fault.friction.rest_excess) * closed
-        carried = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + held
-        return ca.if_else(state[1] == 0, ca.fmin(carried, held), strength)
+        load = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + held
+        return ca.if_else(state[1] == 0, ca.fmin(load, held), strength)
 
     def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float, works: int = 0) -> ca.SX:
         """State after one step, with at most one release and one stop; the last entries of the state are works."""
         moved = _SplitStep(self.plant, self.held, method, motion, step, works)
-        rests, push = state[1] == 0, moved.push(0.0, state)
-        release = _crossing(push, moved.push(1.0, moved.rested(0.0, 1.0, state)))
-        begin = ca.if_else(rests, ca.if_else(push > 0, 0.0, release), 0.0)
+        rests, starting = state[1] == 0, moved.starting_acceleration(0.0, state)
+        release = _crossing(starting, moved.starting_acceleration(1.0, moved.rested(0.0, 1.0, state)))
+        begin = ca.if_else(rests, ca.if_else(starting > 0, 0.0, release), 0.0)
         start = moved.rested(0.0, begin, state)
         ahead = moved.slid(begin, 1 - begin, start)
         stop, stopped = moved.stop(begin, start, ahead)
@@ -100,7 +100,7 @@ class _SplitStep:
         """Time derivative of the state while the fault slips."""
         return self.motion(self.plant, passed, state)
 
-    def push(self, passed: Number, state: ca.SX) -> ca.SX:
+    def starting_acceleration(self, passed: Number, state: ca.SX) -> ca.SX:
         """Acceleration [m/s²] from rest; positive if friction cannot carry the load."""
         return self.motion(self.held, passed, ca.vertcat(state[0], 0, state[2:]))[1]
 

@@ -87,7 +87,7 @@ def _operate(node: sp.Basic, table: Operations, walk: Callable[[sp.Basic], Value
         return float(bool(node))
     if isinstance(node, sp.Piecewise):
         if node.args[-1][1] != sp.true:
-            raise ParameterError(f"the last branch of a piecewise expression must hold otherwise. Received {node}.")
+            raise ParameterError(f"the last branch of a piecewise expression must be unconditional. Received {node}.")
         result = walk(node.args[-1][0])
         for value, condition in reversed(node.args[:-1]):
             result = table[sp.Piecewise](walk(condition), walk(value), result)
@@ -205,7 +205,7 @@ def vectorised(function: ca.Function) -> Callable[..., "np.ndarray"]:
     for k in range(function.n_instructions()):
         code, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if code not in (ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT) and code not in _INSTRUCTIONS:
-            raise ParameterError(f"an instruction must be one of the known ones. Received number {code} of CasADi.")
+            raise ParameterError(f"an instruction must be a known operation of CasADi. Received number {code}.")
         steps.append((code, out, function.instruction_constant(k) if code == ca.OP_CONST else into))
 
     def evaluated(*inputs: "np.ndarray") -> "np.ndarray":

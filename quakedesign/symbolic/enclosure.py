@@ -418,10 +418,10 @@ def _operation(e: sp.Expr) -> Operation:
 
 
 def _without_ball(what: str) -> Operation:
-    def refuse(values: list[arb]) -> arb:
+    def reject(values: list[arb]) -> arb:
         raise UnsupportedError(f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, Min or Max.")
 
-    return refuse
+    return reject
 
 
 def _ball_power(exponent: sp.Expr) -> Operation:
@@ -518,8 +518,8 @@ def upper_bound(
     result = -heap[0][0]
     if result == float("inf"):
         raise ParameterError(
-            f"no finite bound was found in {pieces} subdivisions of the box. An expression that is defined all over it "
-            "is expected. Narrow the ranges."
+            f"no finite bound was found in {pieces} subdivisions of the box. The expression may be undefined in it. "
+            "Narrow the ranges."
         )
     return Fraction(result)
 
@@ -613,14 +613,14 @@ def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction)
         if top <= limit + slack:
             return max(bound, Fraction(top))
         part = heapq.heappop(heap)[2]
-        risen = form.risen(part)
-        for point in (_centre(risen), _centre(part)):  # a face may lie on a kink, with a wider enclosure than nearby
+        face = form.upper_face(part)
+        for point in (_centre(face), _centre(part)):  # a face may lie on a kink, with a wider enclosure than nearby
             low, _ = interval(form.expression, {symbol: (x, x) for symbol, x in point.items()})
             if low > limit + slack:
                 return Excess(at=point, value=Fraction(low))
-        if any(abs(x) > FURTHEST for x in _centre(risen).values()):
-            return Undecided(risen)
-        for half in form.halves(risen):
+        if any(abs(x) > FURTHEST for x in _centre(face).values()):
+            return Undecided(face)
+        for half in form.halves(face):
             push(half)
     return Undecided(heap[0][2])
 
@@ -657,21 +657,21 @@ class _Form:
                 mean = add(mean, times(self.slope(symbol, box), add(ends, negative(point[symbol]))))
         return min(high, mean[1])
 
-    def risen(self, box: Box) -> Box:
+    def upper_face(self, box: Box) -> Box:
         """Face of a box on which the expression is largest, by the signs of its derivatives if these are definite.
 
         With jumps in the expression, the half of the box at this face, so that the side of the jump stays known.
         """
         if not regular(self.expression, box):
             return box
-        risen = dict(box)
+        face = dict(box)
         for symbol, (low, high) in box.items():
-            falls, rises = self.slope(symbol, risen)
+            falls, rises = self.slope(symbol, face)
             end = low if rises <= 0 else high if falls >= 0 else None
             if end is not None and not isinstance(end, float):
                 inner = _middle((low, high)) if self.jumps else end
-                risen[symbol] = (min(inner, end), max(inner, end))
-        return risen
+                face[symbol] = (min(inner, end), max(inner, end))
+        return face
 
     def halves(self, box: Box) -> list[Box]:
         """Both halves of a box, divided along the side that gives the smallest maximum of both enclosures."""

@@ -108,7 +108,7 @@ def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
     continued = sp.sympify(friction)
     signs = [power for power in continued.atoms(SignedPower) if power.args[1] == 0]
     if signs or continued.has(sp.sign, sp.Heaviside, sp.DiracDelta):
-        raise UnsupportedError(f"nothing can be proved with {law.name}, whose friction may jump. Write a steep ramp.")
+        raise UnsupportedError(f"nothing can be proved with {law.name}, whose friction may jump. Make it continuous.")
     return continued
 
 
@@ -139,7 +139,7 @@ def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Exces
     at = ", ".join(f"{x} {float(value):.4g} {_UNITS.get(str(x), '')}".rstrip() for x, value in answer.at.items())
     return (
         f"{what} of {law.name} must bound its friction. Declared {float(abs(declared)):.6g}, but "
-        f"{'at ' + at if at else 'everywhere'} it is {float(abs(answer.value)):.6g}. Correct what the law declares."
+        f"{'at ' + at if at else 'everywhere'} it is {float(abs(answer.value)):.6g}. Correct the declared value."
     )
 
 
@@ -147,7 +147,7 @@ def _undecided(law: FrictionLaw, what: str, declared: Fraction, answer: Undecide
     at = ", ".join(f"{x} from {float(low):.3g} to {float(high):.3g}" for x, (low, high) in answer.where.items())
     return (
         f"nothing can be proved with {law.name}: {what}, declared as {float(abs(declared)):.6g}, is not confirmed for "
-        f"{at}. Write the law in another form, or hold the slip with Min."
+        f"{at}. Write the law in another form, or limit the slip with Min."
     )
 
 

@@ -163,7 +163,7 @@ def homogeneous(
     components = {s: normal_form(r) for s, r in rates.items()}
     missing = [s for s in components if s is not None and s not in weights]
     if missing:
-        raise ParameterError(f"every state needs a weight. None was given for {', '.join(map(str, missing))}.")
+        raise ParameterError(f"every state needs a weight. Received none for {', '.join(map(str, missing))}.")
     exact = {s: sp.sympify(r) for s, r in weights.items()}
     return _decided(components, exact, None if degree is None else sp.sympify(degree))
 
@@ -278,7 +278,7 @@ def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -
     for state, rate in rates.items():
         for term in sp.Add.make_args(normal_form(rate)):
             if any(f.has(*rates) for f in term.atoms(sp.Function) - term.atoms(SignedPower, AbsolutePower)):
-                raise ParameterError(f"{term} is not built from signed powers; it has no weight.")
+                raise ParameterError(f"{term} is not a product of signed powers, so that it has no degree.")
             if term != 0:
                 equations.append(size_of(term, unknown, equations) - unknown[state] - degree)
     solution = sp.linsolve([e for e in equations if e != 0], *unknown.values())

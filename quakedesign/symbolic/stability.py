@@ -20,7 +20,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import end_of, fraction_of, rational, shortly, to_sympy
 from quakedesign.fault import Fault, FrictionLaw, require_fault
 from quakedesign.fault.equilibrium import by_equilibrium
-from quakedesign.symbolic import plant, rate_and_state_plant
+from quakedesign.symbolic import plant
 from quakedesign.symbolic import rate_and_state_plant as state_plant
 from quakedesign.symbolic.enclosure import BallBox, enclose
 from quakedesign.symbolic.plant import ErrorDynamics, N_hat, eta_hat, k_hat, p, sigma
@@ -113,13 +113,11 @@ def stability(
     at = operating_rate(fault, loading_rate)
     pressures = _interval(pressure, fault)
     ranges = _ranges(fault, pressures, uncertain)
-    slopes = rate_and_state_plant.slopes(
-        fault.friction.symbolic(), rate_and_state_plant.loading_rate if at else sp.Integer(0)
-    )
-    parameters = {**fault.friction.values(), rate_and_state_plant.loading_rate: sp.Rational(str(at))}
+    slopes = state_plant.slopes(fault.friction.symbolic(), state_plant.loading_rate if at else sp.Integer(0))
+    parameters = {**fault.friction.values(), state_plant.loading_rate: sp.Rational(str(at))}
     conditions = tuple(
         _condition(expression, slopes, parameters, ranges)
-        for expression in rate_and_state_plant.stability_conditions(fault.friction.state_names, inertia=inertia)
+        for expression in state_plant.stability_conditions(fault.friction.state_names, inertia=inertia)
     )
     return StabilityVerdict(
         outcome=_outcome(conditions), conditions=conditions, pressure=pressures, loading_rate=at, inertia=inertia
@@ -239,7 +237,7 @@ def critical_stiffness(
     pressure, loading_rate, inertia
         As in `stability`.
     """
-    expression = rate_and_state_plant.critical_stiffness(fault.friction.symbolic(), inertia=inertia)
+    expression = state_plant.critical_stiffness(fault.friction.symbolic(), inertia=inertia)
     return float(_number(expression, fault, pressure, loading_rate)) * fault.mass
 
 
@@ -252,7 +250,7 @@ def nucleation_length(fault: Fault, *, pressure: float = 0, loading_rate: float 
     pressure, loading_rate
         As in `stability`.
     """
-    expression = rate_and_state_plant.nucleation_length(fault.friction.symbolic())
+    expression = state_plant.nucleation_length(fault.friction.symbolic())
     length = float(_number(expression, fault, pressure, loading_rate))
     return length if length > 0 else float("inf")
 
@@ -263,8 +261,8 @@ def _number(expression: sp.Expr, fault: Fault, pressure: float, rate: float | No
         **plant.plant_values(fault),
         **fault.friction.values(),
         p: sp.Rational(str(constant)),
-        rate_and_state_plant.loading_rate: sp.Rational(str(operating_rate(fault, rate))),
-        rate_and_state_plant.shear_modulus: sp.Rational(str(rational(fault.shear_modulus))),
+        state_plant.loading_rate: sp.Rational(str(operating_rate(fault, rate))),
+        state_plant.shear_modulus: sp.Rational(str(rational(fault.shear_modulus))),
     }
     return sp.N(sp.sympify(expression).subs(values), 30)
 
@@ -297,7 +295,7 @@ _SLIDING = _Forms(
     jacobian=state_plant.jacobian,
     acceleration=lambda law: state_plant.third_order_rates(law)[1],
     instability=state_plant.instability,
-    soft="the spring is softer than steady sliding needs",
+    soft="the spring is softer than the critical stiffness",
 )
 _forms_of = by_equilibrium(rest=lambda fault: _AT_REST, sliding=lambda fault: _SLIDING)
 

@@ -110,7 +110,7 @@ def cell_polynomial(
         for state, exponent, kind in term.factors:
             degree, rest = divmod(exponent.numerator * weights[state], exponent.denominator)
             if rest or degree < 0:
-                raise CertificateError(f"⌈{state}⌋^{exponent} with weight {weights[state]} is no polynomial on a cell.")
+                raise CertificateError(f"⌈{state}⌋^{exponent} of weight {weights[state]} is not polynomial on a cell.")
             exponents[state] = degree
             coefficient *= signs[state] if kind == "s" else 1
         key = tuple(exponents.values())
@@ -132,5 +132,5 @@ def real_polynomial(
     for term in terms:
         for state, exponent, kind in term.factors:
             if exponent.denominator != 1 or (kind == "s") != (exponent % 2 == 1):
-                raise CertificateError(f"{kind}-power {exponent} of {state} is no polynomial on the reals.")
+                raise CertificateError(f"{kind}-power {exponent} of {state} is not polynomial on the reals.")
     return cell_polynomial(terms, dict.fromkeys(states, 1), dict.fromkeys(states, 1), parameters)

@@ -16,8 +16,8 @@ from quakedesign.laws import Controller, control_law
 from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Loop
 from quakedesign.lyapunov.exact.perturbation_bounds import coefficient_range, least_authority
-from quakedesign.lyapunov.gains.path_following import look, scaled_norm, short, with_gains
-from quakedesign.lyapunov.gains.synthesise import ComparedGains, Synthesis, SynthesisProblem, question, synthesise
+from quakedesign.lyapunov.gains.path_following import scaled_norm, short, state_at, with_gains
+from quakedesign.lyapunov.gains.synthesise import ComparedGains, Synthesis, SynthesisProblem, problem_of, synthesise
 from quakedesign.lyapunov.search.certify import Number
 from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.simulation import Metrics, simulate
@@ -163,7 +163,7 @@ def synthesise_sampled(
     Synthesis or None
         Its value is the metric, in its unit; never worse than that of proved gains from the literature.
     """
-    problem = question(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
+    problem = problem_of(trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=degrees)
     measured = [_measured(trial, problem, loop) for loop in problem.published]
     small = synthesise(
         trial.law, "norm", lipschitz=1, gain_range=trial.gain_range, degrees=problem.degrees, starts=1, compare=False
@@ -204,7 +204,7 @@ def _tried(
     def error(factors: Any) -> float:
         grown = {**base, **{n: base[n] * math.exp(x) for n, x in zip(free, factors, strict=True)}}
         loop = with_gains(problem.loop, short(problem.loop, grown))
-        if look(setting, loop, scaled_norm(loop, setting.exponents)) is None:
+        if state_at(setting, loop, scaled_norm(loop, setting.exponents)) is None:
             return _WORST
         value = trial.error(tuple(loop.gains.values()))
         if not value:

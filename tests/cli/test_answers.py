@@ -119,7 +119,7 @@ def test_only_proofs_for_every_fault_are_code_zero(prove, answers, code, json_to
 
 def test_a_fault_whose_earthquake_cannot_be_computed_has_its_guarantee_without(prove, monkeypatch):
     def drowned(_):
-        raise SimulationError("is unstable, but its simulation does not move")
+        raise SimulationError("is unstable, but it stays at rest in simulation")
 
     monkeypatch.setattr("quakedesign.simulation.earthquake.natural_peak", drowned)
     code, out, _ = prove([proof(True)], "real-fault")

@@ -59,7 +59,7 @@ def test_another_campaign_needs_force(call):
     assert call("--samples", "2")[0] == 0
     code, _, err = call("--samples", "2", box="paper")
     assert code == 2
-    assert "differs in fault.box.authority" in err
+    assert "Received changes of fault.box.authority" in err
     code, out, _ = call("--samples", "2", "--force", "--json", box="paper")
     assert (code, json.loads(out)["resumed"]) == (0, 0)
 

@@ -349,7 +349,8 @@ def test_what_a_law_is_designed_for_stands_where_nothing_is_given(monkeypatch):
     assert free == (3, ActuatorOptions(lag=1.0).build(0.1), Measurement(seed=2))
     law = SimpleNamespace(controller=object(), noise=lambda seed: ("noise of the proof", seed))
     meant = ActuatorOptions(delay=0.1).build(0.1)
-    monkeypatch.setattr("quakedesign.simulation.run_settings.own_path", lambda *given: (meant, 7) if given[0] else None)
+    path = "quakedesign.simulation.run_settings.designed_path"
+    monkeypatch.setattr(path, lambda *given: (meant, 7) if given[0] else None)
     assert options.surroundings(law, 0.1, RunOptions(), ActuatorOptions(), SensorOptions(), 2) == (
         7,
         ActuatorOptions().build(0.1).completed(meant),
@@ -357,7 +358,7 @@ def test_what_a_law_is_designed_for_stands_where_nothing_is_given(monkeypatch):
     )
     noisy = options.surroundings(law, 0.1, RunOptions(), ActuatorOptions(), SensorOptions(slip_noise=1e-6), 2)
     assert noisy[2] == Measurement(slip_noise=1e-6, seed=2)
-    monkeypatch.setattr("quakedesign.simulation.run_settings.own_path", lambda *_: (None, 1))
+    monkeypatch.setattr("quakedesign.simulation.run_settings.designed_path", lambda *_: (None, 1))
     pump = ActuatorOptions(saturation=1e6)
     assert options.surroundings(law, 0.1, RunOptions(), pump, SensorOptions(), 0)[1] == pump.build(0.1)
 

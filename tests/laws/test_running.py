@@ -150,7 +150,7 @@ def test_python_control_runs_it_in_discrete_time():
 
 
 def test_it_has_no_function_of_a_loop_in_continuous_time():
-    with pytest.raises(UnsupportedError, match="law of samples"):
+    with pytest.raises(UnsupportedError, match="a sampled law has no closed loop"):
         to_casadi(REAL, HELD.controller)
 
 

@@ -227,10 +227,10 @@ def test_the_same_certificate_gives_the_same_bytes_in_another_process():
 
 NO_THEOREM = ("guarantee", "sliding", "uncertain_plant", "stick_slip_aperiodic")
 KINDS = {
-    "motzkin_not-sos": "not-sos",
-    "guarantee_lab-fault": "a guarantee",
-    "sliding_crustal-patch": "a slow_sliding",
-    "uncertain_plant_pendulum": "a uncertain_plant",
+    "motzkin_not-sos": "kind not-sos",
+    "guarantee_lab-fault": "kind guarantee",
+    "sliding_crustal-patch": "kind slow_sliding",
+    "uncertain_plant_pendulum": "kind uncertain_plant",
 }
 
 
@@ -241,13 +241,13 @@ def test_a_kind_without_theorem_is_refused(name, kind):
 
 
 def test_an_aperiodic_stick_slip_loop_is_refused():
-    with pytest.raises(UnsupportedError, match="for periodic sampling alone"):
+    with pytest.raises(UnsupportedError, match="only periodic sampling"):
         rocq_text(read_json(CERTIFICATES / "stick_slip_aperiodic_real-fault.json"))
 
 
 def test_a_point_that_refutes_an_attraction_is_refused():
     refuted = {key: ATTRACTION[key] for key in ("format", "kind", "variables", "field", "V")}
-    with pytest.raises(UnsupportedError, match="Received a point that refutes"):
+    with pytest.raises(UnsupportedError, match="Received a refutation of an attraction"):
         rocq_text(refuted | {"level": ["2"], "negative": {"point": ["1"]}})
 
 

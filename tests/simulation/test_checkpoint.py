@@ -128,7 +128,7 @@ def test_the_checkpoint_of_another_run_is_refused(tmp_path, change):
     with pytest.raises(KeyboardInterrupt):
         simulate(REAL, published("real-fault")["elqr"], progress=stop, checkpoint=path, **SETTING)
     before = path.read_bytes()
-    with pytest.raises(SimulationError, match=r"must be that of this very run.*another run"):
+    with pytest.raises(SimulationError, match=r"must be that of the same run.*another run"):
         simulate(REAL, published("real-fault")["elqr"], checkpoint=path, **(SETTING | change))
     assert path.read_bytes() == before
 

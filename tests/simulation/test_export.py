@@ -411,7 +411,7 @@ def test_nothing_is_left_of_a_failed_export(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("settings", "named"),
     [
-        ({"scheme": "continuous"}, "samples"),
+        ({"scheme": "continuous"}, "sampled scheme"),
         (
             {"scheme": simulation_scheme("explicit", actuator=Actuator(stages=(Lag(time_constant=0.1),)))},
             "between samples",

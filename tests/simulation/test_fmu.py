@@ -215,7 +215,7 @@ def test_a_platform_that_is_not_built_here_gets_the_sources(monkeypatch, system,
     monkeypatch.setattr(platform, "system", lambda: system)
     monkeypatch.setattr(platform, "machine", lambda: machine)
     monkeypatch.setattr(export, "shared_library", lambda *_: pytest.fail("compiled"))
-    assert export._binary({}) == ({}, "sources only: this platform has no name in FMI 2.0 that is built here")
+    assert export._binary({}) == ({}, "sources only: no binary of FMI 2.0 is built for this platform")
 
 
 @pytest.mark.parametrize(

@@ -47,8 +47,8 @@ def test_a_file_has_its_units_in_the_first_row(tmp_path):
     [
         ("5 m", UnitError, "pressure must be a quantity in Pa"),
         ("1 s: 1 MPa, 2 MPa", ParameterError, "'time: pressure'"),
-        ("2 s: 1 MPa, 1 s: 2 MPa", ParameterError, "must not descend"),
-        ("1 s: 1 MPa, 1 s: 2 MPa, 1 s: 3 MPa", ParameterError, "must not descend"),
+        ("2 s: 1 MPa, 1 s: 2 MPa", ParameterError, "must ascend"),
+        ("1 s: 1 MPa, 1 s: 2 MPa, 1 s: 3 MPa", ParameterError, "must ascend"),
         ("1 s: inf", ParameterError, "finite"),
         ("none.csv", ParameterError, "cannot be read"),
     ],

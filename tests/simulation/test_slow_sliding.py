@@ -381,7 +381,7 @@ def test_simulate_runs_what_a_design_found_in_its_own_way():
         ({"plant": "stick-slip"}, "one of smooth, quasi-dynamic"),
         (
             {"actuator": Actuator(stages=(Diffusion.of_time(100.0), Lag(time_constant=30.0)))},
-            "a lag, a diffusion path, or both. Received diffusion, lag",
+            "a lag and then a diffusion path. Received diffusion, lag",
         ),
     ],
 )

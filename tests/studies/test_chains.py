@@ -537,8 +537,8 @@ def test_the_law_of_slow_sliding_is_exported_with_its_plan(monkeypatch, capsys, 
     assert list(answer["measurement"].items()) == [(f"slip_{i}", "m") for i in (1, 2, 3)]
     assert answer["guarantee"]["verdict"] == "proved"
     header = " ".join((tmp_path / "c" / "controller.h").read_text(encoding="utf-8").replace("*", "").split())
-    assert "writes the fluid pressure [Pa] beside the plan of CONTROLLER_PRESSURES wells" in header
-    assert "the plan reaches the fault as it is" in header
+    assert "of CONTROLLER_PRESSURES wells, in addition to the planned pressure, to hold" in header
+    assert "the planned pressure reaches the fault unchanged" in header
     assert "|ln(v/V)| <= 0.0738" in header
 
 

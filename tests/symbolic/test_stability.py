@@ -257,7 +257,7 @@ def test_the_model_of_a_law_with_state_is_that_of_the_closed_form(fault):
     model = derive(soft)
     assert model.unstable
     assert len(model.reasons) == 1
-    assert "softer than steady sliding needs" in model.reasons[0]
+    assert "softer than the critical stiffness" in model.reasons[0]
     assert model.eigenvalues == pytest.approx(eigenvalues(soft, 1e-6), rel=1e-12)
     assert model.jacobian.shape == (3, 3)
     assert not model.jacobian.subs(model.values).free_symbols

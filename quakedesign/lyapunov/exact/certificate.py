@@ -88,7 +88,7 @@ def _check_proof(certificate: Evidence) -> None:
     allowed |= {"decay"} if second == "decrease" else set()
     require(
         required <= set(claims) <= required | allowed,
-        f"the claims must be positive, {second}, bounds of states and, on cells, decay.",
+        f"the claims must be those named positive and {second}, bounds of states and, on cells, decay.",
     )
     require(all(c > 0 for c in claims.values()), "a claim must be positive.")
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)
@@ -104,7 +104,7 @@ def _check_witnesses(certificate: Evidence, obligations: Iterable[Obligation]) -
         require(one.name in certificate.witnesses, f"the witness of {one.name!r} is missing.")
         holds = proves(one, certificate.witnesses[one.name], certificate.loop.domain)
         require(holds, f"the witness of {one.name!r} does not prove its polynomial.")
-    extra = "there are witnesses that no obligation needs, or in another order."
+    extra = "the witnesses are not those of the obligations in their order."
     require(expected == list(certificate.witnesses), extra)
 
 
@@ -113,14 +113,14 @@ def _check_roots(loop: Loop) -> None:
         number = loop.parameters[of]
         require(
             number > 0 and 0 <= low <= high and low**2 <= number <= high**2,
-            f"the range of {name} does not hold the root of {of}.",
+            f"the range of {name} does not contain the root of {of}.",
         )
-    require(loop.domain == "cells" or not loop.lifts, "lifts belong on cells.")
+    require(loop.domain == "cells" or not loop.lifts, "lifts are allowed only in the domain cells.")
 
 
 def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
     plain = loop.domain == "cells" and not (loop.lifts or loop.roots)
-    require(plain, "an equilibrium needs cells without lifts.")
+    require(plain, "an equilibrium needs the domain cells, without lifts and roots.")
     point, parameters = equilibrium.point, equilibrium.parameters
     require(set(point) == set(loop.states) and any(point.values()), "the point must be away from the origin.")
     require(
@@ -163,7 +163,7 @@ def limit(
         part = value(term, {**loop.parameters, **parameters})
         for state, exponent, kind in term.factors:
             power = exponent * loop.states[state]
-            require(power.denominator == 1, f"⌈{state}⌋^{exponent} is no polynomial on a cell.")
+            require(power.denominator == 1, f"⌈{state}⌋^{exponent} is not polynomial on a cell.")
             part *= abs(point[state]) ** power.numerator * (signs[state] if kind == "s" else 1)
         total += part
     return total

@@ -80,11 +80,12 @@ class LoopEntries(Entries):
         need(all(1 <= w <= top for w in self.states.values()), f"weights must be integers from 1 to {top}")
         for name, (low, high) in self.uncertain.items():
             need(low <= high, f"the range of {name} is not ordered")
-        need(all(of in {**self.gains, **self.constants} for of, *_ in self.roots.values()), "a root must be of a gain")
+        known = {*self.gains, *self.constants}
+        need(all(of in known for of, *_ in self.roots.values()), "a root must be that of a gain or constant")
         roots = {name: (of, (low, high)) for name, (of, low, high) in self.roots.items()}
         bare = made(Loop, self, field={}, roots=roots, lifts={})
         powers = (*self.states, *self.lifts)
-        need(self.domain == "cells" or not self.lifts, "lifts belong on cells")
+        need(self.domain == "cells" or not self.lifts, "lifts are allowed only in the domain cells")
         lifts = {
             lift: terms_of(self.lifts[lift], bare, powers[: len(self.states) + i]) for i, lift in enumerate(self.lifts)
         }
@@ -103,9 +104,9 @@ def terms_of(entries: tuple[TermEntries, ...], loop: Loop, powers: Sequence[str]
         need(len({f[0] for f in factors}) == len(factors), "a state occurs twice in a term")
         for state, power, kind in factors:
             need(state in powers, "a factor has an unknown state")
-            need(0 <= power <= 24 and (kind == "s" or power > 0), "a factor has a wrong exponent")
+            need(0 <= power <= 24 and (kind == "s" or power > 0), f"exponent {power} of {state} is outside its range")
             whole = (power * loop.states.get(state, 0)).denominator == 1
-            need(whole, "an exponent times the weight of its state is no integer")
+            need(whole, f"the exponent {power} times the weight of {state} is not an integer")
     return tuple(Term(*entry) for entry in entries)
 
 
@@ -133,11 +134,10 @@ class WitnessEntries(Entries):
 
     def witness(self, loop: Loop) -> Witness:
         """Witness; its sizes must match the loop."""
-        need(
-            self.multiplier != {} and len(self.multiplier) <= LIMITS["basis"], "a multiplier must not be empty or long"
-        )
+        most = LIMITS["basis"]
+        need(self.multiplier != {} and len(self.multiplier) <= most, f"a multiplier must have 1 to {most} terms")
         n, states = len(next(iter(self.multiplier))), len(loop.states)
-        need(states <= n <= states + len(loop.lifts) + 1, "a multiplier has a wrong key")
+        need(states <= n <= states + len(loop.lifts) + 1, f"a multiplier has {n} variables, not as many as its loop")
         for cofactor in self.equalities:
             require_polynomial(cofactor, "a cofactor", n, 20_000)
         squares = _squares(self.squares, n, loop, ())
@@ -154,7 +154,7 @@ class WitnessEntries(Entries):
 def _squares(
     entries: tuple[SquareEntries, ...], variables: int, loop: Loop, condition: tuple[int, ...]
 ) -> tuple[Square, ...]:
-    need(len(entries) <= 1 << variables, f"squares are more than {1 << variables}")
+    need(len(entries) <= 1 << variables, f"{len(entries)} squares are more than {1 << variables}")
     top = 1 if loop.domain == "cells" else 0
     for entry in entries:
         need(len(entry.times) == variables and max(entry.times) <= top, f"times must be integers from 0 to {top}")
@@ -228,7 +228,7 @@ def evidence_of(raw: object) -> Evidence:
         return Evidence(loop=refuted.loop(), refutation=made(Equilibrium, refuted.refutation))
     file = read_as(ProofFile, entries)
     loop, names = file.loop(), [witness.obligation for witness in file.witnesses]
-    need(len(set(names)) == len(names), "an obligation must be named once, by a text")
+    need(len(set(names)) == len(names), "an obligation must have only one witness")
     return Evidence(
         loop=loop,
         lyapunov=terms_of(file.V, loop, tuple(loop.states)),

@@ -126,29 +126,29 @@ def certified_lipschitz(certificate: Certificate) -> Fraction:
     return min(-low, high)
 
 
-def certified_domain(question: DomainProblem) -> Domain:
+def certified_domain(problem: DomainProblem) -> Domain:
     """Largest level set on which one of the two methods is proved; rigorous, but only to steps of an eighth.
 
     It is empty if β leaves its certified range, or h' its bound at zero errors.
     """
-    low_beta, high_beta = coefficient_range(question.fault, question.controller.divisor)
-    certified = question.certificate.loop.uncertain["beta"]
+    low_beta, high_beta = coefficient_range(problem.fault, problem.controller.divisor)
+    certified = problem.certificate.loop.uncertain["beta"]
     if low_beta < certified[0] or high_beta > certified[1]:
-        return _domain(question, Fraction(0), "", "the control coefficient β, which leaves its certified range")
+        return _domain(problem, Fraction(0), "", "the control coefficient β, which leaves its certified range")
 
     def whole(step: int) -> bool:
-        return question.holds_whole(_level(step, question.sets.degree))
+        return problem.holds_whole(_level(step, problem.sets.degree))
 
-    split = _largest_split(question)
+    split = _largest_split(problem)
     low = _STEPS[0] if split is None else split
     best = _largest(whole, low, _STEPS[1]) if whole(low) else None
     if best is not None and (split is None or best > split):
-        level = _level(best, question.sets.degree)
-        return _domain(question, level, "whole", _whole_limit(question, question.sets.errors(level)))
+        level = _level(best, problem.sets.degree)
+        return _domain(problem, level, "whole", _whole_limit(problem, problem.sets.errors(level)))
     if split is not None:
-        level = _level(split, question.sets.degree)
-        return _domain(question, level, "split", _split_limit(question, level))
-    return _domain(question, Fraction(0), "", _whole_limit(question, Errors()))
+        level = _level(split, problem.sets.degree)
+        return _domain(problem, level, "split", _split_limit(problem, level))
+    return _domain(problem, Fraction(0), "", _whole_limit(problem, Errors()))
 
 
 def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
@@ -159,12 +159,12 @@ def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
     return low
 
 
-def _largest_split(question: DomainProblem) -> int | None:
+def _largest_split(problem: DomainProblem) -> int | None:
     """Largest step for which `split` is proved: from a guess with the sensitivities at zero errors, downwards."""
-    degree = question.sets.degree
+    degree = problem.sets.degree
 
     def holds(step: int, errors: Errors | None = None) -> bool:
-        parts = question.split(_level(step, degree), errors)
+        parts = problem.split(_level(step, degree), errors)
         return parts is not None and sum(parts.values()) < 1
 
     low, high = _STEPS
@@ -183,9 +183,9 @@ def _level(step: int, degree: Fraction) -> Fraction:
     return ((1 + Fraction(part, 8)) * Fraction(2) ** whole) ** round(degree)
 
 
-def _domain(question: DomainProblem, level: Fraction, method: str, limit: str) -> Domain:
-    errors = question.sets.errors(level)
-    first, second, *_, last = question.sets.starts(level)
+def _domain(problem: DomainProblem, level: Fraction, method: str, limit: str) -> Domain:
+    errors = problem.sets.errors(level)
+    first, second, *_, last = problem.sets.starts(level)
     return Domain(
         level=float(level),
         slip_error=UpperBound(errors.slip),
@@ -195,24 +195,24 @@ def _domain(question: DomainProblem, level: Fraction, method: str, limit: str) -
         start_perturbation=LowerBound(last),
         method=method,
         limited_by=limit,
-        feedforward=question.controller.feedforward.name,
+        feedforward=problem.controller.feedforward.name,
     )
 
 
 _FROM_ERRORS = {
-    "the control itself, through viscosity and rate weakening (e2')": (plant.acceleration_error,),
+    "the control, through viscosity and rate weakening (e2')": (plant.acceleration_error,),
     "the slip-rate error, through spring and weakening friction": (plant.e2, plant.e1),
 }
 _GIVEN = {"the disturbance": (plant.phi, plant.phi_t), "the moving reference": (stage,)}
 
 
-def _whole_limit(question: DomainProblem, errors: Errors) -> str:
+def _whole_limit(problem: DomainProblem, errors: Errors) -> str:
     """Cause of the largest part of h': among the errors or, at zero errors, among disturbance and reference.
 
     For each cause the symbols of all others are set to zero.
     """
-    expression = rate_expression(question.fault, question.controller.divisor, question.controller.feedforward)
-    box = parameter_ranges(question.fault) | errors.ranges()
+    expression = rate_expression(problem.fault, problem.controller.divisor, problem.controller.feedforward)
+    box = parameter_ranges(problem.fault) | errors.ranges()
     every = _FROM_ERRORS | _GIVEN
 
     def alone(cause: str) -> Fraction:
@@ -228,18 +228,18 @@ _ERRORS = {
 }
 
 
-def _split_limit(question: DomainProblem, level: Fraction) -> str:
+def _split_limit(problem: DomainProblem, level: Fraction) -> str:
     """Error that cancels most of the decrease, and the cause of its effect."""
-    parts = question.split(level) or {}
+    parts = problem.split(level) or {}
     error = max(parts, key=lambda name: parts[name])
     name, slope, rest = _ERRORS[error]
-    fault, controller = question.fault, question.controller
+    fault, controller = problem.fault, problem.controller
     expressions = sensitivity_expressions(fault, controller.divisor, controller.feedforward)
     expression = dict(zip(_ERRORS, expressions, strict=True))[error]
-    box = parameter_ranges(fault) | question.sets.errors(level).ranges()
+    box = parameter_ranges(fault) | problem.sets.errors(level).ranges()
     straight = expression.xreplace({slope: sp.Integer(0)})
     calm = straight.xreplace(dict.fromkeys((plant.phi_1, plant.phi_2), sp.Integer(0)))
-    less = "" if controller.feedforward.name == "none" else " less its feed-forward"
+    less = "" if controller.feedforward.name == "none" else " minus its feed-forward"
     causes = {
         f"{rest}{less}": calm,
         "friction": expression - straight,

@@ -65,7 +65,7 @@ class Obligations:
         terms = collected(rates, (*self.loop.states, *self.loop.lifts))
         ranges = self.loop.ranges
         twice = {p for t in terms for p in t.parameters if p in ranges and t.parameters.count(p) > 1}
-        require(not twice, f"V̇ is not affine in {', '.join(sorted(twice))}; the ends of its range do not decide.")
+        require(not twice, f"V̇ is not affine in {', '.join(sorted(twice))}: the ends of its range are not sufficient.")
         return terms
 
     def sign_cells(self) -> Iterator[Cell]:
@@ -93,7 +93,7 @@ class Obligations:
             for name, exponent, _ in term.factors:
                 if name in exponents:
                     exponents[name].append(exponent)
-        require(all(exponents.values()), "a lift occurs nowhere.")
+        require(all(exponents.values()), "a lift does not occur in the field or in another lift.")
         return tuple(lift for lift, occurring in exponents.items() if any(occurring))
 
     @cached_property
@@ -105,7 +105,7 @@ class Obligations:
             values = {
                 sum(e) for signs in _signs(tuple(weights)) for e in self._argument(lift, weights, signs)[1] or [()]
             }
-            require(len(values) == 1 and min(values) >= 1, f"the argument of {lift} is no form of one positive degree.")
+            require(len(values) == 1 and min(values) >= 1, f"the argument of {lift} has no single positive degree.")
             degrees[lift] = values.pop()
         return degrees
 
@@ -195,7 +195,7 @@ class Obligations:
         require(
             not vague,
             f"the argument of a lift has a parameter with a range, {', '.join(vague[:1])}. "
-            "Choose gains that make it one rational number.",
+            "Choose gains for which this parameter is a rational number.",
         )
         return live
 
@@ -246,7 +246,7 @@ def _require_different(inequalities: Sequence[Polynomial], lifts: Sequence[str])
     scaled = {tuple(sorted((e, c / m) for e, c in p.items())) for p, m in zip(inequalities, largest, strict=True)}
     require(
         len(scaled) == len(inequalities) and not any(len(p) == 1 and sum(p[0][0]) == 1 for p in scaled),
-        f"the signs {', '.join(lifts)} say the same twice, or that of one state. Write them as one, or as ⌈x⌋⁰.",
+        f"the signs {', '.join(lifts)} are equal, or equal to that of a state. Use one lift, or ⌈x⌋⁰.",
     )
 
 

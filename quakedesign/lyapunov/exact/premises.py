@@ -79,12 +79,12 @@ class Premise:
         """Texts of the required value (rounded up) and the certified value (rounded down), or a note on equality."""
         unit = "" if self.unit == "-" else f" {self.unit}"
         if self.required == self.certified != 0:
-            return f"at most {self.required:.4g}{unit}", "the same number"
+            return f"at most {self.required:.4g}{unit}", "equal"
         for digits in range(4, _MOST_DIGITS):  # until the rounded values satisfy the premise, too
             required, certified = (f"{side:.{digits}g}" for side in (self.required, self.certified))
             if not self.holds or Fraction(required) <= Fraction(certified):
                 return f"{required}{unit}", f"{certified}{unit}"
-        return f"{self.required:.4g}{unit}", "no less"
+        return f"{self.required:.4g}{unit}", "at least as large"
 
     def to_dict(self) -> Json:
         """Keys of ``--json`` and the unit; None for what is infinite."""
@@ -191,22 +191,22 @@ def _variants(
         )
     require(
         certificate.loop.law == controller.name and dict(certificate.loop.gains) == dict(controller.gains),
-        "the certificate is about other gains than the controller's.",
+        "the gains of the certificate differ from those of the controller.",
     )
     bounded = all(f"bound_{state}" in certificate.claims for state in certificate.loop.states)
     margins = robustness(certificate, controller.loop_field()) if bounded else None
     return tuple(_variant(DomainProblem(fault, law, certificate, margins), bounded=bounded) for law in laws)
 
 
-def _variant(question: DomainProblem, *, bounded: bool) -> Variant:
-    fault, law, certificate = question.fault, question.controller, question.certificate
+def _variant(problem: DomainProblem, *, bounded: bool) -> Variant:
+    fault, law, certificate = problem.fault, problem.controller, problem.certificate
     premises = [
         control_coefficient(fault, law.divisor, certificate.loop.uncertain["beta"]),
         _along_reference(fault, law, certified_lipschitz(certificate)),
     ]
     if bounded:
-        premises.append(_level_set(question))
-    domain = certified_domain(question) if bounded else None
+        premises.append(_level_set(problem))
+    domain = certified_domain(problem) if bounded else None
     return Variant(feedforward=law.feedforward, premises=tuple(premises), domain=domain)
 
 
@@ -236,7 +236,7 @@ def matched_rate_premise(
         certified=against,
         unit="m/s^3",
         proved=certified is not None,
-        note=note if certified is not None else note + "; no certificate: compared with the limit that no V can exceed",
+        note=note if certified is not None else note + "; no certificate: compared with an upper limit for every V",
     )
 
 
@@ -245,17 +245,17 @@ def _along_reference(fault: Fault, controller: SlidingMode, certified: Fraction 
     return matched_rate_premise(fault, controller, "along_reference", Errors(), certified, note)
 
 
-def _level_set(question: DomainProblem) -> Premise:
+def _level_set(problem: DomainProblem) -> Premise:
     """Premise on the level set of the initial state: method *whole* or *split*, whichever has the smaller ratio."""
-    fault, law = question.fault, question.controller
-    level = question.sets.level(initial_perturbation(fault, law.divisor))
-    errors = question.sets.errors(level)
-    start = f"rigorous on the level set of V that holds the start: |e1| <= {UpperBound(errors.slip):.2g} m, "
+    fault, law = problem.fault, problem.controller
+    level = problem.sets.level(initial_perturbation(fault, law.divisor))
+    errors = problem.sets.errors(level)
+    start = f"rigorous on the level set of V that contains the start: |e1| <= {UpperBound(errors.slip):.2g} m, "
     start += f"|e2| <= {UpperBound(errors.rate):.2g} m/s"
-    parts, rate = question.split(level), question.whole(level)
+    parts, rate = problem.split(level), problem.whole(level)
     share = sum(parts.values(), Fraction(0)) if parts else None
     if share is None or rate <= share:
-        return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(question.certificate), start)
+        return matched_rate_premise(fault, law, "level_set", errors, certified_lipschitz(problem.certificate), start)
     return Premise(
         name="level_set",
         required=share,
@@ -295,7 +295,7 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             certificate.loop.law == controller.name
             and dict(certificate.loop.gains) == dict(controller.gains)
             and certificate.loop.constants.get("b") == needed.authority,
-            "the certificate is about other gains, or another fault.",
+            "gains or control authority of the certificate differ from those on this fault.",
         )
     inside = ranges["s"][0] <= needed.slip[0] and ranges["w"][0] <= needed.rate[0] <= needed.rate[1] <= ranges["w"][1]
     peak_rate = Fraction(15, 8) * rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
@@ -320,14 +320,14 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             required=peak_rate,
             certified=0.0,
             unit="m/s",
-            note="certified about constant references; for a moving one see the certified peaks",
+            note="certified for constant references; for a moving reference, see the certified peaks",
         ),
         Premise(
             name="vanishing_disturbance",
             required=float_above(fault.disturbance_bounds[0]),
             certified=0.0,
             unit="m/s^2",
-            note="for one that does not vanish see the certified peaks",
+            note="certified for vanishing disturbances; for other disturbances, see the certified peaks",
         ),
         *_limits_premise(fault, controller),
     ]
@@ -346,7 +346,7 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
             required=abs(worst[0]),
             certified=abs(worst[1]),
             unit="Pa",
-            note="inside the limits of the law; the proof is about deviations that do not reach them",
+            note="inside the limits of the law; the proof is for deviations within these limits",
         )
     ]
 
@@ -371,7 +371,7 @@ def require_degree_of_slip(loop: Loop) -> None:
     if degree != slip_degree():
         raise CertificateError(
             f"{loop.law} acts on derivative {degree} of its first state, the pressure on derivative {slip_degree()} of "
-            "the slip: the certificate is about another plant than a fault"
+            "the slip: the plant of the certificate is not a fault"
         )
 
 
@@ -394,14 +394,14 @@ def covers(certificate: Certificate, fault: Fault) -> list[str]:
     if loop.domain == "reals":
         needed = sectors(fault)
         if loop.constants != {"b": needed.authority}:
-            raise CertificateError(f"the control authority is not that of {fault.name}")
+            raise CertificateError(f"the control authority of the certificate is not that of {fault.name}")
         ranges = needed.ranges()
     else:
         divisor = least_authority(fault)
         ranges = {"beta": coefficient_range(fault, divisor)}
         zero = Errors(slip=Fraction(0), rate=Fraction(0), acceleration=Fraction(0))
         if certified_lipschitz(certificate) <= 0:
-            raise CertificateError("the certified range of d = h' must hold 0 inside to cover a fault")
+            raise CertificateError("the certified range of d = h' must contain 0 in its interior to cover a fault")
         rate = largest_matched_rate(fault, divisor, zero)
         least = UpperBound(rate / certified_lipschitz(certificate))
         lines.append(f"|h'| <= {UpperBound(rate):.4g} m/s^3 along the reference needs a scale of at least {least:.4g}")

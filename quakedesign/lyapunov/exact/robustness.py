@@ -30,7 +30,7 @@ from quakedesign.symbolic.terms import Term, cell_polynomial
 # β·∂V/∂e2·w to V'. For |w| ≤ g1|e1| + g2|e2| the quotients β|∂V/∂e2||e_i| / (−V'·V^{p_i}), p_i = (r_i − r_2 − d)/m, are
 # homogeneous of degree 0, so they have maxima a_i, and V' stays negative where a1·g1·V^{p1} + a2·g2·V^{p2} < 1.
 
-_PUSHED = 1
+_INPUT = 1
 """Index of e2, on which ν acts."""
 
 
@@ -57,8 +57,8 @@ class _Cells:
         self.weights = list(self.loop.states.values())
         self.m = obligation_degree([p for _, p in self.obligations.function()], "V")
         # e1' = e2 determines the degree of the field
-        self.degree = self.weights[_PUSHED] - self.weights[0]
-        self.fallen = self.m + self.degree
+        self.degree = self.weights[_INPUT] - self.weights[0]
+        self.decrease_degree = self.m + self.degree
         self.sizes = [_size(certificate.claims.get(f"bound_{s}"), self.m) for s in self.loop.states]
 
     def form(self, polynomial: dict[tuple[int, ...], Fraction], total: int) -> Form:
@@ -75,27 +75,27 @@ class _Cells:
         for _, values in self.obligations.vertices():
             parameters = {**self.loop.parameters, **values}
             rate = cell_polynomial(self.obligations.derivative, self.loop.states, signs, parameters)
-            yield values, self.form({e: -c for e, c in rate.items()}, self.fallen)
+            yield values, self.form({e: -c for e, c in rate.items()}, self.decrease_degree)
 
     def power(self, index: int) -> Fraction:
         """Exponent p_i = (r_i − r_2 − d)/m, where d is the degree of the field."""
-        return Fraction(self.weights[index] - self.weights[_PUSHED] - self.degree, self.m)
+        return Fraction(self.weights[index] - self.weights[_INPUT] - self.degree, self.m)
 
     def slope(self) -> tuple[Term, ...]:
         """∂V/∂e2."""
         symbols = self.loop.symbols
-        second = symbols[list(self.loop.states)[_PUSHED]]
+        second = symbols[list(self.loop.states)[_INPUT]]
         derivative = lie_derivative(from_terms(self.lyapunov, symbols), {second: sp.Integer(1)})
         return to_terms(derivative, [symbols[s] for s in self.loop.states])
 
-    def push(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
+    def disturbance_term(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
         """Bound β·∂V/∂e2·|e_i| on a cell, from the enclosures of the units of e_i and e2 in their states."""
         weight = self.weights[index]
         bare = cell_polynomial(slope, self.loop.states, signs, {})
         units = list(error_units(self.loop, self.model).values())
-        beta *= units[index][1] / units[_PUSHED][0]
+        beta *= units[index][1] / units[_INPUT][0]
         raised = {tuple(k + weight * (j == index) for j, k in enumerate(e)): beta * c for e, c in bare.items()}
-        return self.form(raised, self.m - self.weights[_PUSHED] + weight)
+        return self.form(raised, self.m - self.weights[_INPUT] + weight)
 
 
 def _size(gamma: Fraction | None, m: int) -> Fraction:
@@ -124,26 +124,26 @@ def robustness(certificate: Certificate, model: LoopField | None = None) -> Robu
     except (CertificateError, KinkError):
         return None
     try:
-        ratios = [largest_ratio(_against_decrease(cells, slope, index)) for index in (0, _PUSHED)]
+        ratios = [largest_ratio(_against_decrease(cells, slope, index)) for index in (0, _INPUT)]
         source = "bisection of the cells"
     except (CertificateError, KinkError):
         kappa = certificate.claims.get("decay")
         if kappa is None:
             return None
-        largest = [largest_ratio(_against_function(cells, slope, index)) for index in (0, _PUSHED)]
+        largest = [largest_ratio(_against_function(cells, slope, index)) for index in (0, _INPUT)]
         ratios = [None if v is None else v / kappa for v in largest]
         source = "claimed decay"
     slip, rate = ratios
     if slip is None or rate is None:
         return None
-    return Robustness(slip=slip, rate=rate, slip_power=cells.power(0), rate_power=cells.power(_PUSHED), source=source)
+    return Robustness(slip=slip, rate=rate, slip_power=cells.power(0), rate_power=cells.power(_INPUT), source=source)
 
 
 def _against_decrease(cells: _Cells, slope: tuple[Term, ...], index: int) -> list[Problem]:
     """Quotients β|∂V/∂e2||e_i| / (−V'·V^p) on every cell and vertex."""
     powers = (Fraction(1), Fraction(-1), -cells.power(index))
     return [
-        ((cells.push(slope, index, signs, values["beta"]), decrease, function), powers)
+        ((cells.disturbance_term(slope, index, signs, values["beta"]), decrease, function), powers)
         for signs, function in cells.functions()
         for values, decrease in cells.decreases(signs)
     ]
@@ -153,9 +153,9 @@ def _against_function(cells: _Cells, slope: tuple[Term, ...], index: int) -> lis
     """Quotients β|∂V/∂e2||e_i| / V^{1 + …} on every cell, with the largest β."""
     beta = cells.loop.uncertain["beta"][1]
     return [
-        ((push, function), (Fraction(1), -Fraction(push.degree, cells.m)))
+        ((term, function), (Fraction(1), -Fraction(term.degree, cells.m)))
         for signs, function in cells.functions()
-        for push in (cells.push(slope, index, signs, beta),)
+        for term in (cells.disturbance_term(slope, index, signs, beta),)
     ]
 
 

@@ -34,7 +34,7 @@ from quakedesign.lyapunov.search.lyapunov_search import (
     scaled,
     sum_of,
 )
-from quakedesign.lyapunov.search.parametric_forms import FormRow, Kin, float_rows, values_of
+from quakedesign.lyapunov.search.parametric_forms import FormRow, StructureKey, float_rows, values_of
 from quakedesign.sos import Polynomial, Statement
 from quakedesign.sos.solve.joint import DecisionBounds, Demand, JointProgram, joint_program
 from quakedesign.symbolic.term_expressions import signed_monomials
@@ -47,12 +47,13 @@ from quakedesign.symbolic.terms import Term
 
 Form = dict[tuple[int, ...], Any]
 """Polynomial with floats."""
+Values = Mapping[str, float]
 Template = tuple[FormRow, Statement, tuple[Fraction, ...]]
 _GRID = 1 << 40
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pace:
+class RequiredRate:
     """Required rate κ, by −w^{m−n}V̇ ≥ κ((n/m)V + (1 − n/m)w^m), which is linear in V and implies V̇ ≤ −κV^{n/m}.
 
     By Young's inequality V^{n/m} ≤ (n/m)V/w^{m−n} + (1 − n/m)w^n for every w > 0, with equality at w = V^{1/m}. A
@@ -85,11 +86,11 @@ def neighbourhood(
     degree: int,
     scale: tuple[Fraction, ...],
     *,
-    pace: Pace | None = None,
+    required: RequiredRate | None = None,
     lyapunov: tuple[Term, ...] = (),
     changed: Sequence[Loop] = (),
 ) -> Neighbourhood:
-    """Demands V > 0 and V̇ < 0 (or the faster decrease of a pace) near one set of gains.
+    """Demands V > 0 and V̇ < 0 (or the required rate of decrease) near one set of gains.
 
     Parameters
     ----------
@@ -105,16 +106,16 @@ def neighbourhood(
     """
     monomials = signed_monomials(loop.states, degree, loop.domain)
     sizes = tuple(Fraction(_power(scale, exponents_of(term, loop.states))) for term in monomials)
-    kin = Kin(loop, degree)
+    key = StructureKey(loop, degree)
     now = {(t.parameters, t.factors): float(t.coefficient) for t in lyapunov}
     present = [now.get((t.parameters, t.factors), 0.0) for t in monomials]
     values = values_of(loop)
     others = [values_of(other) for other in changed]
     demands, fixed = [], []
-    for row, template, whole in _templates(kin, scale, pace is not None):
-        parts = [_faster(row, j, values, pace, 1 / float(size)) for j, size in enumerate(sizes)]
-        moves = [_moved(row, present, values, other, pace) for other in others]
-        rest = _rest(row, pace)
+    for row, template, whole in _templates(key, scale, required is not None):
+        parts = [_faster(row, j, values, required, 1 / float(size)) for j, size in enumerate(sizes)]
+        moves = [_moved(row, present, values, other, required) for other in others]
+        rest = _rest(row, required)
         grown = [{e: c * float(_power(whole, e)) for e, c in p.items()} for p in (*parts, *moves, rest)]
         size = max((abs(c) for p in grown[:-1] for c in p.values()), default=1.0)
         *grown, rest = [{e: c / size for e, c in p.items()} for p in grown]
@@ -122,7 +123,7 @@ def neighbourhood(
         margin = power_sum(len(loop.states), power, len(whole))
         demands.append(Demand(template=template, parts=grown, margin=margin))
         fixed.append(rest)
-    program = _program(kin, scale, pace is not None, len(changed))
+    program = _program(key, scale, required is not None, len(changed))
     return Neighbourhood(monomials=monomials, sizes=sizes, program=program, demands=tuple(demands), fixed=tuple(fixed))
 
 
@@ -130,12 +131,10 @@ def _power(base: Sequence[Fraction], exponents: Sequence[int]) -> Fraction | int
     return math.prod(b**e for b, e in zip(base, exponents, strict=True) if e)
 
 
-def _columns(
-    row: FormRow, j: int | None, values: Mapping[str, float], weights: Sequence[float] = ()
-) -> tuple[Form, Form]:
+def _columns(row: FormRow, j: int | None, values: Values, weights: Sequence[float] = ()) -> tuple[Form, Form]:
     """V and −V̇ of one monomial, or of all monomials with weights."""
     columns: tuple[Form, Form] = ({}, {})
-    for total, parts in zip(columns, (row.function, row.fall), strict=True):
+    for total, parts in zip(columns, (row.function, row.decrease), strict=True):
         for k, e, names, c in parts:
             if j is None or k == j:
                 value = c * (weights[k] if j is None else 1.0) * math.prod(values[n] for n in names)
@@ -146,47 +145,47 @@ def _columns(
 def _faster(
     row: FormRow,
     j: int | None,
-    values: Mapping[str, float],
-    pace: Pace | None,
+    values: Values,
+    required: RequiredRate | None,
     factor: float,
     weights: Sequence[float] = (),
 ) -> Form:
     """Part of a row that depends on V: V, −V̇, or −w^{m−n}V̇ − κ(n/m)V."""
-    function, fall = _columns(row, j, values, weights)
-    if not row.fall:
+    function, decrease = _columns(row, j, values, weights)
+    if not row.decrease:
         form = function
-    elif pace is None:
-        form = fall
+    elif required is None:
+        form = decrease
     else:
-        m, n = pace.degrees
-        size = len(row.fall[0][1])
-        form = fall
+        m, n = required.degrees
+        size = len(row.decrease[0][1])
+        form = decrease
         for _ in range(m - n):
-            form = _times(form, _wide(pace.forms[row.cell], size))
+            form = _times(form, _wide(required.forms[row.cell], size))
         for e, c in _wide(function, size).items():
-            form[e] = form.get(e, 0.0) - pace.rate * n / m * c
+            form[e] = form.get(e, 0.0) - required.rate * n / m * c
     return {e: c * factor for e, c in form.items()}
 
 
 def _moved(
-    row: FormRow, present: Sequence[float], values: Mapping[str, float], other: Mapping[str, float], pace: Pace | None
+    row: FormRow, present: Sequence[float], values: Values, other: Values, required: RequiredRate | None
 ) -> Form:
     """Change of a row with the current V when the numbers of the loop change."""
-    before = _faster(row, None, values, pace, 1.0, present)
-    after = _faster(row, None, other, pace, 1.0, present)
+    before = _faster(row, None, values, required, 1.0, present)
+    after = _faster(row, None, other, required, 1.0, present)
     return {e: after.get(e, 0.0) - before.get(e, 0.0) for e in {**before, **after}}
 
 
-def _rest(row: FormRow, pace: Pace | None) -> Form:
+def _rest(row: FormRow, required: RequiredRate | None) -> Form:
     """Part of a row that does not depend on V: −κ(1 − n/m)w^m."""
-    if pace is None or not row.fall:
+    if required is None or not row.decrease:
         return {}
-    m, n = pace.degrees
-    form = _wide(pace.forms[row.cell], len(row.fall[0][1]))
+    m, n = required.degrees
+    form = _wide(required.forms[row.cell], len(row.decrease[0][1]))
     result = form
     for _ in range(m - 1):
         result = _times(result, form)
-    return {e: -pace.rate * (m - n) / m * c for e, c in result.items()}
+    return {e: -required.rate * (m - n) / m * c for e, c in result.items()}
 
 
 def _wide(form: Form, size: int) -> Form:
@@ -203,16 +202,16 @@ def _times(left: Form, right: Form) -> Form:
 
 
 @lru_cache(maxsize=32)
-def _templates(kin: Kin, scale: tuple[Fraction, ...], paced: bool) -> tuple[Template, ...]:
+def _templates(key: StructureKey, scale: tuple[Fraction, ...], has_rate: bool) -> tuple[Template, ...]:
     """Every row with its set and monomials in scaled variables, and the scale of all variables."""
     templates = []
-    loop = kin.loop
-    for row in float_rows(kin):
+    loop = key.loop
+    for row in float_rows(key):
         whole = lifted_scale(row.equalities, scale)
-        parts = row.fall or row.function
+        parts = row.decrease or row.function
         degree = sum(parts[0][1])
         support = dict.fromkeys(e for _, e, _, _ in parts)
-        if row.fall and paced:
+        if row.decrease and has_rate:
             power, size = sum(row.function[0][1]), len(parts[0][1])
             unit = dict.fromkeys((tuple(int(i == j) for j in range(size)) for i in range(len(loop.states))), 1.0)
             form = dict(unit)
@@ -238,11 +237,11 @@ def _raised(support: Iterable[tuple[int, ...]], unit: Form, times: int) -> Form:
 
 
 @lru_cache(maxsize=32)
-def _program(kin: Kin, scale: tuple[Fraction, ...], paced: bool, changes: int) -> JointProgram:
-    loop, degree = kin.loop, kin.structure.degree
+def _program(key: StructureKey, scale: tuple[Fraction, ...], has_rate: bool, changes: int) -> JointProgram:
+    loop, degree = key.loop, key.structure.degree
     count = len(signed_monomials(loop.states, degree, loop.domain)) + changes
     return JointProgram(
-        [Demand(template=t, parts=[{}] * count, margin={}) for _, t, _ in _templates(kin, scale, paced)]
+        [Demand(template=t, parts=[{}] * count, margin={}) for _, t, _ in _templates(key, scale, has_rate)]
     )
 
 
@@ -292,15 +291,15 @@ def degrees_of(obligations: Obligations) -> tuple[int, int]:
     return m, obligation_degree([one.polynomial for _, one in obligations.decrease("")], "V̇")
 
 
-def pace_of(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: int) -> Pace:
-    """Pace with which V ≤ 1 of degree m = `power` settles within T = 1/speed: κ = speed·m/(m−n), for n < m.
+def required_rate(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: int) -> RequiredRate:
+    """Rate with which V ≤ 1 of degree m = `power` settles within T = 1/speed: κ = speed·m/(m−n), for n < m.
 
     w is fitted on every cell to the root V^{1/m} of a nearby V, whose degree may differ.
     """
     obligations = Obligations(loop, lyapunov)
     m, n = degrees_of(obligations)
     forms = {cell.name: _form(obligations.potential(cell.signs), m) for cell in obligations.sign_cells()}
-    return Pace(rate=speed * power / (m - n), degrees=(power, power + n - m), forms=forms)
+    return RequiredRate(rate=speed * power / (m - n), degrees=(power, power + n - m), forms=forms)
 
 
 def least_margins(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> tuple[float, float]:
@@ -389,7 +388,7 @@ def _values(polynomial: Polynomial, points: np.ndarray) -> np.ndarray:
 # Scaling of the gains with the uncertain parameters: exponents that the terms of the loop determine.
 
 
-def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fraction]:
+def scaling_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fraction]:
     """Exponents p and q with which gains k → s^p·k and states x → s^q·x compensate scaled uncertain parameters.
 
     Every term of a rate must scale like its state, and all terms of a nested argument alike. With d → s·d this is the
@@ -427,7 +426,7 @@ def stretch_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
     if not solution or not all(v.is_Rational for v in solution):
         raise ParameterError(
             f"the terms of {loop.law} must determine how its gains scale. Received {solution or 'a contradiction'}. "
-            "Leave out gains without effect."
+            "Omit gains without effect on the loop."
         )
     exponents = {name: fraction_of(v) for name, v in zip(unknown, solution, strict=True)}
     return {name: exponents[name] for name in (*loop.gains, *loop.states)}
@@ -451,7 +450,7 @@ class PathSetting:
     """Constants of a search."""
 
     objective: "Objective"
-    exponents: Mapping[str, Fraction]  # Exponents of gains and states, see `stretch_exponents`
+    exponents: Mapping[str, Fraction]  # Exponents of gains and states, see `scaling_exponents`
     degree: int  # Degree of V
     units: Mapping[str, sp.Expr] = field(default_factory=dict)  # See `LoopField.units`
     least: float = MARGIN  # Least accepted margin; well above the accuracy of the solver
@@ -484,7 +483,7 @@ class Objective(ABC):
     meaning: ClassVar[str]
     larger: ClassVar[bool] = True
     bounded: ClassVar[bool] = True
-    paced: ClassVar[bool] = False
+    has_rate: ClassVar[bool] = False
 
     bound: float | None = None  # Largest ‖k_i/L̄^{p_i}‖₂ allowed
 
@@ -501,7 +500,7 @@ class Objective(ABC):
         return loop
 
     def speed(self, level: float) -> float | None:
-        """Speed 1/T that a level requires, see `pace_of`; None without a pace."""
+        """Speed 1/T that a level requires, see `required_rate`; None without one."""
         return None
 
     def norm_bound(self, level: float) -> float | None:
@@ -528,7 +527,7 @@ class Objective(ABC):
         return find_certificate(state.loop, setting.degree, subject=subject)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Proof of given gains without a climb; a paced objective compares it with a climb. None without one."""
+        """Proof of given gains without a climb; an objective with a rate compares it with a climb. None without one."""
         return None
 
     @abstractmethod
@@ -629,7 +628,7 @@ def _level(setting: PathSetting, state: State, share: float) -> State | None:
     """State with the same gains at a better level; None if none is found."""
     level = setting.objective.improved(state.level, share)
     level = setting.objective.reached(level, state.loop, setting.exponents)
-    return look(setting, state.loop, level, state.lyapunov, state.level)
+    return state_at(setting, state.loop, level, state.lyapunov, state.level)
 
 
 def _step(setting: PathSetting, state: State, share: float) -> State | None:
@@ -641,20 +640,20 @@ def _step(setting: PathSetting, state: State, share: float) -> State | None:
     base = [float(k) for k in loop.gains.values()]
     changed = [with_gains(loop, g) for g in changes.values()]
     sizes = [float(changes[name][name] - loop.gains[name]) for name in changes]
-    around = _around(setting, loop, level, state.lyapunov, changed)
-    if around is None:
+    neighbourhood = _neighbourhood(setting, loop, level, state.lyapunov, changed)
+    if neighbourhood is None:
         return None
-    limits = _limits(setting, loop, level, around, dict(zip(changes, sizes, strict=True)))
-    proposal = around.program.solve(around.demands, around.fixed, limits)
+    limits = _limits(setting, loop, level, neighbourhood, dict(zip(changes, sizes, strict=True)))
+    proposal = neighbourhood.program.solve(neighbourhood.demands, neighbourhood.fixed, limits)
     if proposal is None:
         return None
     chosen = dict(zip(loop.gains, base, strict=True))
-    first = len(around.monomials)
+    first = len(neighbourhood.monomials)
     for name, size, x in zip(changes, sizes, proposal.decision[first : first + len(sizes)], strict=True):
         chosen[name] += size * x
     moved = with_gains(loop, short(loop, objective.clipped(chosen, loop, setting.exponents)))
     beyond = state.level if share else None
-    return look(setting, moved, objective.reached(level, moved, setting.exponents), state.lyapunov, beyond)
+    return state_at(setting, moved, objective.reached(level, moved, setting.exponents), state.lyapunov, beyond)
 
 
 def _changes(setting: PathSetting, loop: Loop, trust: float) -> dict[str, dict[str, Fraction]]:
@@ -673,22 +672,22 @@ def _changes(setting: PathSetting, loop: Loop, trust: float) -> dict[str, dict[s
     return changes
 
 
-def _around(
+def _neighbourhood(
     setting: PathSetting, loop: Loop, level: float, lyapunov: tuple[Term, ...], changed: Sequence[Loop] = ()
 ) -> Neighbourhood | None:
     speed = setting.objective.speed(level)
     try:
-        pace = pace_of(loop, lyapunov, speed, setting.degree) if speed else None
-        return neighbourhood(loop, setting.degree, balance(loop), pace=pace, lyapunov=lyapunov, changed=changed)
+        required = required_rate(loop, lyapunov, speed, setting.degree) if speed else None
+        return neighbourhood(loop, setting.degree, balance(loop), required=required, lyapunov=lyapunov, changed=changed)
     except (CertificateError, ValueError):
         return None
 
 
 def _limits(
-    setting: PathSetting, loop: Loop, level: float, around: Neighbourhood, sizes: Mapping[str, float]
+    setting: PathSetting, loop: Loop, level: float, neighbourhood: Neighbourhood, sizes: Mapping[str, float]
 ) -> DecisionBounds:
     """Bounds: |a_j| and shares of the changes at most one, and the norm of the gains within the objective's bound."""
-    count = len(around.monomials)
+    count = len(neighbourhood.monomials)
     bound = setting.objective.norm_bound(level)
     rows, bounds = [], []
     if bound is not None and sizes:
@@ -698,20 +697,20 @@ def _limits(
         rows.append([*[0.0] * count, *slopes])
         bounds.append(bound - norm)
     return DecisionBounds(
-        radii=[1.0] * (count + len(sizes)), rows=rows, bounds=bounds, shares=_shares(setting, loop, around)
+        radii=[1.0] * (count + len(sizes)), rows=rows, bounds=bounds, shares=_shares(setting, loop, neighbourhood)
     )
 
 
-def _shares(setting: PathSetting, loop: Loop, around: Neighbourhood) -> list[float]:
-    """Bounds on the terms of V on the box per unit of a_j, which ensure V ≤ 1 there; empty without a pace."""
-    if not setting.objective.paced:
+def _shares(setting: PathSetting, loop: Loop, neighbourhood: Neighbourhood) -> list[float]:
+    """Bounds on the terms of V on the box per unit of a_j, which ensure V ≤ 1 there; empty without a rate."""
+    if not setting.objective.has_rate:
         return []
     sizes = box(loop, setting.units)
-    shares = [on_box((term,), loop.states, sizes) for term in around.monomials]
-    return [share / float(size) for size, share in zip(around.sizes, shares, strict=True)]
+    shares = [on_box((term,), loop.states, sizes) for term in neighbourhood.monomials]
+    return [share / float(size) for size, share in zip(neighbourhood.sizes, shares, strict=True)]
 
 
-def look(
+def state_at(
     setting: PathSetting,
     loop: Loop,
     level: float,
@@ -724,7 +723,7 @@ def look(
     Parameters
     ----------
     lyapunov : tuple of Term
-        V of a nearby state, needed only for a pace.
+        V of a nearby state, needed only for a required rate.
     least : float, optional
         Least accepted margin; by default that of the setting.
     """
@@ -732,12 +731,12 @@ def look(
     if beyond is not None and not objective.better(level, beyond):
         return None
     loop = objective.at(loop, level)
-    around = _around(setting, loop, level, lyapunov)
-    if around is None:
+    neighbourhood = _neighbourhood(setting, loop, level, lyapunov)
+    if neighbourhood is None:
         return None
-    limits = _limits(setting, loop, level, around, {})
-    proposal = around.program.solve(around.demands, around.fixed, limits)
+    limits = _limits(setting, loop, level, neighbourhood, {})
+    proposal = neighbourhood.program.solve(neighbourhood.demands, neighbourhood.fixed, limits)
     if proposal is None or not proposal.margin > (setting.least if least is None else least):
         return None
-    function = around.function(proposal.decision)
+    function = neighbourhood.function(proposal.decision)
     return State(loop=loop, level=level, lyapunov=function, margin=proposal.margin)

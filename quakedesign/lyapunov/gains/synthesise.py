@@ -30,12 +30,12 @@ from quakedesign.lyapunov.gains.path_following import (
     degrees_of,
     fastest,
     least_margins,
-    look,
     on_box,
     rounded,
     scaled_norm,
+    scaling_exponents,
     short,
-    stretch_exponents,
+    state_at,
     with_gains,
 )
 from quakedesign.lyapunov.search.certify import Number, closed_loop, largest_gain_range
@@ -50,7 +50,7 @@ from quakedesign.lyapunov.search.lyapunov_search import (
 )
 from quakedesign.lyapunov.search.settling_time import fastest_settling
 from quakedesign.parallel import Crew, Here, crew_or_here
-from quakedesign.sos.solve.conic import handing_back
+from quakedesign.sos.solve.conic import collecting
 
 # ----------------------------------------------------------------------
 # Objectives: order of levels, requirements of a level on a loop, the final proof and its value.
@@ -79,7 +79,7 @@ class SmallestNorm(Objective):
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
         """State at given gains."""
-        return look(setting, loop, scaled_norm(loop, setting.exponents), least=FAINT)
+        return state_at(setting, loop, scaled_norm(loop, setting.exponents), least=FAINT)
 
     def figure(self, certificate: Certificate, setting: PathSetting) -> float:
         """Norm of the gains."""
@@ -96,16 +96,16 @@ class LargestDecay(Objective):
 
     name: ClassVar[str] = "decay"
     unit: ClassVar[str] = "1/s"
-    meaning: ClassVar[str] = "one over the certified settling time from where every error is at most the bound on |h'|"
-    paced: ClassVar[bool] = True
+    meaning: ClassVar[str] = "inverse of the certified settling time from errors of at most the bound on |h'|"
+    has_rate: ClassVar[bool] = True
 
     def speed(self, level: float) -> float | None:
         """The level itself."""
         return level
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
-        """State at half the estimated speed of a V that was computed without a pace, or a smaller speed."""
-        first = look(replace(setting, objective=SmallestNorm()), loop, scaled_norm(loop, setting.exponents))
+        """State at half the estimated speed of a V that was computed without a rate, or a smaller speed."""
+        first = state_at(replace(setting, objective=SmallestNorm()), loop, scaled_norm(loop, setting.exponents))
         if first is None:
             return None
         largest = on_box(first.lyapunov, loop.states, box(loop, setting.units))
@@ -114,7 +114,7 @@ class LargestDecay(Objective):
         speed = fastest(loop, function) * (m - n) / m
         for _ in range(_HALVINGS):
             speed /= 2
-            state = look(setting, loop, speed, function)
+            state = state_at(setting, loop, speed, function)
             if state is not None:
                 return state
         return None
@@ -156,7 +156,7 @@ class LargestRange(Objective):
 
     name: ClassVar[str] = "beta"
     unit: ClassVar[str] = "-"
-    meaning: ClassVar[str] = "ratio of the ends of the range of β to its geometric middle"
+    meaning: ClassVar[str] = "ratio of the ends of the range of β to its geometric mean"
 
     middle: Fraction = Fraction(1)
     first: float = 1.01
@@ -169,7 +169,7 @@ class LargestRange(Objective):
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
         """State with the requested range, which is widened to at least 1 % on either side."""
-        return look(setting, loop, self.first, least=FAINT)
+        return state_at(setting, loop, self.first, least=FAINT)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
         """Certificate of the largest range to four digits, by a search over one number in which V̇ is affine."""
@@ -201,7 +201,7 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
     require_known(name, _OBJECTIVES, "objective", UnknownNameError)
     chosen = _OBJECTIVES[name]
     if chosen.bounded and not (bound is not None and bound > 0):
-        raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give one.")
+        raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give bound.")
     make = partial(chosen, bound=bound if chosen.bounded else None)
     if chosen is not LargestRange:
         return make()
@@ -232,7 +232,7 @@ class SynthesisProblem:
     published: tuple[Loop, ...]  # Loops with gains from the literature, scaled to the same ranges
 
 
-def question(
+def problem_of(
     subject: Subject,
     objective: str,
     *,
@@ -252,7 +252,7 @@ def question(
     loop = closed_loop(subject, (1,) * len(model.gains), lipschitz=lipschitz, gain_range=gain_range)
     if not ("d" in loop.uncertain and loop.uncertain["d"][1] > 0):
         raise ParameterError(f"synthesis needs a positive bound on |d|. Received lipschitz = {lipschitz}.")
-    exponents = stretch_exponents(loop, {"d": 1})
+    exponents = scaling_exponents(loop, {"d": 1})
     published = tuple(with_gains(loop, gains) for gains in _literature(name, loop, exponents))
     if bound is None and published:
         bound = min(scaled_norm(one, exponents) for one in published)
@@ -285,7 +285,7 @@ def _scaled(
 ) -> dict[str, Fraction]:
     """Gains for |d| ≤ bound and β = 1, scaled to the ranges of the loop and rounded to four digits."""
     beta = float(loop.uncertain["beta"][0]) if "beta" in loop.uncertain else 1.0
-    of_beta = stretch_exponents(loop, {"beta": 1})
+    of_beta = scaling_exponents(loop, {"beta": 1})
     ratio = float(loop.uncertain["d"][1]) / bound
     moved = {n: k * ratio ** float(exponents[n]) * beta ** float(of_beta[n]) for n, k in gains.items()}
     return short(loop, moved)
@@ -317,7 +317,7 @@ def _beyond(setting: PathSetting, loop: Loop) -> tuple[bool, float]:
 # ----------------------------------------------------------------------
 # Joint search for gains and a Lyapunov function; gains without a proof are never returned.
 
-_STRETCHES = (1.0, 1.5, 4.0)
+_GAIN_SCALES = (1.0, 1.5, 4.0)
 _DRAWS = 12
 _MOST_STARTS = 10_000
 _TRIES, _FEW = 6, 2
@@ -414,14 +414,14 @@ def synthesise(
     SimulationError
         When the workers are not reachable, or die.
     """
-    problem = question(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
+    problem = problem_of(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
     require_count(_MOST_STARTS, starts=starts)
     require_count(MOST_WORKERS, workers=workers)
     first = list(islice(begin_with(problem, seed), starts * _DRAWS))
-    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+    with Here() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         best = _best(problem, _climbed(problem.setting, first, starts, crew))
     mine = _synthesis(problem, *best) if best else None
-    return _beside(problem, mine) if compare else mine
+    return _compared(problem, mine) if compare else mine
 
 
 def _synthesis(problem: SynthesisProblem, certificate: Certificate, value: float) -> Synthesis:
@@ -436,10 +436,10 @@ def _synthesis(problem: SynthesisProblem, certificate: Certificate, value: float
     )
 
 
-def _beside(problem: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
+def _compared(problem: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
     """Synthesis compared with gains from the literature, which replace it if they are better within the norm bound."""
     objective = problem.setting.objective
-    compared = [given(problem, one) for one in problem.published]
+    compared = [compared_gains(problem, one) for one in problem.published]
     for one in compared:
         if one.certificate is None or one.value is None or one.norm > (objective.bound or one.norm) * (1 + 1e-9):
             continue
@@ -478,7 +478,7 @@ def attempt(setting: PathSetting, loop: Loop) -> list[State]:
 
     The level is improved first with fixed gains, then with free gains.
     """
-    begin = next(filter(None, (_begin(setting, _stretched(setting, loop, s)) for s in _STRETCHES)), None)
+    begin = next(filter(None, (_begin(setting, _scaled_up(setting, loop, s)) for s in _GAIN_SCALES)), None)
     if begin is None:
         return []
     fixed = climb(setting, begin, free=False)
@@ -498,7 +498,7 @@ def _begin(setting: PathSetting, loop: Loop) -> State | None:
     return setting.objective.start(setting, loop)
 
 
-def _stretched(setting: PathSetting, loop: Loop, factor: float) -> Loop:
+def _scaled_up(setting: PathSetting, loop: Loop, factor: float) -> Loop:
     """Loop with the gains scaled to a larger L̄."""
     if factor == 1:
         return loop
@@ -525,7 +525,7 @@ def _carried(higher: PathSetting, state: State) -> State | None:
     """State with a V of higher degree for the gains of a state, at its level or a lower one."""
     objective = higher.objective
     levels = [objective.reached(state.level * share, state.loop, higher.exponents) for share in _SHARES]
-    states = (look(higher, state.loop, level, state.lyapunov, least=FAINT) for level in dict.fromkeys(levels))
+    states = (state_at(higher, state.loop, level, state.lyapunov, least=FAINT) for level in dict.fromkeys(levels))
     return next(filter(None, states), None)
 
 
@@ -548,7 +548,7 @@ def _proved(
     return None
 
 
-def given(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
+def compared_gains(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
     """Objective for given gains of any norm, with V of every degree; without the ratio.
 
     Parameters
@@ -560,7 +560,7 @@ def given(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
     setting = replace(problem.setting, objective=objective, least=FAINT)
     shorter = objective.given(loop, problem.degrees, problem.subject)
     proofs = [(shorter, objective.figure(shorter, setting))] if shorter else []
-    for degree in problem.degrees if objective.paced or not shorter else ():
+    for degree in problem.degrees if objective.has_rate or not shorter else ():
         at = replace(setting, degree=degree)
         begin = objective.start(at, loop)
         states = _in_order(at, [climb(at, begin, free=False)]) if begin else []

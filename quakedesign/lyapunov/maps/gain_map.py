@@ -26,7 +26,7 @@ from quakedesign.lyapunov.maps.sweep import CLEAR, Frame, Path, Sweep, prove
 from quakedesign.lyapunov.search.certify import Number, closed_loop, necessary_limit
 from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees
 from quakedesign.parallel import Crew, Here, crew_or_here
-from quakedesign.sos.solve.conic import handing_back
+from quakedesign.sos.solve.conic import collecting
 
 # ----------------------------------------------------------------------
 # Computation of the points of a map, by workers that cache their compiled sweeps.
@@ -100,7 +100,7 @@ class Screener:
         sweep = self._sweep(loop)
         if sweep is None:
             return False
-        answer = None if handing_back() else self._follow(sweep, loop)
+        answer = None if collecting() else self._follow(sweep, loop)
         return _solved(sweep, loop) if answer is None else answer
 
     def _follow(self, sweep: Sweep, loop: Loop) -> bool | None:
@@ -158,7 +158,7 @@ class Screeners:
     def __init__(self, sheet: Sheet, crew: Crew) -> None:
         self._sheet, self._crew = sheet, crew
 
-    def answers(self, question: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
+    def answers(self, method: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
         """Results of one method of `Screener` for many arguments, in any order.
 
         Raises
@@ -166,7 +166,7 @@ class Screeners:
         SimulationError
             When processes die repeatedly; a single killed process is replaced.
         """
-        tasks = [(self._sheet, question, one) for one in arguments]
+        tasks = [(self._sheet, method, one) for one in arguments]
         return (answer for _, answer in self._crew.answers(_answer, tasks))
 
 
@@ -179,17 +179,17 @@ class _Cached(threading.local):
 _cached = _Cached()
 
 
-def _answer(sheet: Sheet, question: str, arguments: tuple[object, ...]) -> Any:
+def _answer(sheet: Sheet, method: str, arguments: tuple[object, ...]) -> Any:
     if _cached.screener is None or _cached.screener.sheet != sheet:
         _cached.screener = Screener(sheet)
-    return getattr(_cached.screener, question)(*arguments)
+    return getattr(_cached.screener, method)(*arguments)
 
 
 # ----------------------------------------------------------------------
 # Certified region of two gains: a grid screened with one compiled problem; its edges and a sample proved exactly.
 
 SHARES = tuple(Fraction(s, 100) for s in (25, 50, 75, 90, 99))
-"""Levels of L̄ as shares of the necessary limit of the base gains, unless levels are given."""
+"""Default levels of L̄, as shares of the necessary limit of the base gains."""
 _NEIGHBOURS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 
 
@@ -285,7 +285,7 @@ def gain_map(
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
-    with Here() if handing_back() else crew_or_here(workers, scheduler, executor) as crew:
+    with Here() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         began, screeners = perf_counter(), Screeners(sheet, crew)
         limits, screened, solves = _screen(sheet, screeners, tell)
         middle = perf_counter()
@@ -337,16 +337,14 @@ def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[F
     """
     first, last = rational(low, what), rational(high, what)
     if not first < last:
-        raise ParameterError(f"{what} must rise. Received {low} to {high}.")
+        raise ParameterError(f"{what} must ascend. Received {low} to {high}.")
     shares = [i / (points - 1) for i in range(1, points - 1)]
     a, b = float(first), float(last)
     inner = [a * (b / a) ** s if first > 0 else a + (b - a) * s for s in shares]
     digits = 3 + max(0, round(log10(points)) - 1)
     values = (first, *(Fraction(f"{v:.{digits}e}") for v in inner), last)
     if any(u >= v for u, v in pairwise(values)):
-        raise ParameterError(
-            f"{what} is too narrow for {points} points. Received {low} to {high}. Ask for fewer points."
-        )
+        raise ParameterError(f"{what} is too narrow for {points} points. Received {low} to {high}. Use fewer points.")
     return values
 
 
@@ -358,7 +356,7 @@ def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tu
         return ordered
     limit = necessary_limit(loop, subject)
     if not limit:
-        raise ParameterError("levels of L̄ are needed, since the base gains give no limit. Give --lipschitz.")
+        raise ParameterError("levels of L̄ are required, since the base gains give no limit. Give --lipschitz.")
     return tuple(share * limit for share in SHARES)
 
 

@@ -117,13 +117,13 @@ def _template(row: FormRow, loop: Loop, scale: Sequence[Fraction]) -> Statement:
 # multipliers. All numbers are floating point: a sweep screens without proof.
 
 ACCURACY = 1e-10
-"""Tolerance of the solver by default."""
+"""Default tolerance of the solver."""
 SURE = 5e-10
-"""Margins above this count as found; the solver's answers are about as accurate as that."""
+"""Margins above this are taken as positive; it is about the accuracy of the solver."""
 CLEAR = 1e-6
-"""Margins above this decide what is chosen once for many points, such as a degree, on every processor alike: kernels of
-linear algebra move margins near zero by up to 2e-9."""
-_TOO_FAR = "the gains are too far apart for a search in floating point."
+"""Margins above this decide choices for many points, such as a degree, alike on every processor: kernels of linear
+algebra change margins near zero by up to 2e-9."""
+_TOO_FAR = "the magnitudes of the gains differ too much for a search in floating point."
 _MOST_SCALES = 64  # number of scales with cached coefficients
 
 
@@ -132,7 +132,7 @@ class Frame:
     """Units in which the numbers of a point are about one."""
 
     scale: tuple[Fraction, ...]  # Powers of two, u_i = scale_i·ũ_i
-    pace: float  # Divisor of −V̇
+    rate_scale: float  # Divisor of −V̇
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,7 +172,7 @@ class Sweep:
         self.monomials = signed_monomials(loop.states, degree, loop.domain)
         self.rows = rows_of(loop, self.monomials) if self.monomials else ()
         if not any(row.rate for row in self.rows):
-            raise CertificateError(f"there are no Lyapunov functions of degree {degree} to try for {loop.law}.")
+            raise CertificateError(f"there are no candidate functions V of degree {degree} for {loop.law}.")
         self.products = sorted({names for row in self.rows for _, _, names, _ in row.parts})
         order = {names: i for i, names in enumerate(self.products)}
         parts = [part for row in self.rows for part in row.parts]
@@ -195,7 +195,7 @@ class Sweep:
     def frame(self, loop: Loop) -> Frame:
         """Units of one point."""
         scale = balance(loop)
-        return Frame(scale=scale, pace=self._in_units(scale).pace(self._features(values_of(loop))))
+        return Frame(scale=scale, rate_scale=self._in_units(scale).rate_scale(self._features(values_of(loop))))
 
     def solve(
         self, loop: Loop, frame: Frame | None = None, accuracy: float = ACCURACY, *, anew: bool = False
@@ -219,9 +219,9 @@ class Sweep:
             When the magnitudes of its numbers differ too much for floating point.
         """
         if not self.covers(loop):
-            raise ValueError("the point has another structure. Compile a sweep for it.")
+            raise ValueError("the loop differs in structure from that of the sweep. Compile a sweep for it.")
         values, units = values_of(loop), frame or self.frame(loop)
-        solution = self._in_units(units.scale).solve(self._features(values), units.pace, accuracy, anew=anew)
+        solution = self._in_units(units.scale).solve(self._features(values), units.rate_scale, accuracy, anew=anew)
         self.solves += 1
         if solution is None:
             return None
@@ -236,8 +236,8 @@ class Sweep:
             monomials=self.monomials,
             sizes=self._in_units(frame.scale).sizes,
             demands=(),
-            pace=Fraction(frame.pace),
-            fallen=max(sum(e) for row in self.rows if row.rate for e in row.margin),
+            rate_scale=Fraction(frame.rate_scale),
+            decrease_degree=max(sum(e) for row in self.rows if row.rate for e in row.margin),
         )
 
     def cones(self, frame: Frame) -> Cones:
@@ -248,7 +248,7 @@ class Sweep:
         """Values of all parts at a point, as required by `Cones`."""
         features = self._features(values_of(loop))
         numbers = self._in_units(frame.scale)
-        return np.asarray(numbers.weights(frame.pace) * features[numbers.products])
+        return np.asarray(numbers.weights(frame.rate_scale) * features[numbers.products])
 
     def _in_units(self, scale: tuple[Fraction, ...]) -> "_Numbers":
         if scale not in self._numbers:
@@ -298,7 +298,7 @@ class _Numbers:
         if not np.isfinite(self.coefficients).all():
             raise OverflowError
 
-    def pace(self, features: np.ndarray) -> float:
+    def rate_scale(self, features: np.ndarray) -> float:
         """Largest coefficient of all −V̇_j."""
         with np.errstate(over="ignore", invalid="ignore"):
             merged = np.bincount(self.cones.slots[self.rate], (self.coefficients * features[self.products])[self.rate])
@@ -306,15 +306,15 @@ class _Numbers:
             raise CertificateError(_TOO_FAR)
         return float(np.abs(merged).max(initial=0.0)) or 1.0
 
-    def weights(self, pace: float) -> np.ndarray:
+    def weights(self, rate_scale: float) -> np.ndarray:
         """Coefficient of the product of parameters in every part."""
-        return np.asarray(np.where(self.rate, self.coefficients / pace, self.coefficients))
+        return np.asarray(np.where(self.rate, self.coefficients / rate_scale, self.coefficients))
 
     def solve(
-        self, features: np.ndarray, pace: float, accuracy: float, *, anew: bool
+        self, features: np.ndarray, rate_scale: float, accuracy: float, *, anew: bool
     ) -> tuple[float, list[float], np.ndarray, float] | None:
         """Margin, decision, derivative of the margin in every product, and solver time; None if the solver fails."""
-        weights = self.weights(pace)
+        weights = self.weights(rate_scale)
         solution = self.cones.solve(weights * features[self.products], accuracy, anew=anew)
         if solution is None:
             return None
@@ -367,7 +367,7 @@ _ROOM = 10.0  # least ratio of a valid bound to the residual of its equations
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
+class _Centre:
     """Functionals of all kinds of rows, near the centre of one τ."""
 
     tau: float
@@ -386,7 +386,7 @@ class _Step:
     # least, most: Extreme eigenvalues of ΔS relative to S
     least: float
     most: float
-    missed: float  # Largest residual of the equations, by rounding errors
+    residual: float  # Largest residual of the equations, by rounding errors
 
     @property
     def size(self) -> float:
@@ -396,9 +396,9 @@ class _Step:
     @property
     def feasible(self) -> bool | None:
         """Whether the margin is above `SURE`; None if the bounds do not decide."""
-        if self.most < 1 and -self.tau * self.multipliers[0] > max(SURE, _ROOM * self.missed):
+        if self.most < 1 and -self.tau * self.multipliers[0] > max(SURE, _ROOM * self.residual):
             return True
-        return False if self.least > -1 and self.bound < -_ROOM * self.missed else None
+        return False if self.least > -1 and self.bound < -_ROOM * self.residual else None
 
 
 class Path:
@@ -419,22 +419,22 @@ class Path:
         self._kinds = [_Rows(list(alike)) for _, alike in groupby(rows, key=lambda row: _kind(row[0]))]
         self._means = np.append(0.0, cones.means)
         begun = [kind.interior(cones.margin) / len(rows) for kind in self._kinds]
-        self._places = [_Place(_FIRST, begun)]
+        self._centres = [_Centre(_FIRST, begun)]
 
     def begin(self, frame: Frame) -> "Path":
         """Path without cached neighbours, on which results could depend; the frame must have the same scale."""
         self.frame = frame
-        del self._places[1:]
+        del self._centres[1:]
         return self
 
     def feasible(self, loop: Loop) -> bool | None:
         """Whether there is a Lyapunov function with a margin above `SURE`; None if undecided."""
         table = self.sweep.cones(self.frame).table(self.sweep.parts_at(loop, self.frame))
         tables = [kind.of(table) for kind in self._kinds]
-        place, at_neighbour = self._places[-1], True
+        centre, at_neighbour = self._centres[-1], True
         for _ in range(_MOST):
             try:
-                newton = _Newton(self._kinds, tables, self._means, place)
+                newton = _Newton(self._kinds, tables, self._means, centre)
                 step = newton.step()
                 if step.feasible is None and step.size < _NEAR:
                     step = newton.further(step)
@@ -442,24 +442,24 @@ class Path:
                 step = None
             if step is not None and step.feasible is not None:
                 return step.feasible
-            if at_neighbour and len(self._places) > 1 and (step is None or step.size > _FAR):
-                self._places.pop()
-                place = self._places[-1]
+            if at_neighbour and len(self._centres) > 1 and (step is None or step.size > _FAR):
+                self._centres.pop()
+                centre = self._centres[-1]
                 continue
             if step is None:
                 return None
-            place, at_neighbour = self._moved(place, step), False
+            centre, at_neighbour = self._moved(centre, step), False
         return None
 
-    def _moved(self, place: _Place, step: _Step) -> _Place:
+    def _moved(self, centre: _Centre, step: _Step) -> _Centre:
         """Place after a step, or after 90 % of the way to the boundary; a centred place replaces those of smaller τ."""
         share = min(1.0, 0.9 / step.size)
-        moved = _Place(step.tau, [f + share * d for f, d in zip(place.functionals, step.moves, strict=True)])
+        moved = _Centre(step.tau, [f + share * d for f, d in zip(centre.functionals, step.moves, strict=True)])
         if step.size < _NEAR:
-            later = [one for one in self._places[1:] if one.tau > step.tau]
+            later = [one for one in self._centres[1:] if one.tau > step.tau]
             if len(later) > 1 and later[-2].tau * _APART < step.tau:
                 later.pop()
-            self._places[1:] = [*later, moved]
+            self._centres[1:] = [*later, moved]
         return moved
 
 
@@ -478,10 +478,10 @@ class _Newton:
     """
 
     def __init__(
-        self, kinds: "Sequence[_Rows]", tables: Sequence[np.ndarray], means: np.ndarray, place: _Place
+        self, kinds: "Sequence[_Rows]", tables: Sequence[np.ndarray], means: np.ndarray, centre: _Centre
     ) -> None:
-        self._kinds, self._tables, self._means, self._place = kinds, tables, means, place
-        self._forms = [kind.beside(f) for kind, f in zip(kinds, place.functionals, strict=True)]
+        self._kinds, self._tables, self._means, self._centre = kinds, tables, means, centre
+        self._forms = [kind.relative_to(f) for kind, f in zip(kinds, centre.functionals, strict=True)]
         self._squares = [one @ one.transpose(0, 2, 1) for one in self._forms]
         slopes = [one @ kind.unit for kind, one in zip(kinds, self._forms, strict=True)]
         sides = [np.dstack(pair) for pair in zip(tables, slopes, strict=True)]
@@ -510,8 +510,8 @@ class _Newton:
 
     def step(self) -> _Step:
         """Newton's step towards the centre for the τ of the place."""
-        rest = self._rest(self._place.functionals, 0.0)
-        return self._refined(self._place.tau, *self._solve(self._free, rest, 1 / self._place.tau))
+        rest = self._rest(self._centre.functionals, 0.0)
+        return self._refined(self._centre.tau, *self._solve(self._free, rest, 1 / self._centre.tau))
 
     def further(self, step: _Step) -> _Step:
         """Step of limited size towards the centre for a smaller τ, from the step for the τ of the place."""
@@ -538,9 +538,9 @@ class _Newton:
                 (one @ (kind.unit - change)[..., None])[..., 0] - table @ multipliers
                 for kind, one, change, table in zip(self._kinds, self._forms, changes, self._tables, strict=True)
             ]
-            rest = self._rest([f + d for f, d in zip(self._place.functionals, moves, strict=True)], bound)
-            missed = max(np.abs(rest).max(), tau * max(np.abs(fall).max() for fall in falls))
-            if missed * _ROOM < min(abs(bound), tau * abs(multipliers[0])):
+            rest = self._rest([f + d for f, d in zip(self._centre.functionals, moves, strict=True)], bound)
+            residual = max(np.abs(rest).max(), tau * max(np.abs(fall).max() for fall in falls))
+            if residual * _ROOM < min(abs(bound), tau * abs(multipliers[0])):
                 break
             free = [np.linalg.solve(h, fall[..., None])[..., 0] for h, fall in zip(self._squares, falls, strict=True)]
             more, further, higher = self._solve(free, rest, 1 / tau - self._means @ multipliers)
@@ -548,7 +548,7 @@ class _Newton:
             multipliers, bound = multipliers + further, bound + higher
         least, most = self._ends(changes)
         return _Step(
-            tau=tau, moves=moves, multipliers=multipliers, bound=bound, least=least, most=most, missed=float(missed)
+            tau=tau, moves=moves, multipliers=multipliers, bound=bound, least=least, most=most, residual=float(residual)
         )
 
 
@@ -607,7 +607,7 @@ class _Rows:
         sized = values / (values * margin[self._places]).sum(axis=1)[:, None]
         return np.asarray((self._bases.transpose(0, 2, 1) @ sized[..., None])[..., 0])
 
-    def beside(self, functional: np.ndarray) -> np.ndarray:
+    def relative_to(self, functional: np.ndarray) -> np.ndarray:
         """F⁻¹ S_i F⁻ᵀ of all unknowns i, with F Fᵀ = S = Σ_i L_i S_i: scaled triangles (rows × unknowns × ·)."""
         blocks = []
         for block, (upper, lower, factors) in zip(self._blocks, self._corners, strict=True):

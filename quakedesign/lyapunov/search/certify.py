@@ -164,7 +164,7 @@ def _require_one(degrees: Mapping[Fraction, str], loop: Loop) -> None:
         (m, first), (n, second), *_ = degrees.items()
         raise ParameterError(
             f"a certificate needs a loop of one degree in the weights {dict(loop.states)}. Received degree {m} of "
-            f"{first} and {n} of {second}. Other weights may do: quakedesign.symbolic.homogeneity.weights_for."
+            f"{first} and {n} of {second}. Use weights of quakedesign.symbolic.homogeneity.weights_for."
         )
 
 
@@ -365,7 +365,7 @@ class CertifiedLimit:
         """
         needed = rational(lipschitz, "lipschitz")
         if needed <= 0 or self.quantity != "lipschitz":
-            raise ParameterError(f"a scale needs the reach in lipschitz and a positive bound. Received {needed}.")
+            raise ParameterError(f"a scale needs the limit of lipschitz and a positive bound. Received {needed}.")
         return needed / self.value if self.value else None
 
 

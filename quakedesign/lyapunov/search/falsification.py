@@ -35,20 +35,20 @@ def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
         Number of steps of the first runs; a step moves the state by at most 1/200 of its size.
     """
     field = _FloatField(loop)
-    plays = list(product(*(_choices(loop, name) for name in loop.uncertain)))
-    coarse = field.growths(plays, steps, 1 / 200)
-    for i in sorted(range(len(plays)), key=lambda i: -coarse[i])[:3]:
+    strategies = list(product(*(_choices(loop, name) for name in loop.uncertain)))
+    coarse = field.growths(strategies, steps, 1 / 200)
+    for i in sorted(range(len(strategies)), key=lambda i: -coarse[i])[:3]:
         if coarse[i] < _GROWTH:
             break
-        fine = field.growths(plays[i : i + 1], 4 * steps, 1 / 400)[0]
+        fine = field.growths(strategies[i : i + 1], 4 * steps, 1 / 400)[0]
         if fine > _AGAIN * coarse[i]:
-            strategies = (f"{name} follows {play}" for name, play in zip(loop.uncertain, plays[i], strict=True))
-            return Escape(growth=float(fine), strategy=", ".join(strategies))
+            followed = (f"{name} follows {one}" for name, one in zip(loop.uncertain, strategies[i], strict=True))
+            return Escape(growth=float(fine), strategy=", ".join(followed))
     return None
 
 
 @dataclass(frozen=True, slots=True)
-class _Play:
+class _Strategy:
     """Sign that a parameter follows: that of a product of states and rates, at the middle of all ranges."""
 
     names: tuple[str, ...]
@@ -58,7 +58,7 @@ class _Play:
         return ("" if self.sign > 0 else "-") + "·".join(self.names)
 
 
-def _choices(loop: Loop, name: str) -> list[_Play]:
+def _choices(loop: Loop, name: str) -> list[_Strategy]:
     low, high = loop.uncertain[name]
     rates = {state: f"{state}'" for state in loop.states}
     products: list[tuple[str, ...]]
@@ -67,7 +67,7 @@ def _choices(loop: Loop, name: str) -> list[_Play]:
         products = [*rates.items(), *combinations(loop.states, 2)]
     else:
         products = [(one,) for pair in rates.items() for one in pair]
-    everything = [_Play(names, sign) for names in products for sign in (1, -1)]
+    everything = [_Strategy(names, sign) for names in products for sign in (1, -1)]
     return everything if low < high else everything[:1]
 
 
@@ -103,31 +103,31 @@ class _FloatField:
             total = total + part
         return total
 
-    def growths(self, plays: Sequence[tuple[_Play, ...]], steps: int, pace: float) -> np.ndarray:
+    def growths(self, strategies: Sequence[tuple[_Strategy, ...]], steps: int, step: float) -> np.ndarray:
         """Largest growth of every play in e-foldings over all initial states, without the initial share of the run."""
-        x = np.tile(np.random.default_rng(0).normal(size=(len(self.states), _STARTS)), len(plays))
+        x = np.tile(np.random.default_rng(0).normal(size=(len(self.states), _STARTS)), len(strategies))
         middle, ends = self._parameters()
         growth = np.zeros(x.shape[1])
-        followed = {name: self._followed([play[i] for play in plays]) for i, name in enumerate(self.loop.uncertain)}
+        followed = {name: self._followed([one[i] for one in strategies]) for i, name in enumerate(self.loop.uncertain)}
         columns = np.arange(x.shape[1])
-        for step in range(steps):
+        for number in range(steps):
             size = (np.abs(x) ** (1 / self.weights)).sum(axis=0)
             x = x / size**self.weights
-            growth += np.log(size) if step > steps * _UNCOUNTED else 0.0
+            growth += np.log(size) if number > steps * _UNCOUNTED else 0.0
             signs = np.sign(np.concatenate([x, self.rates(x, middle), np.ones((1, x.shape[1]))]))
             chosen: dict[str, np.ndarray | float] = dict(middle)
             for name, (low, high) in ends.items():
                 first, second, sign = followed[name]
                 chosen[name] = np.where(signs[first, columns] * signs[second, columns] * sign > 0, high, low)
             speed = self.rates(x, chosen)
-            x = x + pace * speed / np.abs(speed).max(axis=0)
-        return np.asarray(growth.reshape(len(plays), _STARTS).max(axis=1))
+            x = x + step * speed / np.abs(speed).max(axis=0)
+        return np.asarray(growth.reshape(len(strategies), _STARTS).max(axis=1))
 
-    def _followed(self, plays: Sequence[_Play]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _followed(self, strategies: Sequence[_Strategy]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rows (of states, rates and a one) of the two signs multiplied in every column, and the sign of the play."""
         rows = {name: i for i, name in enumerate((*self.states, *(f"{s}'" for s in self.states), ""))}
-        pairs = np.array([[rows[name] for name in (*play.names, "")[:2]] for play in plays])
-        return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([play.sign for play in plays], _STARTS))
+        pairs = np.array([[rows[name] for name in (*one.names, "")[:2]] for one in strategies])
+        return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([one.sign for one in strategies], _STARTS))
 
     def _parameters(self) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
         """All parameters, those with ranges at their middle, and the ends of the ranges."""

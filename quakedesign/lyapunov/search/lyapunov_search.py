@@ -41,7 +41,7 @@ from quakedesign.lyapunov.exact.obligations import (
 )
 from quakedesign.sos import Polynomial
 from quakedesign.sos.exact.polynomial import constant, monomial, product
-from quakedesign.sos.solve.conic import handing_back
+from quakedesign.sos.solve.conic import collecting
 from quakedesign.sos.solve.decide import strict_proof
 from quakedesign.sos.solve.joint import Demand, Proposal, joint_program
 from quakedesign.symbolic.term_expressions import signed_monomials
@@ -334,7 +334,7 @@ def cached(search: Search) -> Search:
 
     @wraps(search)
     def stored(loop: Loop, degree: int, subject: Subject | None) -> Certificate | None:
-        path, certificates = place(loop, degree), list[Certificate | None]()
+        path, certificates = path_of(loop, degree), list[Certificate | None]()
 
         def searched() -> str:
             certificates.append(search(loop, degree, subject))
@@ -342,7 +342,7 @@ def cached(search: Search) -> Search:
 
         if path.exists():
             text = path.read_text(encoding="utf-8")
-        elif handing_back() or not in_use():
+        elif collecting() or not in_use():
             return search(loop, degree, subject)
         else:
             text = search_once(searched, "lyapunov", loop, degree)
@@ -357,22 +357,22 @@ def cached(search: Search) -> Search:
     return stored
 
 
-def place(loop: Loop, degree: int) -> Path:
+def path_of(loop: Loop, degree: int) -> Path:
     """File of the search for a loop with all its numbers and a degree of V."""
     key = repr([degree, *((field.name, getattr(loop, field.name)) for field in fields(loop))])
     return FOLDER / f"{loop.law}_{sha256(key.encode()).hexdigest()[:16]}.json"
 
 
-def keep(loop: Loop, degree: int, certificate: Certificate | None) -> None:
+def store(loop: Loop, degree: int, certificate: Certificate | None) -> None:
     """Store the result of a search in its file."""
-    write_whole(place(loop, degree), _NOTHING if certificate is None else certificate_text(certificate))
+    write_whole(path_of(loop, degree), _NOTHING if certificate is None else certificate_text(certificate))
 
 
 # ----------------------------------------------------------------------
 # Search for a Lyapunov function of given gains, completed in exact arithmetic. One pipeline for every law.
 
 _WORTH_A_PROOF = 1e-9
-"""Margins above this are worth a proof in exact arithmetic, which decides."""
+"""Margins above this are tried in exact arithmetic, which decides."""
 _DIGITS = (1 << 14, 1 << 20, 1 << 30)
 _HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # higher degrees gain less than rounding or time cost
 
@@ -433,7 +433,7 @@ def finished(
         lyapunov = family.function(proposal.decision, digits)
         margins = (
             below(proposal.margin * float(min(1 / r**degree for r in scale))),
-            below(proposal.margin * float(family.pace * min(1 / r**family.fallen for r in scale))),
+            below(proposal.margin * float(family.rate_scale * min(1 / r**family.decrease_degree for r in scale))),
         )
         claims = claims_of(loop, lyapunov, margins) | bounds_of(loop, lyapunov, scale)
         certificate = finish(loop, lyapunov, claims, subject)
@@ -449,8 +449,8 @@ class Family:
     monomials: tuple[Term, ...]  # V_j·size_j
     sizes: tuple[Fraction, ...]  # Divisors that make the monomials about one in the scaled variables
     demands: tuple[Demand, ...]  # V and −V̇ on every different cell and vertex, scaled
-    pace: Fraction  # Divisor of −V̇
-    fallen: int  # Degree of V̇
+    rate_scale: Fraction  # Divisor of −V̇
+    decrease_degree: int  # Degree of V̇
 
     def function(self, decision: Sequence[float], digits: int) -> tuple[Term, ...]:
         """V with coefficients rounded to multiples of 1/digits in the scaled variables."""
@@ -474,19 +474,19 @@ def family_of(loop: Loop, degree: int, scale: Sequence[Fraction]) -> Family | No
     columns = [Obligations(loop, (term,)) for term in monomials]
     function = _rows([[Obligation(name, p) for name, p in c.function()] for c in columns])
     decrease = _rows([[one for _, one in c.decrease("")] for c in columns])
-    fallen = max((sum(e) for row in decrease for one in row for e in one.polynomial), default=0)
-    if not fallen or not function or not all(any(one.polynomial for one in row) for row in decrease):
+    power = max((sum(e) for row in decrease for one in row for e in one.polynomial), default=0)
+    if not power or not function or not all(any(one.polynomial for one in row) for row in decrease):
         return None
     moved = [[_moved(one, scale, 1 / size) for one, size in zip(row, sizes, strict=True)] for row in decrease]
-    pace = max(abs(c) for row in moved for one in row for c in one.polynomial.values())
+    largest = max(abs(c) for row in moved for one in row for c in one.polynomial.values())
     demands = [
         *(
             _demand([_moved(o, scale, 1 / s) for o, s in zip(row, sizes, strict=True)], loop, degree)
             for row in function
         ),
-        *(_demand([_moved(o, (), 1 / pace) for o in row], loop, fallen) for row in moved),
+        *(_demand([_moved(o, (), 1 / largest) for o in row], loop, power) for row in moved),
     ]
-    return Family(monomials=monomials, sizes=sizes, demands=tuple(demands), pace=pace, fallen=fallen)
+    return Family(monomials=monomials, sizes=sizes, demands=tuple(demands), rate_scale=largest, decrease_degree=power)
 
 
 def _rows(columns: list[list[Obligation]]) -> list[list[Obligation]]:

@@ -29,9 +29,9 @@ class FormRow:
     """V, or −V̇ with its V, on one cell (and vertex): a form Σ_j a_j P_j that must be non-negative there."""
 
     cell: str  # Signs of the states
-    # function, fall: Terms of all V_j and of all −V̇_j; `fall` is empty in a row of V
+    # function, decrease: Terms of all V_j and of all −V̇_j; `decrease` is empty in a row of V
     function: tuple[Part, ...]
-    fall: tuple[Part, ...] = ()
+    decrease: tuple[Part, ...] = ()
     # equalities, inequalities: Conditions on the variables in addition to u ≥ 0
     equalities: tuple[Polynomial, ...] = ()
     inequalities: tuple[Polynomial, ...] = ()
@@ -39,12 +39,12 @@ class FormRow:
     @property
     def rate(self) -> bool:
         """Whether P_j is −V̇_j instead of V_j."""
-        return bool(self.fall)
+        return bool(self.decrease)
 
     @property
     def parts(self) -> tuple[Part, ...]:
         """Terms of all P_j."""
-        return self.fall or self.function
+        return self.decrease or self.function
 
     @property
     def margin(self) -> Polynomial:
@@ -74,8 +74,8 @@ def values_of(loop: Loop) -> dict[str, float]:
     return values
 
 
-def rows_of(loop: Loop, monomials: Sequence[Term], *, beside: bool = False) -> tuple[FormRow, ...]:
-    """Every different form of V, then of −V̇; with `beside`, equal forms of −V̇ with different V are kept apart.
+def rows_of(loop: Loop, monomials: Sequence[Term], *, with_function: bool = False) -> tuple[FormRow, ...]:
+    """Every different form of V, then of −V̇; with `with_function`, equal forms of −V̇ with different V are kept apart.
 
     Raises
     ------
@@ -84,9 +84,9 @@ def rows_of(loop: Loop, monomials: Sequence[Term], *, beside: bool = False) -> t
     """
     columns = [Obligations(loop, (term,)) for term in monomials]
     rows: dict[tuple[object, ...], FormRow] = {}
-    for row in (*_functions(columns), *_falls(loop, columns)):
+    for row in (*_functions(columns), *_decreases(loop, columns)):
         conditions = tuple(tuple(sorted(p.items())) for p in (*row.equalities, *row.inequalities))
-        rows.setdefault((row.rate, row.parts, row.function if beside else (), conditions), row)
+        rows.setdefault((row.rate, row.parts, row.function if with_function else (), conditions), row)
     return tuple(rows.values())
 
 
@@ -99,14 +99,14 @@ def _potential(columns: Sequence[Obligations], signs: Mapping[str, int]) -> tupl
     return tuple(sorted((j, e, (), c) for j, column in enumerate(columns) for e, c in column.potential(signs).items()))
 
 
-def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
+def _decreases(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
     first, ends = columns[0], ends_of(loop)
     weights = {**loop.states, **first.lift_degrees}
     places = [i for i, name in enumerate(weights) if name in loop.states or name in first.with_variable]
     terms = [(j, term) for j, column in enumerate(columns) for term in column.derivative]
     for cell in first.cells:
         plain = [(j, term.parameters, *_single(term, weights, cell.signs)) for j, term in terms]
-        function = _potential(columns, cell.signs)
+        V = _potential(columns, cell.signs)
         word = "".join("+" if cell.signs[s] > 0 else "-" for s in loop.states)
         for choice in product(*ends.values()):
             vertex = dict(zip(ends, choice, strict=True))
@@ -119,7 +119,7 @@ def _falls(loop: Loop, columns: Sequence[Obligations]) -> Iterator[FormRow]:
             parts = tuple(sorted((*key, c) for key, c in total.items() if c))
             if parts:
                 yield FormRow(
-                    cell=word, function=function, fall=parts, equalities=cell.equalities, inequalities=cell.inequalities
+                    cell=word, function=V, decrease=parts, equalities=cell.equalities, inequalities=cell.inequalities
                 )
 
 
@@ -152,25 +152,25 @@ class Structure:
         return cls(fixed, inside, tuple((n, a == b, a == -b) for n, (a, b) in loop.ranges.items()), degree)
 
 
-class Kin:
+class StructureKey:
     """A loop that equals every other loop of its structure."""
 
     def __init__(self, loop: Loop, degree: int) -> None:
         self.loop, self.structure = loop, Structure.of(loop, degree)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Kin) and self.structure == other.structure
+        return isinstance(other, StructureKey) and self.structure == other.structure
 
     def __hash__(self) -> int:
         return hash(self.structure)
 
 
 @lru_cache(maxsize=32)
-def float_rows(kin: Kin) -> tuple[FormRow, ...]:
+def float_rows(key: StructureKey) -> tuple[FormRow, ...]:
     """Every different row of the monomials of V in floating point, each −V̇ with its V."""
-    monomials = signed_monomials(kin.loop.states, kin.structure.degree, kin.loop.domain)
-    rows = rows_of(kin.loop, monomials, beside=True)
-    return tuple(replace(row, function=_floats(row.function), fall=_floats(row.fall)) for row in rows)
+    monomials = signed_monomials(key.loop.states, key.structure.degree, key.loop.domain)
+    rows = rows_of(key.loop, monomials, with_function=True)
+    return tuple(replace(row, function=_floats(row.function), decrease=_floats(row.decrease)) for row in rows)
 
 
 def _floats(parts: Iterable[Part]) -> tuple[Part, ...]:

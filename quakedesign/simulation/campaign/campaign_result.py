@@ -210,9 +210,8 @@ class Campaign:
         looked_at = self.search.looked_at if self.search else ()
         number = index.removeprefix("search-")
         if not (index.startswith("search-") and number.isdecimal() and int(number) < len(looked_at)):
-            raise ParameterError(
-                f"index must be a whole number, or search-0 … search-{len(looked_at) - 1}. Received {index!r}."
-            )
+            searched = f", or search-0 … search-{len(looked_at) - 1}" if looked_at else ", since there was no search"
+            raise ParameterError(f"index must be a whole number{searched}. Received {index!r}.")
         return self.problem.trajectory(looked_at[int(number)], samples)
 
     def to_dict(self) -> Json:
@@ -220,19 +219,19 @@ class Campaign:
         return {
             "samples": len(self.results),
             "outcomes": {kind: {"count": len(found), "first": found[:SHOWN]} for kind, found in self.kinds.items()},
-            "worst": {metric: [self._told(i, metric) for i in self.worst(metric)] for metric in self.metrics},
+            "worst": {metric: [self._worst_entry(i, metric) for i in self.worst(metric)] for metric in self.metrics},
             "quantiles": self.quantiles(),
             "events": {name: {"count": len(found), "first": found[:SHOWN]} for name, found in self.events.items()},
             "failures": [{"samples": list(f.samples), "reason": f.reason} for f in self.failures],
-            "search": self._searched(),
+            "search": self._search_entry(),
             "resumed": self.resumed,
         }
 
-    def _told(self, index: int, metric: str) -> Json:
+    def _worst_entry(self, index: int, metric: str) -> Json:
         value = _finite(float(self.values(metric)[index]))
         return {"index": index, "value": value, "sample": self.problem.sample(index).numbers}
 
-    def _searched(self) -> Json | None:
+    def _search_entry(self) -> Json | None:
         if self.search is None:
             return None
         return {
@@ -273,15 +272,15 @@ class Campaign:
         contents = {
             "results.json": text,
             "samples.csv": self.to_pandas().to_csv(),
-            **({"distribution.png": self._drawn()} if figures is None else figures),
+            **({"distribution.png": self._image()} if figures is None else figures),
         }
         for name, content in contents.items():
             write_whole(Path(folder) / name, content)
 
-    def _drawn(self) -> bytes:
-        drawn = BytesIO()
-        self.plot().savefig(drawn, format="png", dpi=150, metadata={"Software": None})
-        return drawn.getvalue()
+    def _image(self) -> bytes:
+        image = BytesIO()
+        self.plot().savefig(image, format="png", dpi=150, metadata={"Software": None})
+        return image.getvalue()
 
     def plot(self) -> "Figure":
         """Return a matplotlib Figure of the distribution of the metrics."""
@@ -310,7 +309,7 @@ def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
 def require_metric(metric: str, known: Sequence[str]) -> None:
     """Raise if a metric is unknown."""
     if not known:
-        raise ParameterError(f"metric must be one of none, as all diverge. Received {metric!r}.")
+        raise ParameterError(f"metric must be that of a finite sample, but all samples diverge. Received {metric!r}.")
     require_known(metric, known, "metric")
 
 

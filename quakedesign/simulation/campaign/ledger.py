@@ -53,7 +53,7 @@ def differences(one: Any, other: Any, name: str = "") -> list[str]:
     return [] if one == other else [name]
 
 
-def _told(names: list[str]) -> str:
+def _listed(names: list[str]) -> str:
     """The first few names as text, without the digest that follows from the other entries."""
     chosen = [name or "everything" for name in names if name != "arithmetic"] or names
     return ", ".join(chosen[:_NAMED]) + " and more" * (len(chosen) > _NAMED)
@@ -95,8 +95,8 @@ class Ledger:
             ledger._clear()
         elif changed:
             raise SimulationError(
-                f"the campaign in {folder} must be this one to go on. Received one that differs in {_told(changed)}. "
-                "Choose another folder, or replace it by force."
+                f"the campaign in {folder} must have the same settings to be resumed. Received changes of "
+                f"{_listed(changed)}. Choose a new folder, or replace the campaign by force."
             )
         ledger._create()
         write_whole(folder / MANIFEST, text + "\n")
@@ -118,12 +118,12 @@ class Ledger:
         try:
             names = [path.name for path in self.folder.iterdir()] if self.folder.exists() else []
         except OSError as error:
-            raise OutputError(f"{self.folder} must be a folder: {error.strerror}. Choose another one.") from None
+            raise OutputError(f"{self.folder} must be a folder: {error.strerror}. Choose a folder.") from None
         others = [name for name in names if name != BATCHES and not name.startswith(FAMILY)]
         if others:
             raise OutputError(
                 f"the folder of a campaign must be new, empty, or that of this campaign. Received {self.folder}, "
-                f"which holds {others[0]}. Choose another one."
+                f"which contains {others[0]}. Choose a new folder."
             )
 
     def _changes(self, inputs: Any) -> list[str]:
@@ -156,7 +156,7 @@ class Ledger:
             return []
         if fingerprint != self.fingerprint:
             raise SimulationError(
-                f"{path} must be a batch of this campaign. Received one of another campaign. Take it away."
+                f"{path} must be a batch of this campaign. Received one of another campaign. Remove the file."
             )
         return list(zip(starts, ends, strict=True))
 

@@ -262,10 +262,10 @@ class SlidingProgram:
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
         """Metrics, then times of events, one sample a row; nan for missing ones."""
         duration = steps * float(self.step)
-        return np.array([_told(self.run([float(v) for v in row], duration, 1)) for row in np.atleast_2d(starts)])
+        return np.array([_sample_row(self.run([float(v) for v in row], duration, 1)) for row in np.atleast_2d(starts)])
 
 
-def _told(run: SlidingRun) -> list[float]:
+def _sample_row(run: SlidingRun) -> list[float]:
     measured = run.metrics.to_dict()
     found = [measured[name] for name in _FIGURES] + [run.events.get(name) for name in EVENTS]
     return [math.nan if value is None else float(value) for value in found]
@@ -398,7 +398,7 @@ class Library:
         """
         content = self.path.read_bytes()
         if _digest(content) != self.digest:
-            raise OSError(f"{self.path} is not what was built")
+            raise OSError(f"{self.path} differs from the library that was built")
         return content
 
 

@@ -33,7 +33,7 @@ from quakedesign.simulation.campaign.problem import (
 from quakedesign.simulation.campaign.space import Sample, Space, Worst, require_count, search
 from quakedesign.simulation.closed_loop import Load
 from quakedesign.simulation.integrators import DormandPrince, integrator
-from quakedesign.simulation.run_settings import STICK_SLIP, RunSetting, own_path, sampled_scheme
+from quakedesign.simulation.run_settings import STICK_SLIP, RunSetting, designed_path, sampled_scheme
 from quakedesign.simulation.slow_sliding import PLANTS
 from quakedesign.simulation.state_plant import TIDE
 
@@ -43,8 +43,8 @@ from quakedesign.simulation.state_plant import TIDE
 ATTEMPTS = 3
 _MOST_DEATHS = 2 * ATTEMPTS  # in a row: then the workers cannot run at all
 _DEATH = (
-    "a worker died (out of memory, or killed; in a script, the call belongs under if __name__ == '__main__':), "
-    "each time that this batch was computed"
+    "a worker died each time that this batch was computed: out of memory, killed, or started by a script without "
+    "if __name__ == '__main__':"
 )
 
 
@@ -86,7 +86,7 @@ class _Dispatch:
             for future in done:
                 dead += self._collect(self._running.pop(future), future)
             if dead:
-                self._bury([*dead, *self._left()])
+                self._after_deaths([*dead, *self._unfinished()])
         return self._failed
 
     def _fill(self) -> list[int]:
@@ -113,7 +113,7 @@ class _Dispatch:
         self._keep(key, answer)
         return []
 
-    def _bury(self, dead: list[int]) -> None:
+    def _after_deaths(self, dead: list[int]) -> None:
         """Renew the workers and decide which batches are suspected of the death."""
         self._running.clear()
         self._deaths += 1
@@ -128,7 +128,7 @@ class _Dispatch:
         else:
             self._suspects.extend(dead)
 
-    def _left(self) -> list[int]:
+    def _unfinished(self) -> list[int]:
         """Running batches left without a result by the broken workers."""
         done, pending = wait(self._running, timeout=1.0)
         lost = [key for future in done for key in self._collect(self._running[future], future)]
@@ -202,7 +202,7 @@ def campaign_problem(
     entries["setting"] = RunSetting.of(fault, step, duration, 1, settled_from)
 
     def stepped(fault: Fault) -> CampaignProblem:
-        actuator, substeps = own_path(controller, None) if isinstance(way, str) else (None, 1)
+        actuator, substeps = designed_path(controller, None) if isinstance(way, str) else (None, 1)
         entries["scheme"] = sampled_scheme(way, substeps, actuator, **own)
         if spread or stress:
             raise ParameterError(
@@ -323,8 +323,8 @@ class _Runner:
         self._problem, self._ledger, self._program, self._crew = problem, ledger, program, crew
         self._sent = crew.shared(program)
         self._batch, self._tell = batch, tell
-        self._known = ledger.read()
-        self._filed, self._used = frozenset(self._known), set[bytes]()
+        self._records = ledger.read()
+        self._filed, self._used = frozenset(self._records), set[bytes]()
         self.failures = list[Failure]()
 
     @property
@@ -335,10 +335,10 @@ class _Runner:
     def results(self, samples: Sequence[Sample], names: Sequence[str], what: str) -> list[SampleResult | None]:
         """Result of every sample, None where its batch failed."""
         starts = self._problem.starts(samples)
-        missing = [i for i, start in enumerate(starts) if start.tobytes() not in self._known]
+        missing = [i for i, start in enumerate(starts) if start.tobytes() not in self._records]
         self._used.update(start.tobytes() for start in starts)
         self._compute([starts[i] for i in missing], [names[i] for i in missing], what, len(starts))
-        ends = [self._known.get(start.tobytes()) for start in starts]
+        ends = [self._records.get(start.tobytes()) for start in starts]
         found = iter(self._problem.results([end for end in ends if end is not None]))
         return [None if end is None else next(found) for end in ends]
 
@@ -351,7 +351,7 @@ class _Runner:
         def keep(first: int, ends: "np.ndarray") -> None:
             nonlocal done
             self._ledger.add(batches[first], ends)
-            self._known |= {start.tobytes(): end for start, end in zip(batches[first], ends, strict=True)}
+            self._records |= {start.tobytes(): end for start, end in zip(batches[first], ends, strict=True)}
             done += len(ends)
             self._tell(what, done / total)
 

@@ -49,7 +49,7 @@ class Token(NamedTuple):
     start: int
 
 
-def refuse(text: str, token: Token, expected: str, remedy: str) -> NoReturn:
+def reject(text: str, token: Token, expected: str, remedy: str) -> NoReturn:
     """Raise PolynomialError with a short one-line excerpt, in which ⟦ ⟧ marks the token."""
     start, end = token.start, token.start + min(len(token.text), 24)
     before, after = text[max(0, start - 24) : start], text[end : end + 24]
@@ -91,7 +91,7 @@ class Expansion:
         return {0: value} if value else {}
 
     def _too_long(self, token: Token) -> NoReturn:
-        refuse(self._text, token, f"a number of at most {DIGITS} digits", "Round it, or scale the polynomial.")
+        reject(self._text, token, f"a number of at most {DIGITS} digits", "Round it, or scale the polynomial.")
 
     def variable(self, token: Token) -> Terms:
         """Polynomial of one name."""
@@ -108,34 +108,34 @@ class Expansion:
         self._spend(len(other), token, other)
         for key, value in other.items():
             self._accumulate(total, key, value, token)
-        self._room(len(total), token)
+        self._check_size(len(total), token)
         return total
 
     def multiply(self, left: Terms, right: Terms, token: Token) -> Terms:
         """p·q."""
         if self._degree(left) + self._degree(right) > DEGREE:
-            refuse(self._text, token, f"degree at most {DEGREE}", "Lower the degree.")
+            reject(self._text, token, f"degree at most {DEGREE}", "Lower the degree.")
         self._spend(len(left) * len(right), token, left, right)
         total: Terms = {}
         for key, value in left.items():
             for other, factor in right.items():
                 self._accumulate(total, key + other, value * factor, token)
-            self._room(len(total), token)
+            self._check_size(len(total), token)
         return total
 
     def divide(self, left: Terms, right: Terms, token: Token) -> Terms:
         """p/c for a nonzero number c."""
         if set(right) != {0}:
-            refuse(self._text, token, "a nonzero number after /", "Multiply out; only numbers divide.")
+            reject(self._text, token, "a nonzero number after /", "Multiply out; only numbers divide.")
         return self.multiply(left, {0: 1 / right[0]}, token)
 
     def power(self, base: Terms, token: Token) -> Terms:
         """Power p^n; the token must be a whole number n."""
         if not token.text.isdigit() or len(token.text) > 9 or int(token.text) > DEGREE:
             expected = f"a whole number from 0 to {DEGREE} as exponent"
-            refuse(self._text, token, expected, "Write for example x^2; only digits make an exponent.")
+            reject(self._text, token, expected, "Write for example x^2; only digits make an exponent.")
         exponent = int(token.text)
-        self._room(self._size_of_power(base, exponent), token)
+        self._check_size(self._size_of_power(base, exponent), token)
         total: Terms = {0: fmpq(1)}
         for _ in range(exponent):
             total = self.multiply(total, base, token)
@@ -164,11 +164,11 @@ class Expansion:
         longest = sum(max((value.height_bits() for value in terms.values()), default=0) for terms in operands)
         self._work -= operations * (1 + longest // _SHORT) + sum(map(len, operands))
         if self._work < 0:
-            refuse(self._text, token, "less to expand", "Expand or simplify the polynomial before.")
+            reject(self._text, token, "an expression with fewer operations", "Expand or simplify it.")
 
-    def _room(self, monomials: int, token: Token) -> None:
+    def _check_size(self, monomials: int, token: Token) -> None:
         if monomials > MONOMIALS:
-            refuse(self._text, token, f"at most {MONOMIALS} monomials", "Use fewer variables, or a lower degree.")
+            reject(self._text, token, f"at most {MONOMIALS} monomials", "Use fewer variables, or a lower degree.")
 
     def _accumulate(self, total: Terms, key: int, value: Any, token: Token) -> None:
         old = total.get(key)
@@ -177,7 +177,7 @@ class Expansion:
             total.pop(key, None)
         elif new.height_bits() > _BITS:
             expected = f"coefficients of at most {COEFFICIENT_DIGITS} digits"
-            refuse(self._text, token, expected, "Round or scale the numbers.")
+            reject(self._text, token, expected, "Round or scale the numbers.")
         else:
             total[key] = new
 
@@ -191,11 +191,11 @@ class Expansion:
 # never passed to an interpreter, and every limit is checked before the operation that it limits.
 
 LENGTH = 20_000
-"""Characters of one text."""
+"""Largest number of characters of a text."""
 DEPTH = 100
-"""Parentheses inside one another."""
+"""Largest depth of nested parentheses."""
 VARIABLES = 16
-"""Different names."""
+"""Largest number of different names."""
 
 _NAME = 32  # characters
 _TOKEN = re.compile(
@@ -241,7 +241,7 @@ def parse(
     order = _order(text, tokens, variables)
     relation = next((token for token in tokens if token.kind == "relation"), None)
     if relation:
-        refuse(text, relation, "a polynomial without relation", "Give constraints apart, for example on x>=0.")
+        reject(text, relation, "a polynomial without relation", "Give constraints apart, for example on x>=0.")
     expansion = Expansion(text, order)
     return order, expansion.unpacked(_evaluate(text, tokens, expansion))
 
@@ -315,7 +315,7 @@ def _scan(text: str) -> Iterator[Token]:
         match = _TOKEN.match(text, place)
         if match is None:
             remedy = "Use numbers, names, + - * / ^ ** and parentheses."
-            refuse(text, Token("other", text[place], place), "a number, a name or an operator", remedy)
+            reject(text, Token("other", text[place], place), "a number, a name or an operator", remedy)
         yield Token(str(match.lastgroup), _SAME.get(match[0], match[0]), place)
         place = _blank(text, match.end())
 
@@ -330,14 +330,14 @@ def _order(text: str, tokens: Sequence[Token], variables: Sequence[str] | None) 
     order = tuple(sorted(used, key=lambda name: used[name].start)) if variables is None else _checked(variables)
     for name, token in used.items():
         if len(name) > _NAME:
-            refuse(text, token, f"a name of at most {_NAME} characters", "Shorten it.")
+            reject(text, token, f"a name of at most {_NAME} characters", "Shorten it.")
         if variables is None and name in _NUMBERS:
-            remedy = "Write numbers in digits; name a variable otherwise, or declare it (variables=)."
-            refuse(text, token, "a number in digits or the name of a variable", remedy)
+            remedy = "Write numbers in digits; rename a variable, or declare it (variables=)."
+            reject(text, token, "a number in digits or the name of a variable", remedy)
         if name not in order:
-            refuse(text, token, f"one of the variables {', '.join(order)}", "Correct the name, or declare it.")
+            reject(text, token, f"one of the variables {', '.join(order)}", "Correct the name, or declare it.")
     if len(order) > VARIABLES:
-        refuse(text, used[order[VARIABLES]], f"at most {VARIABLES} different variables", "Use fewer.")
+        reject(text, used[order[VARIABLES]], f"at most {VARIABLES} different variables", "Use fewer.")
     return order
 
 
@@ -356,12 +356,12 @@ def _relation(text: str, tokens: Sequence[Token]) -> int:
     """Index of the only relation among the tokens."""
     places = [i for i, token in enumerate(tokens) if token.kind == "relation"]
     if not places:
-        refuse(text, tokens[-1], "one of >=, <=, ==", "Write for example x >= 0.")
+        reject(text, tokens[-1], "one of >=, <=, ==", "Write for example x >= 0.")
     if len(places) > 1:
-        refuse(text, tokens[places[1]], "only one relation", "Give two constraints instead of a chain.")
+        reject(text, tokens[places[1]], "only one relation", "Give two constraints instead of a chain.")
     token = tokens[places[0]]
     if token.text not in _RELATIONS:
-        refuse(text, token, "one of >=, <=, ==", "Sets are closed here; write >= for >.")
+        reject(text, token, "one of >=, <=, ==", "Only closed sets are supported; write >= for >.")
     return places[0]
 
 
@@ -377,7 +377,7 @@ def _evaluate(text: str, tokens: Sequence[Token], expansion: Expansion) -> Terms
             place += 1
             values[-1] = expansion.power(values[-1], tokens[place])
             if tokens[place + 1].text == "^":
-                refuse(text, tokens[place + 1], "only one exponent", "Write (x^2)^3 for a power of a power.")
+                reject(text, tokens[place + 1], "only one exponent", "Write (x^2)^3 for a power of a power.")
         else:
             operand = _continue(text, tokens[place], values, pending, expansion)
         place += 1
@@ -392,12 +392,12 @@ def _begin(text: str, token: Token, values: list[Terms], pending: list[Token], e
     sign = token.text
     if sign == "(":
         if sum(other.text == "(" for other in pending) >= DEPTH:
-            refuse(text, token, f"at most {DEPTH} nested parentheses", "Remove some, or expand.")
+            reject(text, token, f"at most {DEPTH} nested parentheses", "Remove some, or expand.")
         pending.append(token)
     elif sign == "-":
         pending.append(token._replace(kind="negative"))
     elif sign != "+":
-        refuse(text, token, "a number, a name or (", "Complete the expression there.")
+        reject(text, token, "a number, a name or (", "Complete the expression there.")
     return False
 
 
@@ -405,14 +405,14 @@ def _continue(text: str, token: Token, values: list[Terms], pending: list[Token]
     """Process a token after a complete operand; whether another operand must follow."""
     sign = token.text
     if token.kind not in ("end", "operator") or sign == "(":
-        refuse(text, token, "an operator", "Write products with *, for example 2*x.")
+        reject(text, token, "an operator", "Write products with *, for example 2*x.")
     strength = _STRENGTH.get(sign, 0)
     while pending and pending[-1].text != "(" and _strength(pending[-1]) >= strength:
         _apply(pending.pop(), values, expansion)
     if token.kind == "end" and pending:
-        refuse(text, pending[-1], "a closing partner of this (", "Balance the parentheses.")
+        reject(text, pending[-1], "a closing parenthesis for this (", "Balance the parentheses.")
     if sign == ")" and not pending:
-        refuse(text, token, "no ) without its (", "Balance the parentheses.")
+        reject(text, token, "an opening parenthesis for this )", "Balance the parentheses.")
     if sign == ")":
         pending.pop()
     else:

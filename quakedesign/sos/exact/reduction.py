@@ -51,7 +51,7 @@ def reduced_bases(statement: Statement) -> Bases:
     """
     alive = [dict.fromkeys(basis) for basis in full_bases(statement)]
     others, diagonal = _contributions(statement, alive)
-    open_to_equalities = reach(statement)
+    open_to_equalities = equality_monomials(statement)
     target = statement.target
     waiting = list(diagonal)
     while waiting:
@@ -61,7 +61,7 @@ def reduced_bases(statement: Statement) -> Bases:
         for k, b, _ in list(diagonal[e]):
             if b in alive[k]:
                 del alive[k][b]
-                waiting += _forget(statement.weights[k], k, b, alive[k], others, diagonal)
+                waiting += _removed(statement.weights[k], k, b, alive[k], others, diagonal)
     return tuple(tuple(basis) for basis in alive)
 
 
@@ -80,7 +80,7 @@ def _contributions(statement: Statement, alive: Any) -> Any:
     return others, diagonal
 
 
-def _forget(weight: Polynomial, k: int, gone: Exponents, basis: Any, others: Any, diagonal: Any) -> list[Exponents]:
+def _removed(weight: Polynomial, k: int, gone: Exponents, basis: Any, others: Any, diagonal: Any) -> list[Exponents]:
     """Remove the entries of one basis element; the monomials to which they contributed."""
     touched = []
     for e, c in weight.items():
@@ -95,7 +95,7 @@ def _forget(weight: Polynomial, k: int, gone: Exponents, basis: Any, others: Any
     return touched
 
 
-def reach(statement: Statement) -> set[Exponents]:
+def equality_monomials(statement: Statement) -> set[Exponents]:
     """Monomials to which a multiple of an equality may contribute."""
     size = len(statement.variables)
     reachable = set[Exponents]()

@@ -67,24 +67,24 @@ def _no_float(text: str) -> None:
 
 def _integer(text: str) -> int:
     if len(text) > 3 or text == "-0":
-        _refuse(f"the integer {text[:20]} is out of range")
+        _reject(f"the integer {text[:20]} is out of range")
     return int(text)
 
 
-def _refuse(reason: str) -> NoReturn:
+def _reject(reason: str) -> NoReturn:
     raise CertificateError(f"{reason}.")
 
 
 def need(condition: bool, reason: str) -> None:
     """Raise CertificateError unless a condition holds."""
     if not condition:
-        _refuse(reason)
+        _reject(reason)
 
 
 def headed(raw: Any, kind: str = "") -> Json:
     """Entries of a file after a check of its format and, if given, its kind, both of which are removed."""
     if not isinstance(raw, dict):
-        _refuse("the file must be an object")
+        _reject("the file must be an object")
     need(type(raw.get("format")) is int and raw["format"] == 1, "format must be 1")
     need(not kind or raw.get("kind") == kind, f"kind must be {kind}")
     return {key: entry for key, entry in raw.items() if key != "format" and (key != "kind" or not kind)}
@@ -93,7 +93,7 @@ def headed(raw: Any, kind: str = "") -> Json:
 def read_rational(raw: Any) -> Fraction:
     """Fraction of a text in canonical form."""
     if not isinstance(raw, str):
-        _refuse("a rational must be a text")
+        _reject("a rational must be a text")
     return _rational(raw)
 
 
@@ -101,11 +101,11 @@ def read_rational(raw: Any) -> Fraction:
 def _rational(text: str) -> Fraction:
     match = _RATIONAL.fullmatch(text)
     if match is None:
-        _refuse(f"{text[:40]!r} is not a canonical rational")
+        _reject(f"{text[:40]!r} is not a canonical rational")
     top, bottom = match.groups("1")
     value = Fraction(int(top), int(bottom))
     if str(value) != text:
-        _refuse(f"{text[:40]!r} is not in lowest terms")
+        _reject(f"{text[:40]!r} is not in lowest terms")
     return value
 
 
@@ -115,28 +115,28 @@ def common_grid(gram: Iterable[Fraction]) -> None:
     for denominator in {entry.denominator for entry in gram}:
         common = math.lcm(common, denominator)
         if common.bit_length() > _GRID_BITS:
-            _refuse(f"the common denominator of a Gram matrix exceeds {_GRID_BITS} bits")
+            _reject(f"the common denominator of a Gram matrix exceeds {_GRID_BITS} bits")
 
 
 def read_polynomial(raw: Any) -> dict[tuple[int, ...], Fraction]:
     """Polynomial from an object of exponents (equal length, each at most 999) to nonzero rationals."""
     if not isinstance(raw, dict):
-        _refuse("a polynomial must be an object")
+        _reject("a polynomial must be an object")
     polynomial: dict[tuple[int, ...], Fraction] = {}
     for key, number in raw.items():
         if _EXPONENTS.fullmatch(key) is None:
-            _refuse("a polynomial has a wrong key")
+            _reject(f"the key {key[:40]!r} of a polynomial is not a list of exponents")
         polynomial[tuple(map(int, key.split(",")))] = value = read_rational(number)
         if not value:
-            _refuse("a polynomial has a zero coefficient")
-    need(len(set(map(len, polynomial))) <= 1, "a polynomial has a wrong key")
+            _reject("a polynomial has a zero coefficient")
+    need(len(set(map(len, polynomial))) <= 1, "the keys of a polynomial differ in length")
     return polynomial
 
 
 def require_polynomial(polynomial: Mapping[tuple[int, ...], Fraction], what: str, variables: int, limit: int) -> None:
     """Reject a polynomial with another number of variables, or with more terms than the limit."""
     need(len(polynomial) <= limit, f"{what} is longer than {limit} terms")
-    need(all(len(exponents) == variables for exponents in polynomial), f"{what} has a wrong key")
+    need(all(len(exponents) == variables for exponents in polynomial), f"{what} has another number of variables")
 
 
 def polynomial_text(polynomial: Any) -> dict[str, str]:
@@ -180,11 +180,11 @@ def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
         value = msgspec.convert(raw, kind, dec_hook=_decoded)
     except msgspec.ValidationError as error:
         reason, _, place = str(error).partition(" - at ")
-        reason = _PATTERN.sub("a name of other letters or another length", reason)
+        reason = _PATTERN.sub("a name of up to 40 letters and digits", reason)
         place = place.replace("`", "").replace("$.", "").strip("$.")
-        _refuse(f"{place or what}: {reason[:1].lower()}{reason[1:].strip('.')}")
+        _reject(f"{place or what}: {reason[:1].lower()}{reason[1:].strip('.')}")
     if place := _difference(raw, written(value)):
-        _refuse(f"{place.strip('. ')} must be a known key, and omitted where it has its default value")
+        _reject(f"{place.strip('. ')} must be a known key, and omitted where it has its default value")
     return value
 
 

@@ -47,7 +47,7 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     if multiplier != "1":
         lines.append(f"multiplied by {multiplier}")
     lines += [*_reason(answer), *filter(None, [answer.remark])]
-    lines += ["vacuous: the set is empty"] if answer.set_is_empty else []
+    lines += ["the set is empty, so that this holds trivially"] if answer.set_is_empty else []
     if verbose:
         lines += [
             f"Gram matrices {when} reduction: {' + '.join(map(str, sizes)) or 'none'}"
@@ -90,7 +90,7 @@ def _reason(answer: Answer) -> list[str]:
                 f"{n} = {exact_text(v)}" for n, v in zip(statement.variables, proof.coordinates, strict=True)
             )
             return [f"negative at {point}", f"value {_shown(evaluate(answer.statement.polynomial, proof.coordinates))}"]
-    return ["neither a rational proof nor a rational refutation was found; this says nothing about the polynomial"]
+    return ["neither a rational proof nor a rational refutation was found; the polynomial remains undecided"]
 
 
 def _shown(value: Fraction) -> str:
@@ -129,7 +129,7 @@ def region_words(region: Region) -> list[str]:
     if shown is not None:
         lines += claim_words(shown)
     if region.inclusion is not None and (level := region.shape_level) is not None:
-        lines.append(f"that is so wherever {_shape(region)} <= {level} ({LowerBound(level)} rounded down)")
+        lines.append(f"the region contains {_shape(region)} <= {level} ({LowerBound(level)} rounded down)")
     if region.proved is not None and region.refuted is not None:
         lines += _point_words(region.refuted)
     return [*lines, *filter(None, [region.remark])]
@@ -172,7 +172,7 @@ def _point_words(claim: Attraction) -> list[str]:
     assert claim.height is not None
     point = ", ".join(f"{name} = {x}" for name, x in zip(claim.variables, claim.refutation.coordinates, strict=True))
     if claim.equilibrium:
-        return [f"another equilibrium, so that no V helps beyond: {point}"]
+        return [f"another equilibrium, which no region of attraction contains: {point}"]
     what = "V is not positive" if claim.height <= 0 else "V does not fall"
     above = "" if claim.height <= 0 else f", so that no level above {UpperBound(claim.height)} (rounded up) holds"
     return [f"{what} at {point}{above}"]

@@ -166,7 +166,7 @@ _INSIDE = Fraction(999999, 1000000)  # share of the level that V must not exceed
 _SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))  # of β where shape touches level
 _SLACK = (Fraction(99, 100), Fraction(9, 10))  # share of level and β for the multipliers; at 1, V could not change
 _MORE = (0, 2)
-_ROOM = 1e-3  # share of the largest β given up for a V with a margin
+_LOSS = 1e-3  # share of the largest β given up for a V with a margin
 _GRID = 2**20  # denominator of the coefficients of V
 
 
@@ -272,7 +272,7 @@ def _larger(
     program.require(affine(one, [*minus, combination([(Fraction(-1), inner)])]))
     program.require(affine(combination([(Fraction(-1), falling)]), [*slopes, {}]))
     program.maximize({tuple(int(i == len(terms)) for i in range(len(terms) + 1)): Fraction(1)})
-    values = program.proposal(_ROOM)
+    values = program.proposal(_LOSS)
     if values is None:
         return None
     rounded = {e: nearest(v, _GRID) for e, v in zip(terms, values, strict=False)}
@@ -373,7 +373,7 @@ def region_of_attraction(
     """
     if not _FINEST <= relative < 1:
         raise PolynomialError(
-            f"relative must be from {_FINEST:g} to below 1. Received {relative!r}. Omit relative for 1e-4."
+            f"relative must be from {_FINEST:g} to below 1. Received {relative!r}. The default is 1e-4."
         )
     claim = _claim(field, V)
     inner = _shape(field, shape, degree)
@@ -399,7 +399,7 @@ def _region(claim: Attraction, relative: float) -> Region:
     if refuted.level is None:
         return Region(proved=None, refuted=refuted, remark="V is not positive")
     region = Region(proved=_bisected(claim, refuted.height or Fraction(0), relative), refuted=refuted)
-    return region if region.proved else replace(region, remark="no level below was proved")
+    return region if region.proved else replace(region, remark="no lower level was proved")
 
 
 def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomial | None:

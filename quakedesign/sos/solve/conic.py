@@ -42,12 +42,12 @@ def stated_problems() -> "Iterator[list[cp.Problem]]":
         problems.extend(by_number.values())
 
 
-def handing_back() -> bool:
+def collecting() -> bool:
     """Whether a `stated_problems` block is active."""
     return _handed.get() is not None
 
 
-def hand_back(problem: "cp.Problem") -> None:
+def record(problem: "cp.Problem") -> None:
     """Record a problem for the active `stated_problems` block."""
     handed = _handed.get()
     if handed is not None:
@@ -58,7 +58,7 @@ def solve(problem: "cp.Problem", **chosen: Any) -> bool:
     """Run Clarabel; whether its solution is usable. Its status is no verdict."""
     import cvxpy as cp
 
-    hand_back(problem)
+    record(problem)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -120,7 +120,7 @@ class Compiled:
             False reuses the solver of the last call with its ordering and scaling, which is faster; rounding then
             depends on the problems solved before.
         """
-        hand_back(self.problem)
+        record(self.problem)
         data, chain, inverse = self.data()
         answer = chain.solver.solve_via_data(data, not anew, False, options(accuracy), self._solvers)
         self.solver_seconds = answer.solve_time

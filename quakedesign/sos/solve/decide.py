@@ -208,7 +208,7 @@ def _blocks_of(structure: Structure) -> tuple[Block, ...]:
     sizes = [len(b.monomials) for b in blocks]
     if sum(comb(comb(n + 1, 2) + 1, 2) for n in sizes) > _ENTRIES:
         raise PolynomialError(
-            "Gram matrices must be small enough for a solver: one of at most 140 x 140, say. "
+            "Gram matrices must be small enough for a solver, for example one of at most 140 x 140. "
             f"Received {len(sizes)} of up to {max(sizes)} x {max(sizes)}. Lower the degree."
         )
     return tuple(blocks)

@@ -24,7 +24,7 @@ from quakedesign.sos.solve.moment import MomentProgram
 from quakedesign.sos.solve.rounding import System, relations
 
 Affine = tuple[Fraction, ...]
-"""Constant and the factor of every decision."""
+"""Constant, then the coefficient of every decision."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,10 +79,10 @@ class Forced:
         present, before = self, -1
         while len(present.reasons) > before and not present.contradiction:
             before = len(present.reasons)
-            for k, need in enumerate(present.requirements):
-                reached = need.reached
-                for e in sorted({e for part in need.parts for e in part if e not in reached}, reverse=True):
-                    rule = f"requirement {k + 1}: no term of a certificate has {_monomial(need.template.variables, e)}"
+            for k, required in enumerate(present.requirements):
+                reached = required.reached
+                for e in sorted({e for part in required.parts for e in part if e not in reached}, reverse=True):
+                    rule = f"requirement {k + 1}: no certificate contains {_monomial(required.template.variables, e)}"
                     present = present._with(present.requirements[k].coefficient(e), rule, names)
         return present
 
@@ -92,9 +92,9 @@ class Forced:
             r if b is None else replace(r, blocks=tuple(b)) for r, b in zip(self.requirements, faces, strict=True)
         )
         present = replace(self, requirements=tuple(within))
-        for k, need in enumerate(present.requirements):
-            rule = f"requirement {k + 1}: a kernel of its Gram matrix, rounded"
-            for row in _annihilators(need) if faces[k] is not None else ():
+        for k, required in enumerate(present.requirements):
+            rule = f"requirement {k + 1}: the rounded kernel of its Gram matrix removes a coefficient"
+            for row in _annihilators(required) if faces[k] is not None else ():
                 parts = present.requirements[k].parts
                 equation = tuple(sum((c * p.get(e, 0) for e, c in row.items()), start=Fraction(0)) for p in parts)
                 present = present._with(equation, rule, names)
@@ -102,15 +102,15 @@ class Forced:
 
     def refuted(self) -> str:
         """Sentence on a monomial that only squares produce, but with a negative coefficient; empty without one."""
-        for k, need in enumerate(self.requirements):
-            system = System(need.template, need.present)
+        for k, required in enumerate(self.requirements):
+            system = System(required.template, required.present)
             mixed = {e for _, _, r in system.relations for e in r}
             for (_, i, j), column in zip(system.entries, system.columns, strict=False):
                 mixed |= {e for e, c in column.items() if i != j or c < 0}
-            for e, c in need.parts[0].items():
-                if c < 0 and e not in mixed and not any(need.coefficient(e)[1:]):
-                    monomial = _monomial(need.template.variables, e)
-                    return f"requirement {k + 1}: squares alone produce {monomial}, but {c} stands before it"
+            for e, c in required.parts[0].items():
+                if c < 0 and e not in mixed and not any(required.coefficient(e)[1:]):
+                    monomial = _monomial(required.template.variables, e)
+                    return f"requirement {k + 1}: only squares contain {monomial}, but its coefficient is {c}"
         return ""
 
     def _with(self, equation: Affine, rule: str, names: Sequence[str]) -> "Forced":
@@ -119,7 +119,7 @@ class Forced:
             return self
         pivot = next((j for j, c in enumerate(equation[1:]) if c), None)
         if pivot is None:
-            text = f"{rule}, but {equation[0]} stands before it"
+            text = f"{rule}, but its coefficient is {equation[0]}"
             return replace(self, reasons=(*self.reasons, text), contradiction=True)
         row = tuple(Fraction(0) if j == pivot + 1 else -c / equation[pivot + 1] for j, c in enumerate(equation))
         text = f"{rule}, so {names[pivot]} = {_sentence(row, names)}"
@@ -128,14 +128,14 @@ class Forced:
         return Forced(requirements=requirements, solved=solved, reasons=(*self.reasons, text))
 
 
-def _eliminated(need: Requirement, pivot: int, row: Affine) -> Requirement:
-    gone = need.parts[pivot + 1]
+def _eliminated(required: Requirement, pivot: int, row: Affine) -> Requirement:
+    gone = required.parts[pivot + 1]
     if not gone:
-        return need
-    parts = [combination([(Fraction(1), p), (c, gone)]) if c else p for p, c in zip(need.parts, row, strict=True)]
+        return required
+    parts = [combination([(Fraction(1), p), (c, gone)]) if c else p for p, c in zip(required.parts, row, strict=True)]
     parts[pivot + 1] = {}
     support = dict.fromkeys((e for p in parts for e in p), Fraction(1))
-    return replace(need, parts=tuple(parts), template=replace(need.template, polynomial=support))
+    return replace(required, parts=tuple(parts), template=replace(required.template, polynomial=support))
 
 
 def _insert(affine: Affine, pivot: int, row: Affine) -> Affine:
@@ -151,10 +151,10 @@ def _value(affine: Affine, values: Sequence[Fraction]) -> Fraction:
     return sum((c * v for c, v in zip(affine[1:], values, strict=True) if c), start=affine[0])
 
 
-def _annihilators(need: Requirement) -> Iterable[dict[Exponents, Fraction]]:
+def _annihilators(required: Requirement) -> Iterable[dict[Exponents, Fraction]]:
     """Basis of the functionals that vanish on every product of a face."""
-    columns = [dict(c) for c in {frozenset(c.items()) for c in System(need.template, need.present).columns}]
-    keys = sorted({e for c in (*columns, *need.parts) for e in c})
+    columns = [dict(c) for c in {frozenset(c.items()) for c in System(required.template, required.present).columns}]
+    keys = sorted({e for c in (*columns, *required.parts) for e in c})
     if not columns:
         return [{e: Fraction(1)} for e in keys]
     entries = [[c.get(e, Fraction(0)) for e in keys] for c in columns]

@@ -204,7 +204,7 @@ class MomentProgram:
         vector = np.zeros(len(self.keys))
         for e, c in target.items():
             if e not in self.index:
-                raise ValueError(f"the monomial {e} is none of this structure.")
+                raise ValueError(f"the monomial {e} does not occur in this programme.")
             vector[self.index[e]] = float(c)
         return vector
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Positivity with decision variables: solved by cvxpy and Clarabel, rounded, and proved polynomial by polynomial.
 
-_ROOM = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+_LOSSES = (1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 _BITS = (4, 8, 12, 18, 24, 32)
 _KERNELS = ((1e-6, 1e-3), (1e-6, 1e-5), (1e-4, 1e-2), (1e-4, 1e-4))  # eigenvalue threshold and rounding tolerance
 _ROUNDS = 3  # successive restrictions to faces by numerical kernels
@@ -190,7 +190,7 @@ class Program:
         """Solution on the present faces or None, and the outcome of the search in words."""
         if self._forced.contradiction:
             return None, "so no decisions satisfy the requirements at this degree"
-        solution = next(filter(None, (self._rounded(*point) for point in self._interior(_ROOM))), None)
+        solution = next(filter(None, (self._rounded(*point) for point in self._interior(_LOSSES))), None)
         ended = f"{'the rest' if self._forced.reasons else 'the programme'} is {self._status} in floating point"
         if self._margin is not None:
             ended += f", with a margin of {self._margin.value:.1g}, but no exact decisions were found"
@@ -204,11 +204,11 @@ class Program:
             return False
         faces: list[Sequence[Block] | None] = []
         sizes = [float(np.abs(v.value).max(initial=0)) for v in (self._vector, *(g for gs in self._grams for g in gs))]
-        for need, grams in zip(self._forced.requirements, self._grams, strict=True):
+        for required, grams in zip(self._forced.requirements, self._grams, strict=True):
             whole = [gram.value + self._margin.value * np.eye(gram.shape[0]) for gram in grams]
             unit = max(1e-3 * max(sizes), 1e-300, *(float(np.abs(w).max()) for w in whole))
-            scaled = [w / unit for w in whole]
-            faces.append(at_kernels(need.present, scaled, threshold, tolerance, [Fraction(1)] * len(self.variables)))
+            ones = [Fraction(1)] * len(self.variables)
+            faces.append(at_kernels(required.present, [w / unit for w in whole], threshold, tolerance, ones))
         self._forced = self._forced.on_faces(faces, self.decisions)
         return any(face is not None for face in faces)
 
@@ -221,12 +221,12 @@ class Program:
             Loss of objective allowed for the margin, relative to max(1, |optimum|).
         """
         if not room >= 0 or math.isinf(room):
-            raise PolynomialError(f"room must be a number of at least 0. Received {room!r}. Write 0.01, say.")
+            raise PolynomialError(f"room must be a number of at least 0. Received {room!r}. Give for example 0.01.")
         self.problem()
         solution = next(self._interior((room,)), None)
         return None if solution is None else np.asarray(self._vector.value).tolist()
 
-    def _interior(self, rooms: Sequence[float]) -> Iterator[tuple[float, float]]:
+    def _interior(self, losses: Sequence[float]) -> Iterator[tuple[float, float]]:
         """Optimum and allowed loss of objective, for each loss that admits decisions with a margin."""
         import cvxpy as cp
 
@@ -242,19 +242,19 @@ class Program:
         margin, least = cp.Variable(), cp.Parameter()
         wanted = [self._value(self._objective) >= least] if self._objective else []
         within = Compiled(cp.Problem(cp.Maximize(margin), [*self._constraints(margin), margin <= 1, *wanted]))
-        for room in (share * max(1.0, abs(best)) for share in (rooms if self._objective else rooms[:1])):
-            least.value = best - room
+        for loss in (share * max(1.0, abs(best)) for share in (losses if self._objective else losses[:1])):
+            least.value = best - loss
             if within.solve():
                 self._margin = margin
                 if within.problem.value >= 1e-11:
-                    yield best, room
+                    yield best, loss
 
-    def _rounded(self, best: float, room: float) -> Solution | None:
-        """Proved decision near the last one of the solver, whose objective is within `room` of the optimum."""
+    def _rounded(self, best: float, loss: float) -> Solution | None:
+        """Proved decision near the last one of the solver, whose objective is within `loss` of the optimum."""
         for bits in _BITS:
             near = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
             values = self._forced.completed(near)
-            close = not self._objective or _at(self._objective, values) >= Fraction(best) - 2 * Fraction(room)
+            close = not self._objective or _at(self._objective, values) >= Fraction(best) - 2 * Fraction(loss)
             answers = self._proved(values) if close else None
             if answers is not None:
                 objective = _at(self._objective, values)
@@ -272,9 +272,9 @@ class Program:
             if not positive_definite([[_at(entry, values) for entry in row] for row in rows]):
                 return None
         answers = []
-        for need in self._required:
-            polynomial = combination(zip((Fraction(1), *values), need.parts, strict=True))
-            answer = decide(replace(need.template, polynomial=polynomial))
+        for required in self._required:
+            polynomial = combination(zip((Fraction(1), *values), required.parts, strict=True))
+            answer = decide(replace(required.template, polynomial=polynomial))
             if answer.verdict is not Positivity.SOS:
                 return None
             answers.append(answer)
@@ -282,8 +282,8 @@ class Program:
 
     def _constraints(self, margin: "cp.Variable | float") -> "list[cp.Constraint]":
         constraints, self._grams = list(self.constraints), []
-        for need in self._forced.requirements:
-            grams, equations = _membership(self._vector, need, margin)
+        for required in self._forced.requirements:
+            grams, equations = _membership(self._vector, required, margin)
             self._grams.append(grams)
             constraints += [*(gram >> 0 for gram in grams), *equations]
         for j, affine in self._forced.solved.items():
@@ -292,7 +292,7 @@ class Program:
         for rows in self._definite:
             constraints.append(_definite(self._vector, rows, margin))
         if not constraints:
-            raise PolynomialError("a program must require something. Received nothing. Call require first.")
+            raise PolynomialError("a program must require something. Received no requirement. Call require first.")
         return constraints
 
     def _value(self, affine: Mapping[Exponents, Fraction]) -> "cp.Expression":
@@ -358,19 +358,19 @@ def _at(affine: Mapping[Exponents, Fraction], values: Sequence[Fraction]) -> Fra
 
 
 def _membership(
-    vector: "cp.Variable", need: Requirement, margin: "cp.Variable | float"
+    vector: "cp.Variable", required: Requirement, margin: "cp.Variable | float"
 ) -> "tuple[list[cp.Variable], list[cp.Constraint]]":
     """Gram matrices minus margin·I, and the equations that match their coefficients to the polynomial."""
     import cvxpy as cp
 
-    shape, reached = need.shape, need.reached
-    beyond = {e for part in need.parts for e in part if e not in reached}  # empty unless requirements conflict
+    shape, reached = required.shape, required.reached
+    beyond = {e for part in required.parts for e in part if e not in reached}  # empty unless requirements conflict
     vanishing = []
-    for constant, *factors in map(need.coefficient, beyond):
+    for constant, *factors in map(required.coefficient, beyond):
         vanishing.append(float(constant) + np.array(factors, dtype=float) @ vector == 0)
     if shape is None:
         return [], vanishing
-    reachable = [{e: c for e, c in part.items() if e in reached} for part in need.parts]
+    reachable = [{e: c for e, c in part.items() if e in reached} for part in required.parts]
     left, triangles = np.array([shape.vector(part) for part in reachable]).T, shape.triangles()
     total: cp.Expression = left[:, 0] + left[:, 1:] @ vector
     grams, start = [], 0

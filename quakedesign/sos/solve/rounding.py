@@ -214,7 +214,7 @@ class Scaled:
     def restored(self, proof: SumOfSquares) -> SumOfSquares:
         """Sum of squares in u from one in ũ."""
         inverse = tuple(1 / s for s in self.scale)
-        squares = tuple(_moved(s, inverse, self._factor(s)) for s in proof.squares)
+        squares = tuple(_transformed(s, inverse, self._factor(s)) for s in proof.squares)
         cofactors = tuple(
             {e: c * self.target / factor for e, c in rescaled(q, inverse).items()}
             for q, factor in zip(proof.cofactors, self.equalities, strict=True)
@@ -223,14 +223,14 @@ class Scaled:
 
     def square(self, square: Square) -> Square:
         """Square in ũ from one in u."""
-        return _moved(square, self.scale, 1 / self._factor(square))
+        return _transformed(square, self.scale, 1 / self._factor(square))
 
     def _factor(self, square: Square) -> Fraction:
         """Factor from the Gram matrix in ũ to that in u."""
         return self.target / prod(self.inequalities[i] for i in square.product)
 
 
-def _moved(square: Square, scale: Sequence[Fraction], factor: Fraction) -> Square:
+def _transformed(square: Square, scale: Sequence[Fraction], factor: Fraction) -> Square:
     elements = [_rescaled(b, scale) for b in square.basis]
     sizes = [size for _, size in elements]
     pairs = (left * right for i, left in enumerate(factor * size for size in sizes) for right in sizes[i:])

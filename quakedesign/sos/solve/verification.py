@@ -80,7 +80,7 @@ def verify(
     grams, bases = (_listed(gram), _listed(basis)) if inequalities else ([gram], [basis])
     if not len(grams) == len(bases) == 1 + len(inequalities):
         raise PolynomialError(
-            f"1 + {len(inequalities)} Gram matrices and bases are needed, for 1 and for every inequality. "
+            f"{1 + len(inequalities)} Gram matrices and bases are needed: for the factor 1, then for each inequality. "
             f"Received {len(grams)} and {len(bases)}."
         )
     products = [(), *((i,) for i in range(len(inequalities)))]
@@ -123,7 +123,7 @@ def _matrix(gram: Any, size: int) -> Any:
     try:
         matrix = np.asarray(gram, dtype=object).astype(float)  # by entry, so that complex numbers raise
     except (TypeError, ValueError, OverflowError):
-        raise PolynomialError("a Gram matrix must be an array of real numbers. Received something else.") from None
+        raise PolynomialError(f"a Gram matrix must be an array of real numbers. Received {shown(gram)}.") from None
     if matrix.shape != (size, size) or not np.all(np.isfinite(matrix)):
         raise PolynomialError(
             f"a Gram matrix must be {size} x {size}, as its basis has {size} elements, and finite. "
@@ -146,7 +146,7 @@ def _verified(problem: Statement, squares: Sequence[Square]) -> Answer:
             return answer
     answer = decide(problem)
     why = "neither a proof nor a counterexample was found" if answer.proof is None else "decided"
-    return replace(answer, remark=f"no proof comes from {matrix}; {why} without it")
+    return replace(answer, remark=f"{matrix} gives no proof; {why} without it")
 
 
 def _block(moved: Statement, square: Square) -> Matrixed:
@@ -168,12 +168,12 @@ def _proposed(moved: Scaled, blocks: Sequence[Block], grams: Sequence[Array]) ->
     """Proofs from the given matrices, then from the matrices without their kernels."""
     yield "rounded", _rounded(moved, blocks, grams)
     for threshold, tolerance in KERNELS:
-        smaller = [_beside(b, g, threshold, tolerance, moved) for b, g in zip(blocks, grams, strict=True)]
+        smaller = [_without_kernel(b, g, threshold, tolerance, moved) for b, g in zip(blocks, grams, strict=True)]
         left = [pair for pair in smaller if pair is not None]
-        yield "rounded beside its kernel", _rounded(moved, *zip(*left, strict=True)) if left else None
+        yield "rounded on the complement of its kernel", _rounded(moved, *zip(*left, strict=True)) if left else None
 
 
-def _beside(block: Block, gram: Array, threshold: float, tolerance: float, moved: Scaled) -> Matrixed | None:
+def _without_kernel(block: Block, gram: Array, threshold: float, tolerance: float, moved: Scaled) -> Matrixed | None:
     """Block without the numerical kernel of its matrix, and the restricted matrix; None if the block is empty."""
     smaller = at_kernels([block], [gram], threshold, tolerance, decimal_units(moved.scale))
     if smaller is None:

@@ -169,14 +169,14 @@ def test_campaigns_exports_and_python_control_run_it_as_simulate_does():
         pressures.append(float(pressure))
     assert (step.step, step.facts["weight"]) == (0.184, "0.35")
     assert np.allclose(pressures, found.pressure, rtol=1e-9, atol=1e-6)
-    with pytest.raises(UnsupportedError, match="law of samples"):
+    with pytest.raises(UnsupportedError, match="a sampled law has no closed loop"):
         to_casadi(REAL, law)
 
 
 def test_python_control_has_no_fault_to_take_an_input_gain_from():
     law = designed().controller
     bare = replace(law, gains=dict(law.gains), sampling=Sampling(step=STEP, scheme="compensated"))
-    with pytest.raises(UnsupportedError, match="which needs them"):
+    with pytest.raises(UnsupportedError, match="uses them"):
         to_iosystem(bare)
 
 

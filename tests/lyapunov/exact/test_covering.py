@@ -33,7 +33,7 @@ def test_a_linear_certificate_covers_a_fault_whose_ranges_it_holds_to_their_ends
                 covers(uncertain(ELQR, **{name: wrong}), LAB)
         assert covers(uncertain(ELQR, **{name: (low - 1, high + 1)}), LAB)
     for constants in ({"b": F(8, 1385)}, {"b": F(4, 1385), "c": F(1)}):
-        with pytest.raises(CertificateError, match="the control authority is not that of lab-fault"):
+        with pytest.raises(CertificateError, match="the control authority of the certificate is not that of lab-fault"):
             covers(replace(ELQR, loop=replace(ELQR.loop, constants=constants)), LAB)
 
 
@@ -65,6 +65,6 @@ def test_a_sliding_mode_s_certificate_says_which_scale_a_fault_needs(asked):
         with pytest.raises(CertificateError, match="range of beta does not cover"):
             covers(uncertain(wide, beta=beta), LAB)
     for d in ((F(0), F(1)), (F(-1), F(0))):
-        with pytest.raises(CertificateError, match="must hold 0 inside"):
+        with pytest.raises(CertificateError, match="must contain 0 in its interior"):
             covers(uncertain(wide, d=d), LAB)
     assert covers(uncertain(wide, d=(F(-1, 10**6), F(1, 10**6))), LAB)

@@ -165,7 +165,7 @@ def test_feed_forward_enlarges_the_domain(variants):
     assert slip["centred"] > 30 * slip["none"]
     assert rate["centred"] > rate["nominal"] > 5 * rate["none"]
     assert "viscosity" in variants["none"].domain.limited_by
-    assert "less its feed-forward" in variants["nominal"].domain.limited_by
+    assert "minus its feed-forward" in variants["nominal"].domain.limited_by
 
 
 def test_only_with_feed_forward_is_the_start_certified(variants):
@@ -207,7 +207,7 @@ def test_the_other_method_alone_is_rigorous_and_smaller(found, variants):
     whole = certified_domain(DomainProblem(REAL, found.controller, found.certificate, None))
     assert whole.method == "whole"
     assert 0 < whole.slip_error < 1e-3 * variants["none"].domain.slip_error
-    assert "the control itself" in whole.limited_by
+    assert "the control, through viscosity" in whole.limited_by
 
 
 def test_an_empty_domain_names_its_cause(found, known):
@@ -317,7 +317,7 @@ def test_joint_starts_are_bounded(found):
 
 def test_where_the_decrease_is_not_polynomial_the_claimed_decay_serves(found, known, monkeypatch):
     def refuse(*_):
-        raise CertificateError("no polynomial on a cell.")
+        raise CertificateError("not polynomial on a cell.")
 
     monkeypatch.setattr(robustness_module, "_against_decrease", refuse)
     assert robustness(found.certificate) is None

@@ -99,7 +99,7 @@ def test_a_claimed_decay_serves_where_powers_are_nested():
 def test_powers_of_v_follow_the_weights():
     """p1 = (3 - 2 + 1)/4, p2 = (2 - 2 + 1)/4."""
     cells = _Cells(weighted())
-    assert (cells.m, cells.degree, cells.fallen) == (4, -1, 3)
+    assert (cells.m, cells.degree, cells.decrease_degree) == (4, -1, 3)
     assert (cells.power(0), cells.power(1)) == (F(1, 2), F(1, 4))
 
 

@@ -8,7 +8,7 @@ import sympy as sp
 from quakedesign.errors import ParameterError
 from quakedesign.laws import control_law
 from quakedesign.lyapunov.exact.loop_expressions import sympy_field
-from quakedesign.lyapunov.gains.path_following import scaled_norm, stretch_exponents
+from quakedesign.lyapunov.gains.path_following import scaled_norm, scaling_exponents
 from quakedesign.lyapunov.search.certify import closed_loop
 from quakedesign.symbolic.signed_power import SignedPower
 
@@ -25,13 +25,13 @@ from quakedesign.symbolic.signed_power import SignedPower
 def test_exponents_of_the_lambda_scaling(name, exponents):
     ones = (1,) * len(exponents)
     loop = closed_loop(name, ones, lipschitz=1)
-    found = stretch_exponents(loop, {"d": 1})
+    found = scaling_exponents(loop, {"d": 1})
     assert [found[gain] for gain in loop.gains] == [F(p) for p in exponents]
 
 
 def test_the_scaled_norm_is_that_of_the_issue_and_no_scale_changes_it():
     loop = closed_loop("cta", ("7", "5", "2.3", "1.1"), lipschitz="0.8")
-    exponents = stretch_exponents(loop, {"d": 1})
+    exponents = scaling_exponents(loop, {"d": 1})
     parts = (7 * 0.8 ** (-2 / 3), 5 * 0.8**-0.5, 2.3 / 0.8, 1.1 / 0.8)
     assert scaled_norm(loop, exponents) == pytest.approx(sum(x * x for x in parts) ** 0.5)
     law = control_law("cta").from_values((7, 5, "2.3", "1.1"))
@@ -47,7 +47,7 @@ def test_the_scaled_norm_is_that_of_the_issue_and_no_scale_changes_it():
 def test_the_stretched_field_is_the_old_one_in_stretched_states(name, stretched):
     count = {"cta": 4, "cta3": 6, "super-twisting": 2}[name]
     loop = closed_loop(name, (1,) * count, lipschitz=1)
-    found = stretch_exponents(loop, {stretched: 1})
+    found = scaling_exponents(loop, {stretched: 1})
     s = sp.Integer(2) ** 12
     sizes = {name: s ** sp.Rational(str(p)) for name, p in found.items()} | {stretched: s}
     symbols = loop.symbols
@@ -68,4 +68,4 @@ def test_gains_that_the_terms_leave_open_are_refused():
     field = {x: -k * SignedPower(x, 0) + d}
     model = LoopField(states={x: 1}, field=field, gains=(k, free), constants=(), uncertain=(d,), domain="cells")
     with pytest.raises(ParameterError, match="determine how its gains scale"):
-        stretch_exponents(closed_loop(model, (1, 1), lipschitz=1), {"d": 1})
+        scaling_exponents(closed_loop(model, (1, 1), lipschitz=1), {"d": 1})

@@ -13,7 +13,7 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.laws import LoopField
 from quakedesign.lyapunov import Verdict, certificate_text
 from quakedesign.lyapunov.gains.path_following import scaled_norm
-from quakedesign.lyapunov.gains.synthesise import OBJECTIVES, begin_with, given, question, synthesise
+from quakedesign.lyapunov.gains.synthesise import OBJECTIVES, begin_with, compared_gains, problem_of, synthesise
 from quakedesign.symbolic import SignedPower
 
 FAST = {"degrees": (5,), "starts": 1, "compare": False}
@@ -120,8 +120,8 @@ def test_no_set_beyond_the_bound_on_the_norm_takes_the_place_of_gains_found(monk
 
 
 def test_the_range_of_given_gains_is_the_largest_of_their_family():
-    asked = question("cta", "beta", lipschitz=1, gain_range=(1, 1), degrees=(5,))
-    reached = given(asked, asked.published[0])
+    asked = problem_of("cta", "beta", lipschitz=1, gain_range=(1, 1), degrees=(5,))
+    reached = compared_gains(asked, asked.published[0])
     low, high = reached.certificate.loop.uncertain["beta"]
     assert reached.value == pytest.approx(math.sqrt(high / low))
     from quakedesign.lyapunov.search.certify import closed_loop
@@ -134,8 +134,8 @@ def test_the_range_of_given_gains_is_the_largest_of_their_family():
 @pytest.mark.slow
 def test_the_paper_ratio_is_compared_at_its_best():
     # with generated V it is known to be proved for β in [1, 1.425] and 0.97 kI3 (METHODS), and to settle
-    asked = question("dia", "beta", lipschitz=1, gain_range=(1, 1), degrees=(5,))
-    assert given(asked, asked.published[0]).value > math.sqrt(1.425)
+    asked = problem_of("dia", "beta", lipschitz=1, gain_range=(1, 1), degrees=(5,))
+    assert compared_gains(asked, asked.published[0]).value > math.sqrt(1.425)
 
 
 @pytest.mark.slow
@@ -170,7 +170,7 @@ def test_without_a_proof_there_are_no_gains(monkeypatch):
 
 
 def test_starts_depend_on_the_seed_alone():
-    asked = question("cta", "norm", lipschitz=1, gain_range=(1, 1))
+    asked = problem_of("cta", "norm", lipschitz=1, gain_range=(1, 1))
 
     def draw(seed, count=7):
         return [loop.gains for loop, _ in zip(begin_with(asked, seed), range(count), strict=False)]
@@ -183,7 +183,7 @@ def test_starts_depend_on_the_seed_alone():
 
 def test_gains_from_the_literature_are_carried_over_to_other_ranges():
     # e3 → βe3 maps β = b, |d| ≤ L onto β = 1, |d| ≤ bL, with gains times 1/b: k1 ∝ (bL)^⅔/b, k2 ∝ (bL)^½/b, k3 ∝ L
-    asked = question("cta", "norm", lipschitz="0.01", gain_range=("8", "8"))
+    asked = problem_of("cta", "norm", lipschitz="0.01", gain_range=("8", "8"))
     moved = asked.published[0].gains
     wanted = (7 * 0.08 ** (2 / 3) / 8, 5 * 0.08**0.5 / 8, 0.023, 0.011)
     assert [float(k) for k in moved.values()] == pytest.approx(wanted, rel=1e-3)
@@ -217,7 +217,7 @@ def test_every_objective_beats_every_published_set():
     assert OBJECTIVES == ("norm", "decay", "beta")
     sets = [(7, 5, 2.3, 1.1), (13, 7.5, 2.3, 1.1), (19, 10, 2.3, 1.1), (25, 15, 2.3, 1.1)]
     for objective in OBJECTIVES:
-        asked = question("cta", objective, lipschitz=1, gain_range=(1, 1), degrees=(5,))
+        asked = problem_of("cta", objective, lipschitz=1, gain_range=(1, 1), degrees=(5,))
         for place, known in enumerate(sets):
             norm = scaled_norm(asked.published[place], asked.setting.exponents) * (1 + 1e-9)
             bound = norm if asked.setting.objective.bounded else None

@@ -11,7 +11,7 @@ from quakedesign.lyapunov.gains.path_following import (
     fastest,
     neighbourhood,
     on_box,
-    pace_of,
+    required_rate,
     rounded,
     short,
     with_gains,
@@ -76,13 +76,13 @@ def test_the_rate_estimated_by_sampling_is_above_what_is_proved(cta):
 
 
 def test_linear_forms_are_near_the_root_of_v(cta):
-    pace = pace_of(cta.loop, cta.lyapunov, 1.0, 5)
+    required = required_rate(cta.loop, cta.lyapunov, 1.0, 5)
     rng = np.random.default_rng(2)
     u = rng.dirichlet((1, 1, 1), 500) * (1, 1.4, 7)
     for cell in Obligations(cta.loop, cta.lyapunov).sign_cells():
         potential = Obligations(cta.loop, cta.lyapunov).potential(cell.signs)
         V = sum(float(c) * np.prod(u ** np.array(e), axis=1) for e, c in potential.items())
-        w = sum(c * u[:, e.index(1)] for e, c in pace.forms[cell.name].items())
+        w = sum(c * u[:, e.index(1)] for e, c in required.forms[cell.name].items())
         assert np.median(np.abs(w / V**0.2 - 1)) < 0.2
 
 

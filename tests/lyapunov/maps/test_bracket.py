@@ -8,7 +8,7 @@ import pytest
 from quakedesign.lyapunov.maps.sweep import Frame, Screened
 from quakedesign.lyapunov.search.certify import TOLERANCE, first_below, last_success
 
-FRAME = Frame(scale=(F(1),), pace=1.0)
+FRAME = Frame(scale=(F(1),), rate_scale=1.0)
 ROOT = math.sqrt(0.7)
 FUNCTIONS = {
     "concave": (lambda x: 0.7 - x**2, lambda x: -2 * x),

@@ -61,9 +61,9 @@ def test_both_bounds_hold_wherever_a_step_has_them(monkeypatch):
     def noted(self, *given):
         step = honest(self, *given)
         steps.append(step)
-        ends = [f + d for f, d in zip(self._place.functionals, step.moves, strict=True)]
+        ends = [f + d for f, d in zip(self._centre.functionals, step.moves, strict=True)]
         shares = [np.tensordot(c, f, axes=((0, 1), (0, 1))) for c, f in zip(self._tables, ends, strict=True)]
-        assert step.missed >= 0.9 * np.abs(sum(shares) - np.eye(len(self._means))[0] - step.bound * self._means).max()
+        assert step.residual >= 0.9 * np.abs(sum(shares) - np.eye(len(self._means))[0] - step.bound * self._means).max()
         return step
 
     monkeypatch.setattr(paths._Newton, "_refined", noted)
@@ -83,21 +83,21 @@ def test_both_bounds_hold_wherever_a_step_has_them(monkeypatch):
 
 
 def test_a_bound_counts_only_where_it_holds_and_beyond_what_its_equations_are_missed_by():
-    given = {"tau": 1.0, "moves": (), "least": -0.5, "most": 0.5, "missed": 1e-6}
+    given = {"tau": 1.0, "moves": (), "least": -0.5, "most": 0.5, "residual": 1e-6}
     found = lambda **other: paths._Step(**given | other).feasible  # noqa: E731
     assert found(multipliers=np.array([-1e-3]), bound=2.0) is True
     assert found(multipliers=np.array([-1e-3]), bound=2.0, most=1.5) is None
-    assert found(multipliers=np.array([-1e-3]), bound=2.0, missed=1e-3) is None
-    assert found(multipliers=np.array([-4e-10]), bound=2.0, missed=0.0) is None
+    assert found(multipliers=np.array([-1e-3]), bound=2.0, residual=1e-3) is None
+    assert found(multipliers=np.array([-4e-10]), bound=2.0, residual=0.0) is None
     assert found(multipliers=np.array([1e-3]), bound=-1e-3) is False
     assert found(multipliers=np.array([1e-3]), bound=-1e-3, least=-1.5) is None
-    assert found(multipliers=np.array([1e-3]), bound=-1e-3, missed=1e-3) is None
+    assert found(multipliers=np.array([1e-3]), bound=-1e-3, residual=1e-3) is None
 
 
 def test_a_row_does_not_depend_on_the_rows_before(monkeypatch):
     sheet, taken = sheet_of("super-twisting"), []
     honest = paths._Newton.step
-    monkeypatch.setattr(paths._Newton, "step", lambda self: taken.append(self._place.tau) or honest(self))
+    monkeypatch.setattr(paths._Newton, "step", lambda self: taken.append(self._centre.tau) or honest(self))
 
     def steps_of(screener, row):
         taken.clear()
@@ -154,7 +154,7 @@ def test_a_solver_decides_where_no_path_does(monkeypatch):
 
 def test_problems_are_solved_by_cvxpy_while_they_are_handed_back(monkeypatch):
     sheet = sheet_of("super-twisting")
-    monkeypatch.setattr(workers, "handing_back", lambda: True)
+    monkeypatch.setattr(workers, "collecting", lambda: True)
     monkeypatch.setattr(Path, "feasible", lambda self, loop: pytest.fail("a path was asked"))
     assert Screener(sheet).row(sheet.rows[0][:2])[1] >= 2
 

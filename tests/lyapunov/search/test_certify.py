@@ -169,7 +169,7 @@ def test_a_missing_or_extra_witness_is_refused(proof):
     without = {name: proof.witnesses[name] for name in rest}
     with pytest.raises(CertificateError, match="missing"):
         replace(proof, witnesses=without).check()
-    with pytest.raises(CertificateError, match="no obligation needs"):
+    with pytest.raises(CertificateError, match="not those of the obligations"):
         replace(proof, witnesses=proof.witnesses | {"decrease of nothing": proof.witnesses[first]}).check()
 
 

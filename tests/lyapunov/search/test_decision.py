@@ -162,7 +162,7 @@ def test_neither_checker_takes_a_root_of_zero():
     text = certificate_text(certify(loop, (1,), lipschitz=1)[1])
     raw = json.loads(text)
     raw["gains"]["k"], raw["roots"]["root"] = "0", ["k", "0", "1"]
-    with pytest.raises(CertificateError, match="does not hold the root of k"):
+    with pytest.raises(CertificateError, match="does not contain the root of k"):
         parse_certificate(json.dumps(raw)).check(loop)
     with pytest.raises(checker.Refused, match="the root of a positive number"):
         checker.check(json.dumps(raw))
@@ -190,7 +190,7 @@ def test_a_root_that_is_declared_negative_is_refused():
 
 
 def test_signs_that_say_the_same_are_named():
-    with pytest.raises(CertificateError, match=r"that of one state\. Write"):
+    with pytest.raises(CertificateError, match=r"that of a state\. Use"):
         certify(replace(PLAIN, field={x: -2 * sp.sign(k * x) + d}), (3,), lipschitz=1)
 
 

@@ -206,9 +206,9 @@ SHAKEN = REAL.with_disturbance(Disturbance(amplitude=1.0, frequency=1.0))
     [
         (QUIET, Errors(), "the moving reference"),
         (SHAKEN, Errors(), "the disturbance"),
-        (QUIET, Errors(acceleration=F(1)), "the control itself, through viscosity and rate weakening (e2')"),
+        (QUIET, Errors(acceleration=F(1)), "the control, through viscosity and rate weakening (e2')"),
         (QUIET, Errors(rate=F(1)), "the slip-rate error, through spring and weakening friction"),
-        (SHAKEN, Errors(acceleration=F(1)), "the control itself, through viscosity and rate weakening (e2')"),
+        (SHAKEN, Errors(acceleration=F(1)), "the control, through viscosity and rate weakening (e2')"),
         (SHAKEN, Errors(rate=F(1)), "the slip-rate error, through spring and weakening friction"),
     ],
 )
@@ -245,7 +245,7 @@ def test_what_the_feed_forward_leaves_is_named_so(monkeypatch):
     wide = STEADY.with_box("ten-percent")
     law = Law(divisor=least_authority(wide), feedforward=feed_forward("nominal", wide, least_authority(wide)))
     asked = replace(question(WITHSTANDS), fault=wide, controller=law)
-    assert domain._split_limit(asked, F(1)) == "the slip error, through the spring less its feed-forward"
+    assert domain._split_limit(asked, F(1)) == "the slip error, through the spring minus its feed-forward"
 
 
 @given(st.fractions(F(1, 10**6), 10**6), st.sampled_from([F(1), F(1, 2), F(2, 5), F(7, 3)]))

@@ -25,7 +25,7 @@ PRESETS = ("real-fault", "lab-fault")
 def test_every_certificate_that_is_kept_proves_its_claim_in_the_place_of_its_question(path):
     certificate = load_certificate(path)
     assert certificate.check() is Verdict.PROVED
-    assert kept.place(certificate.loop, degree(certificate.loop)) == path
+    assert kept.path_of(certificate.loop, degree(certificate.loop)) == path
 
 
 def degree(loop):
@@ -38,7 +38,7 @@ def asked(monkeypatch):
     found = []
 
     def noted(loop, degree, subject, answered=search._of_degree):
-        found.append((kept.place(loop, degree), loop, answered(loop, degree, subject)))
+        found.append((kept.path_of(loop, degree), loop, answered(loop, degree, subject)))
         return found[-1][2]
 
     monkeypatch.setattr(search, "_of_degree", noted)
@@ -77,9 +77,9 @@ def test_a_file_that_proves_nothing_is_not_believed(monkeypatch, tmp_path):
     monkeypatch.setattr(kept, "FOLDER", tmp_path)
     searched = kept.cached(lambda loop, degree, subject: "searched")
     assert searched(known.loop, 5, None) == "searched"
-    kept.keep(known.loop, 5, known)
+    kept.store(known.loop, 5, known)
     assert searched(known.loop, 5, None) == known
-    place = kept.place(known.loop, 5)
+    place = kept.path_of(known.loop, 5)
     text = place.read_text(encoding="utf-8")
     for wrong in (text.replace('"positive":"', '"positive":"9', 1), text[: len(text) // 2], "", "{}"):
         assert wrong != text
@@ -89,8 +89,8 @@ def test_a_file_that_proves_nothing_is_not_believed(monkeypatch, tmp_path):
 
 def test_another_degree_or_number_is_another_question():
     loop = load_certificate(PROOFS[0]).loop
-    assert kept.place(loop, 5) != kept.place(loop, 7)
-    assert kept.place(loop, 5) != kept.place(load_certificate(PROOFS[1]).loop, 5)
+    assert kept.path_of(loop, 5) != kept.path_of(loop, 7)
+    assert kept.path_of(loop, 5) != kept.path_of(load_certificate(PROOFS[1]).loop, 5)
 
 
 def test_what_was_searched_for_on_this_machine_is_decided_anew(monkeypatch, tmp_path):

@@ -156,7 +156,7 @@ def test_bad_input_gets_one_clear_message(call, message):
 
 def test_a_scale_needs_a_bound():
     reach = largest_gain_range("super-twisting", ("1.2", "2"), lipschitz=1, degrees=6)
-    with pytest.raises(ParameterError, match="a scale needs the reach in lipschitz"):
+    with pytest.raises(ParameterError, match="a scale needs the limit of lipschitz"):
         reach.smallest_scale(1)
 
 

@@ -45,7 +45,7 @@ def test_the_rows_are_the_demands_of_the_search(name):
             for n in names:
                 c = c * values[n]
             found[j][exponents] = found[j].get(exponents, F(0)) + c
-        factor = 1 / family.pace if row.rate else F(1)
+        factor = 1 / family.rate_scale if row.rate else F(1)
         return tuple(tuple(sorted((e, c * factor) for e, c in p.items() if c)) for p in found)
 
     wanted = {tuple(tuple(sorted(p.items())) for p in d.parts) for d in family.demands}
@@ -103,7 +103,7 @@ def test_the_sign_of_the_margin_does_not_depend_on_units_or_on_what_was_solved_b
     beyond = closed_loop("cta", LOOPS["cta"][0], lipschitz="1.3")
     for one, sign in ((at, 1), (beyond, -1)):
         for scale in ((1, 1, 8), (1, 1, 16), (1, 2, 8)):
-            frame = Frame(scale=tuple(map(F, scale)), pace=sweep.frame(one).pace)
+            frame = Frame(scale=tuple(map(F, scale)), rate_scale=sweep.frame(one).rate_scale)
             assert np.sign(sweep.solve(one, frame).margin) == sign
     assert sweep.solve(at).margin == pytest.approx(Sweep(at, degree).solve(at).margin, rel=1e-4)
 
@@ -121,7 +121,7 @@ def test_the_margin_goes_on_below_zero_with_the_disturbance():
 def test_another_structure_is_refused():
     at, degree = loop("super-twisting")
     point = closed_loop("super-twisting", ("1.5", "1.1"), lipschitz="0.9")
-    with pytest.raises(ValueError, match="another structure"):
+    with pytest.raises(ValueError, match="differs in structure"):
         Sweep(at, degree).solve(point)
     nested = closed_loop("dia", ("4", "20", "1", "0.3"), lipschitz="0.3")
     sweep = Sweep(nested, 5)
@@ -132,6 +132,6 @@ def test_another_structure_is_refused():
 
 
 def test_a_degree_without_candidates_is_refused():
-    with pytest.raises(CertificateError, match="no Lyapunov functions of degree 1"):
+    with pytest.raises(CertificateError, match="no candidate functions V of degree 1"):
         Sweep(loop("cta")[0], 1)
     assert law("cta").name == "cta"

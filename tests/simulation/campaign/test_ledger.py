@@ -15,7 +15,7 @@ from quakedesign.errors import OutputError, SimulationError
 from quakedesign.files import FAMILY, PREFIX
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation.campaign.ledger import Ledger, _told, differences, plain
+from quakedesign.simulation.campaign.ledger import Ledger, _listed, differences, plain
 
 INPUTS = {"seed": 1, "controller": {"gains": {"k1": "7"}}}
 
@@ -37,7 +37,7 @@ def test_bits_come_back(tmp_path):
 def test_another_campaign_is_refused_by_name(tmp_path):
     filled(tmp_path)
     other = {"seed": 2, "controller": {"gains": {"k1": "7", "k2": "5"}}}
-    with pytest.raises(SimulationError, match=r"differs in controller\.gains\.k2, seed"):
+    with pytest.raises(SimulationError, match=r"Received changes of controller\.gains\.k2, seed"):
         Ledger.open(tmp_path, other)
     assert len(Ledger.open(tmp_path, INPUTS).read()) == 2
     assert not Ledger.open(tmp_path, other, renew=True).read()
@@ -46,7 +46,7 @@ def test_another_campaign_is_refused_by_name(tmp_path):
 def test_other_files_are_not_touched(tmp_path):
     (tmp_path / "thesis.txt").write_text("years")
     for renew in (False, True):
-        with pytest.raises(OutputError, match=r"holds thesis\.txt"):
+        with pytest.raises(OutputError, match=r"contains thesis\.txt"):
             Ledger.open(tmp_path, INPUTS, renew=renew)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
@@ -75,7 +75,7 @@ def test_force_does_not_delete_the_same_campaign(tmp_path):
 
 def test_a_manifest_that_is_none(tmp_path):
     (tmp_path / "campaign.json").write_text("[1")
-    with pytest.raises(SimulationError, match="differs in everything"):
+    with pytest.raises(SimulationError, match="Received changes of everything"):
         Ledger.open(tmp_path, INPUTS)
 
 
@@ -190,7 +190,7 @@ def test_differences_name_what_one_of_the_two_has_alone():
     ],
 )
 def test_five_differences_are_told(names, told):
-    assert _told(names) == told
+    assert _listed(names) == told
 
 
 def test_a_campaign_is_known_by_its_inputs_in_any_order(tmp_path):

@@ -132,7 +132,7 @@ def test_a_library_whose_content_is_another_one_is_no_library(tmp_path):
     library = program_module.Library.of(tmp_path / "steps.so")
     assert library.content() == b"built"
     library.path.write_bytes(b"other")
-    with pytest.raises(OSError, match=r"steps\.so is not what was built"):
+    with pytest.raises(OSError, match=r"steps\.so differs from the library that was built"):
         library.content()
 
 

@@ -35,7 +35,7 @@ from quakedesign.sos.exact.proofs import (
     integer_gram,
     localizing_matrix,
 )
-from quakedesign.sos.exact.reduction import _contributions, reach
+from quakedesign.sos.exact.reduction import _contributions, equality_monomials
 from quakedesign.sos.exact.work_budget import STEPS, TERMS, expanded, length, limited, longest, spend
 from quakedesign.sos.solve.engine import prove
 
@@ -195,8 +195,8 @@ STEPS_BY_HAND = {
         lambda: localizing_matrix(LINE, [ONE, X], {ONE: F(1)}), 2**2 * 2,
     ),
     "pairs of a basis of two": (lambda: _contributions(statement(), [{ONE: None, X: None}]), 3),
-    "two multiples of an equality of two terms": (lambda: reach(statement(LINE)), 2 * 2),
-    "one of one term, of the whole degree": (lambda: reach(statement({(2,): F(1)})), 1),
+    "two multiples of an equality of two terms": (lambda: equality_monomials(statement(LINE)), 2 * 2),
+    "one of one term, of the whole degree": (lambda: equality_monomials(statement({(2,): F(1)})), 1),
     "a square of two terms, times one, added": (
         lambda: _sum(statement(), [(Square(basis=(ONE, X), gram=(F(1), F(0), F(1))), UNIT)]), 3 + 2 + 2,
     ),

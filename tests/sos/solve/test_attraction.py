@@ -269,7 +269,11 @@ def test_what_is_not_proved_says_why():
     assert sos.region_of_attraction({"x": "x"}).remark == "the linearised field has no V = x'Px. Give a V"
     assert sos.region_of_attraction({"x": "-x", "y": "-y"}, "x^2 - y^2").remark == "V is not positive"
     found = sos.region_of_attraction({"x": "x"}, "x^2")
-    assert (found.verdict, found.level, found.remark) == ("undecided", None, "no level below was proved")
+    assert (found.verdict, found.level, found.remark) == (
+        "undecided",
+        None,
+        "no lower level was proved",
+    )
     claim = sos.stability(VAN_DER_POL, degrees=())
     assert (claim.verdict, claim.check(), claim.reason) == ("undecided", True, "no degree of V was tried")
     motzkin = "x^4*y^2 + x^2*y^4 + z^6 - 3*x^2*y^2*z^2 + (x^6 + y^6 + z^6)/100"  # positive, and no sum of squares
@@ -346,7 +350,7 @@ def test_the_command_proves_refutes_and_writes_both(tmp_path, capsys):
     assert run(capsys, *line)[0] == 2
     code, out, _ = run(capsys, *line, "--force")
     assert "every solution that starts where V < 1 (1 rounded down) tends to the origin" in out
-    assert "another equilibrium, so that no V helps beyond: x = " in out
+    assert "another equilibrium, which no region of attraction contains: x = " in out
     code, out, _ = run(capsys, "check", *files)
     assert (code, out.count(": proved"), out.count(": refuted")) == (1, 1, 1)
 
@@ -360,7 +364,7 @@ def test_the_command_writes_the_proof_of_the_part_of_a_shape(tmp_path, capsys):
     assert float(F(facts["shape_level"])) == pytest.approx(4, rel=2e-5)
     assert F(facts["shape_level"]) < 4
     code, out, _ = run(capsys, *line, "--force")
-    assert f"that is so wherever 4*x^2 <= {facts['shape_level']} (3.9999" in out
+    assert f"the region contains 4*x^2 <= {facts['shape_level']} (3.9999" in out
     assert run(capsys, "check", tmp_path / "part.json")[0] == 0
     code, _, said = run(capsys, *line[:2], "--everywhere", "--degree", "2")
     assert (code, "--degree and --shape cannot be used with --everywhere" in said) == (2, True)

@@ -50,7 +50,7 @@ def test_infeasible_is_an_answer():
     program.require("-x^2 + g")
     found = program.solve()
     assert not found
-    assert "squares alone produce x^2" in found.reason
+    assert "only squares contain x^2" in found.reason
 
 
 def test_a_product_of_decisions_is_refused():
