@@ -454,7 +454,7 @@ BUDGETS = {
     "sos": 6326,
     "laws": 3105,
     "loop": 4169,
-    "plant": 1444,
+    "plant": 1445,
     "guarantees": 13241,
     "lyapunov": 6953,
     "linear": 2393,
@@ -462,7 +462,7 @@ BUDGETS = {
     "rocq": 842,
     "simulation": 9743,
     "identification": 4049,
-    "studies": 4126,
+    "studies": 4130,
     "report": 4097,
     "cli": 3510,
 }

@@ -68,7 +68,7 @@ def test_progress_of_several_answers():
     told = []
     found = answers([lambda i=i: i * i for i in range(3)], tell=lambda what, done: told.append((what, done)))
     assert found == [0, 1, 4]
-    assert told == [("1 of 3 answered", 1 / 3), ("2 of 3 answered", 2 / 3), ("3 of 3 answered", 1)]
+    assert told == [("1 of 3 computed", 1 / 3), ("2 of 3 computed", 2 / 3), ("3 of 3 computed", 1)]
 
 
 def test_the_process_that_asks_does_what_is_wanted_and_no_more():

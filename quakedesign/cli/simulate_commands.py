@@ -232,8 +232,8 @@ def sampling(
 ) -> int:
     """Show effects of sampling: every scheme with the published controllers, orders of accuracy, sensitivities.
 
-    Writes results.json and figures. Errors are evaluated after the first quarter of each run. Runs with noise last a
-    sixteenth of the task.
+    Runs are on the plant without stick. Errors are evaluated after the first quarter of each run. Runs with noise last
+    a sixteenth of the task. Writes results.json and figures.
 
     Parameters
     ----------

@@ -188,10 +188,11 @@ class UncertainPlant:
         ParameterError
             For a system in discrete time, or with direct feedthrough.
         """
-        if getattr(system, "dt", 0) or any(v for row in system.D.tolist() for v in row):
+        direct = getattr(system, "D", None)
+        if direct is None or getattr(system, "dt", None) or any(v for row in direct.tolist() for v in row):
             raise ParameterError(
-                "a plant must be in continuous time, with D = 0. Received a system in discrete time or with D not 0. "
-                "Use control.ss(A, B, C, 0)."
+                "a plant must be a control.StateSpace in continuous time, with D = 0. Received no such system, one in "
+                "discrete time or D not 0. Use control.ss(A, B, C, 0)."
             )
         labels = {"controls": tuple(system.input_labels), "measurements": tuple(system.output_labels)}
         return cls(**({"A": system.A, "B": system.B, "C": system.C, "name": system.name} | labels | more))

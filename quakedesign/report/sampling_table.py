@@ -55,7 +55,7 @@ def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] 
 def print_sampling(report: SamplingReport, console: Any) -> None:
     """Print a table of the schemes, and one of every study."""
     console.print(report.fault.name, style="bold", end=", ")
-    console.print(f"T_s = {report.fault.sampling_time:g} s")
+    console.print(f"T_s = {report.fault.sampling_time:g} s, plant without stick")
     console.print(_table(OUTCOMES, [row_outcome(row) for row in report.rows], OUTCOME_WIDTHS), soft_wrap=False)
     console.print()
     console.print(_table(COLUMNS, [row_cells(row) for row in report.rows], WIDTHS), soft_wrap=False)

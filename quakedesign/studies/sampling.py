@@ -11,6 +11,7 @@ from quakedesign.fault import Fault
 from quakedesign.laws import Controller, published
 from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
+from quakedesign.simulation.run_settings import PRINTED
 from quakedesign.simulation.sensitivity import SCHEMES
 from quakedesign.studies.certified import certified_bound, trajectory_premise
 from quakedesign.synthesis import Design
@@ -87,7 +88,7 @@ def sampling_report(
     duration: float | None = None,
     progress: Tell | None = None,
 ) -> SamplingReport:
-    """Run a law under every scheme and the published laws, and measure orders and sensitivities.
+    """Run a law under every scheme and published laws without stick, and measure orders and sensitivities.
 
     Parameters
     ----------
@@ -143,7 +144,8 @@ def _row(
     label = f"{law.title}{f', λ {float(law.scale):.3g}' if law.scale is not None else ''}"
     label = f"{law.title}, published" if origin == "published" else label
     text = f"{label}, {scheme}"
-    run = simulate(fault, law, scheme=scheme, duration=duration, samples=1000, progress=lambda done: tell(text, done))
+    options: dict[str, Any] = {"scheme": scheme, "duration": duration, "samples": 1000, "plant": PRINTED}
+    run = simulate(fault, law, progress=lambda done: tell(text, done), **options)
     premise = trajectory_premise(law, None if bound is None else float(bound * (law.scale or 1)), run)
     return SchemeRow(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
 
@@ -159,12 +161,14 @@ def _studies(
         studies["orders"] = orders(fault, law, schemes)
     for i, of in enumerate(("slip_noise", "rate_noise")):
         tell(f"sensitivity to {of.replace('_', ' ')}", i / 3)
+        levels = noise_levels(fault, of)
         studies[of] = noise_sensitivity(
-            fault, law, levels=noise_levels(fault, of), of=of, schemes=schemes, duration=window
+            fault, law, levels=levels, of=of, schemes=schemes, duration=window, plant=PRINTED
         )
     tell("sensitivity to the input gain", 2 / 3)
     box = fault if fault.box.authority else fault.with_box(UNCERTAIN)
-    return studies | {"input_gain": gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration)}
+    gain = gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration, plant=PRINTED)
+    return studies | {"input_gain": gain}
 
 
 def orders(fault: Fault, law: Controller, schemes: Sequence[str] = SCHEMES) -> Study:

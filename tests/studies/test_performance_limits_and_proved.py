@@ -12,6 +12,7 @@ from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Disturbance
 from quakedesign.guarantees import Claims, NoProof, SampledLoop, TrackingProof
 from quakedesign.guarantees.exact.limit_theorems import longest_reaction
+from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.linear_design import Longest
 from quakedesign.laws import summed_integrals
 from quakedesign.plant import uncertain_plant
@@ -153,8 +154,8 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
     )
     assert found.largest_step == plain.largest_step  # even for those who know everything
     told = {"measured": "slip", "slip_noise": F(1, 10**6)}
-    assert told in designs[2]
-    assert {"measured": "slip-and-rate"} in designs[2]
+    assert {"measured": "slip", "setup": ExactSetup(slip_noise=F(1, 10**6))} in designs[2]
+    assert {"measured": "slip-and-rate", "setup": ExactSetup()} in designs[2]
     assert {key: found.to_dict()[key] for key in told} == {key: str(value) for key, value in told.items()}
     said = "even for one that measures the slip with errors of no more than 1 µm up to each sample"
     assert said in " ".join(" ".join(limits_lines(found)).split())

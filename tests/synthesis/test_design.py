@@ -194,7 +194,7 @@ def test_a_simulation_that_holds_the_pressure_agrees_with_both_guarantees(real, 
 
 
 def test_a_design_refuses_quantities_of_the_setup_that_it_does_not_know():
-    with pytest.raises(ParameterError, match=r"a design knows step, measured, delay, .* Received jitter, longest_step"):
+    with pytest.raises(ParameterError, match=r"a design takes step, measured, delay, .* Received jitter, longest_step"):
         qd.design(qd.load_fault("real-fault"), "elqr", jitter="1 ms", longest_step="100 ms")
 
 
