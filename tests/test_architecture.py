@@ -460,7 +460,7 @@ BUDGETS = {
     "linear": 2393,
     "synthesis": 1947,
     "rocq": 842,
-    "simulation": 9743,
+    "simulation": 9744,
     "identification": 4049,
     "studies": 4130,
     "report": 4097,

@@ -140,9 +140,9 @@ def test_blocks_under_the_compiled_law_move_as_in_the_simulated_loop(wells, kind
     chain = replace(CHAIN, fault=replace(CHAIN.fault, reference=task), wells=CHAIN.wells if wells == N else (2500.0,))
     found = qd.guarantee(chain, kind)
     assert found.proved
-    exported = write_step(block_step(chain, found.law), tmp_path / "c")
+    exported = write_step(block_step(chain, found.proof.law), tmp_path / "c")
     step, _ = stepping(exported, tmp_path / "c")
-    run = simulate_blocks(chain, found.law, duration=184.0, substeps=8)
+    run = simulate_blocks(chain, found.proof.law, duration=184.0, substeps=8)
     slips = looped(chain, step, 1000, 8)
     assert slips[-1].min() > 1e-3
     assert np.abs(slips - run.slip).max() < 1e-9 * slips.max()

@@ -27,7 +27,7 @@ def test_a_casadi_function_has_names():
 @pytest.mark.slow
 def test_a_closed_loop_function_integrates_to_the_simulated_run():
     loop = to_casadi(LAB, published("lab-fault")["elqr"])
-    run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.2, samples=10)
+    run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.2, samples=10, plant="printed")
     oracle = solve_ivp(
         lambda t, y: loop(t, y)[0].full().ravel(),
         (0, run.time[-1]),
@@ -47,7 +47,7 @@ def test_python_control_joins_fault_and_law():
     assert (fault.input_labels, fault.output_labels) == (["p"], ["slip", "slip_rate"])
     assert (law.input_labels, law.output_labels) == (["slip", "slip_rate", "r", "r_rate"], ["p"])
     joined = control.interconnect([fault, law], inputs=["r", "r_rate"], outputs=["slip", "p"], check_unused=False)
-    run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.1, samples=200)
+    run = simulate(LAB, published("lab-fault")["elqr"], step=1e-4, duration=0.1, samples=200, plant="printed")
     response = control.input_output_response(
         joined,
         run.time,

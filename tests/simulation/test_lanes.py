@@ -24,7 +24,8 @@ SETS = [("-DLANES=1",), ("-DLANES=8",), ("-DLANES=5", "-mavx2"), processor_flags
 
 
 def problem(law, scheme):
-    return campaign_problem(LAB, published("lab-fault")[law], scheme=scheme, duration=1, initial_slip=1e-4)
+    options = {"scheme": scheme, "duration": 1, "initial_slip": 1e-4, "plant": "printed"}
+    return campaign_problem(LAB, published("lab-fault")[law], **options)
 
 
 def starts(of):

@@ -119,7 +119,7 @@ def test_a_loop_that_is_sampled_too_slowly_for_its_instability_is_an_earthquake(
     Within 100 s one such run of six escapes the earthquake, by the last digits of what it is computed from.
     """
     law = control_law("cta").from_values(("7", "5", "2.3", "1.1"), divisor="27/260000000").scaled("0.000136822")
-    slow, fine = (simulate(UNDERSAMPLED, law, duration=200.0, step=step) for step in (0.1, 0.01))
+    slow, fine = (simulate(UNDERSAMPLED, law, duration=200.0, step=step, plant="printed") for step in (0.1, 0.01))
     assert slow.outcome.kind == "earthquake"
     assert slow.outcome.share_of_natural == slow.metrics.peak_slip_rate / natural_peak(UNDERSAMPLED) > 0.5
     assert fine.outcome.kind == "tracked"

@@ -208,7 +208,8 @@ class CampaignProblem(ABC):
 # ----------------------------------------------------------------------
 # Samples of a fault with rate-and-state friction in controlled slow sliding, each in a separate run.
 
-_FIGURES = tuple(part.name for part in fields(Metrics) if part.name not in (*NOT_COMPARED, "max_h_rate"))
+_NOT_OF_SLIDING = (*NOT_COMPARED, "max_h_rate", "time_at_rest_fraction")
+_FIGURES = tuple(part.name for part in fields(Metrics) if part.name not in _NOT_OF_SLIDING)
 _FACTORS = tuple(field.name for field in fields(SlidingVariation))
 
 
