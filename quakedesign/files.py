@@ -302,8 +302,8 @@ def hold(folder: Path, *, make: bool = False) -> bool:
         _held[place] = lock_of(place)
     except BlockingIOError:
         raise OutputError(
-            f"{folder} must be written by one command at a time. Received one that another writes to. Wait for it, or "
-            "choose another folder."
+            f"{folder} must be written by one command at a time. Received a folder that another command writes. Wait "
+            "for that command, or choose another folder."
         ) from None
     except OSError as error:
         raise OutputError(f"{folder} cannot be written: {error.strerror}. Choose another folder.") from None

@@ -497,8 +497,8 @@ class Given(Crew):
     def renew(self) -> None:
         """See `Crew.renew`."""
         raise SimulationError(
-            "the executor must keep its workers. Received a broken one. Ask again with a new executor: a campaign goes "
-            "on from its files."
+            "the executor must have live workers. Received a broken one. Run again with a new executor: a campaign "
+            "continues from its files."
         )
 
 

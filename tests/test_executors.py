@@ -136,7 +136,7 @@ def test_an_executor_of_the_user_is_not_replaced():
         def submit(self, task, /, *arguments, **named):
             raise BrokenExecutor
 
-    with pytest.raises(SimulationError, match="executor must keep its workers"):
+    with pytest.raises(SimulationError, match="executor must have live workers"):
         list(Given(Broken()).answers(abs, [(1,), (2,)]))
 
 

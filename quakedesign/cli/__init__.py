@@ -70,7 +70,7 @@ def main(arguments: list[str] | None = None) -> None:
             where = error.filename or "the output"
             _refuse(f"{where} cannot be written: {error.strerror}. Choose another place, or make room.")
         defect = one_line(f"{type(error).__name__}: {error}")
-        print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
+        print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.", file=sys.stderr)
         sys.exit(3)
     finally:
         release()

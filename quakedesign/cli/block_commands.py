@@ -49,7 +49,7 @@ def several_blocks(
         named = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(others))
         has = {*accepted, "json"} - {"state"} | ({"force", "box"} & options.keys())
         raise ParameterError(
-            f"{command.__name__} has, of a fault of several blocks, the options "
+            f"options of {command.__name__} for a fault of several blocks must be among "
             f"{', '.join(f'--{name}' for name in sorted(has)).replace('_', '-')}. Received {named}. Omit these."
         )
     if chosen.get("accept_poor_fit"):
@@ -194,7 +194,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
     ]
     last = "proved without stick; run with stick, where an error may pass its bound"
     if chain.ages:
-        meant = ["(largest slip rate, slip from the reference, pressure beside the plan)"]
+        meant = ["(largest slip rate, slip from the reference, pressure from the plan)"]
         stress = LowerBound(sliding["stress"]).quantity("Pa")
         last = f"proved for any shear stress of up to {stress}; run without inertia under a sine"
     lines = [

@@ -57,7 +57,7 @@ def synthesise(
         inverse of the settling time from initial errors of at most the bound on |h'|. beta: widest certified range of
         the control coefficient. sampled: smallest simulated error of proved gains on a fault.
     lipschitz
-        Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the need of the fault.
+        Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the largest |h'| of the fault.
     gain_range
         b_m and b_M, the range of the control coefficient β; 1 1 by default, for sampled that of the fault. For beta
         the certified range contains this range and has the same middle.
@@ -66,7 +66,7 @@ def synthesise(
     degree
         Degree of V; repeat for more. By default the two lowest; higher degrees find better gains and take longer.
     starts
-        Number of starting points, 4 by default; sampled has its own.
+        Number of starting points, 4 by default; not for sampled.
     seed
         Seed of the random starting points, 0 by default.
     workers

@@ -77,7 +77,7 @@ def guarantee(
     Parameters
     ----------
     controller
-        elqr, or a sliding mode: cta, dia. Of several blocks: centralised (default), or decentralised.
+        elqr, or a sliding mode: cta, dia. For several blocks: centralised (default) or decentralised.
     objective
         Design objective: tracking, or peak for the smallest certified slip-rate error.
     gains

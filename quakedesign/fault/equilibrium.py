@@ -44,8 +44,8 @@ STEADY_SLIDING = FaultEquilibrium(
         "into the fault file, and run limits: it names unstable modes that no well reaches.",
         "no_diffusion": "diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.",
         "plant": "plant is for friction without a state, got {value!r} with {law}, which never rests: omit it.",
-        "stick_slip": "friction with a state never rests, so that the stick-slip plant is no other. Received {law}. "
-        "Omit plant.",
+        "stick_slip": "plant must be omitted for friction with a state, which never rests. Received stick-slip with "
+        "{law}. Omit plant.",
     },
 )
 

@@ -487,8 +487,8 @@ def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Faul
     exact = scaled_parameters(quantities(source), scales)
     if exact.pop(_UNIT_FRICTION, radical(1)) != radical(1):
         raise ParameterError(
-            f"{source.friction.name} cannot be multiplied by a factor, so the scales must leave friction as it is. "
-            f"Received the factor {scales.of('slip_m/normal_m')} for slip_m/normal_m."
+            f"slip_m/normal_m must have the factor 1, because {source.friction.name} cannot be multiplied by a factor. "
+            f"Received the factor {scales.of('slip_m/normal_m')}. Give slip_m and normal_m one factor."
         )
     parts: dict[str, dict[str, float]] = {"": {}, "friction": {}, "reference": {}, "disturbance": {}}
     for dotted, value in exact.items():

@@ -215,8 +215,8 @@ def _starts(
     usable = [candidates[i] for i in order if np.isfinite(costs[i])]
     if not usable:
         raise RecordError(
-            "an experiment must be one that a spring can hold without a jump. No set of parameters gives one for this "
-            "record. Check the stiffness, or give a record with measured slip."
+            "sliding must be without a jump for at least one set of parameters. Received a record for which all "
+            f"{_CANDIDATES} tested sets jump. Check the stiffness, or give a record with measured slip."
         )
     starts = usable if near is None else [near, *usable]
     return experiment.resolved(starts[0], scatter), starts

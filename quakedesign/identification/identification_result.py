@@ -183,7 +183,7 @@ class Identification:
         coordinates = self.fit.experiment.coordinates
         if missing := {c.name for c in coordinates} - set(values):
             raise ParameterError(
-                f"values must hold all that was fitted. Received none of {', '.join(sorted(missing))}."
+                f"values must contain every fitted parameter. Received no {', '.join(sorted(missing))}. Add these."
             )
         return self.fit.distance(self.fit.experiment.near(values)) <= self.fit.threshold(len(coordinates))
 

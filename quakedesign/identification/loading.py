@@ -197,7 +197,7 @@ def prepared(record: Record, rates: Sequence[float] = (), fixed: Pieces | None =
     if load is None:
         if len(rates):
             raise RecordError(
-                "--rates go with a column of the load point, which says when they change. Received none. Add it."
+                "--rates needs a column of the load point for the times of changes. Received none. Add this column."
             )
         return thinned(record), None
     if fixed is not None:

@@ -157,12 +157,12 @@ def _heading_cells(line: str, sign: str) -> list[str]:
 def _refuse_count(named: list[Column], count: int, sign: str) -> None:
     if sign == "," and len(named) < count <= 2 * len(named):
         raise RecordError(
-            f"a line must hold {len(named)} values, one a column. Received {count}: decimal commas between commas "
-            "cannot be told apart. Put semicolons between the columns, or write decimal points."
+            f"a line must have {len(named)} values, one for each column. Received {count}: commas separate the columns "
+            "and are decimal signs. Separate the columns by semicolons, or write decimal points."
         )
     raise RecordError(
-        f"a line must hold {len(named)} values, one a column. Received {count} under the headings "
-        f"{shown(', '.join(column.heading for column in named))}. Write one heading a column, without blanks inside."
+        f"a line must have {len(named)} values, one for each column. Received {count} under the headings "
+        f"{shown(', '.join(column.heading for column in named))}. Write one heading without blanks for each column."
     )
 
 

@@ -80,7 +80,7 @@ def read_steps(
             shared = np.isin((record.origin + record.time).round(9), (other.origin + other.time).round(9))
             if shared.sum() > 1:
                 raise RecordError(
-                    f"--steps windows must not overlap: part them. Received {shared.sum()} samples of {window} twice."
+                    f"--steps windows must not overlap. Received {shared.sum()} samples of {window} twice. Shorten one."
                 )
             record = part(record, ~shared, record.name)
         parts.append(replace(record, name=f"{record.name} {window}"))
@@ -195,7 +195,7 @@ def _assessed(common: Identification, steps: Sequence[Identification], probabili
     signs = {np.sign(c.value) for step in steps for c in step.assessment.checks if c.name == "sign" and c.passed}
     sign = sign_check(common.difference, {})
     if sign is not None and sign.passed and signs != {np.sign(sign.value)}:
-        why = "steps do not agree" if signs else "no step has one by itself"
+        why = "the steps disagree" if signs else "no step alone determines it"
         sign = replace(sign, passed=False, sentence=f"the sign of a - b is open: {why}")
     checks = (one, *([sign] if sign is not None else []))
     return Assessment(

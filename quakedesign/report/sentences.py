@@ -256,7 +256,7 @@ def _reach(entry: "Entry") -> list[str]:
     step, delay = (LowerBound(Fraction(certified[name])) for name in ("sampling_time", "delay"))
     law = entry.design.controller
     own = f"at T_s = {law.sampling_time:.6g} s" if law and law.sampling_time else "at the fault's own T_s"
-    late = f"for delays up to at least {delay:.3g} s" if delay else "no delay was found with one"
+    late = f"for delays up to at least {delay:.3g} s" if delay else "none was found with a delay"
     return [f"designs have a guarantee for T_s up to at least {step:.3g} s, and {own} {late}"]
 
 
@@ -371,10 +371,10 @@ def _premises(entry: "Entry") -> list[str]:
     else:
         scheme = entry.run.provenance["scheme"] if entry.run else AS_IN_THE_PAPER
         texts += (
-            [] if scheme == AS_IN_THE_PAPER else [f"in this run has zero-order hold over every step, scheme {scheme}"]
+            [] if scheme == AS_IN_THE_PAPER else [f"this run has a zero-order hold over every step (scheme {scheme})"]
         )
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
-        texts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
+        texts.append(f"the run satisfies the proved bound on |h'| for T_s up to about {entry.largest_step:g} s")
     return texts
 
 
@@ -470,7 +470,7 @@ def state_run_lines(result: dict[str, Any]) -> list[str]:
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa",
     ]
     if result["resting"]:
-        lines.append("steady sliding is unstable here, but nothing disturbs it: start late, or give a pressure")
+        lines.append("steady sliding is unstable here, but nothing disturbs it: use --start late, or set a pressure")
     if outcome["kind"] == "creep" and result["slip"] < _LOCKED * result["loading_rate"] * result["duration"]:
         lines.append(
             "it is not in steady creep: it slips far less than it is loaded, and the run ends before the event; set a "
@@ -509,7 +509,7 @@ def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
     """Beginning of run and proof of slow sliding, and the share of an earthquake's slip in their task."""
     task = fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
-    text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
+    text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; the way there from rest is not"
     share = (
         ""
         if slip is None

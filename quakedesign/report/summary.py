@@ -208,7 +208,7 @@ def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
 # ----------------------------------------------------------------------
 # The table with units in its cells, for pages.
 
-_NUMBERED = (f"{of} {kind}" for of in ("slip rate", "slip error") for kind in ("proved", "worst found", "run"))
+_NUMBERED = (f"{of} {kind}" for of in ("slip rate", "slip error") for kind in ("proved", "worst case found", "run"))
 SUMMARY_COLUMNS = ("controller", "outcome", *_NUMBERED, "pressure")
 
 

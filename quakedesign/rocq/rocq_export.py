@@ -122,7 +122,7 @@ def library(names: Sequence[str] = _LIBRARY) -> list[str]:
     for place in places:
         if place.is_dir():
             return [(place / name).read_text(encoding="utf-8") for name in names]
-    raise UnsupportedError(f"the Rocq library must be in {places[0]}. Found nothing. Install the package again.")
+    raise UnsupportedError(f"the Rocq library must be in {places[0]}. Received none. Install the package again.")
 
 
 def _stick_slip(raw: object) -> Iterator[str]:

@@ -108,7 +108,7 @@ class ChainLimits:
             parts += ["", f"infeasible: slip-rate errors below {rates}"]
         escaping = sum(not mode.reached for mode in self.modes)
         if escaping:
-            parts += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach"]
+            parts += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')}, reached by no well"]
         most, needs = max(b.effective_normal_stress for b in chain.blocks), [m.pressure or 0 for m in self.modes]
         if chain.diffusivity and max(needs, default=0) > most:
             parts += ["", f"a mode needs more than the effective normal stress, {quantity(most, 'Pa')}: move the wells"]

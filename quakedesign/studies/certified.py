@@ -185,7 +185,7 @@ def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[in
     if not excluded:
         return [_AGAINST[kind], "no exact dual was found"]
     family = f"no sum of even signed monomials of degree {degrees}"
-    return [_AGAINST[kind], f"an exact dual was found: {family} is positive and falls, whatever the proof"]
+    return [_AGAINST[kind], f"an exact dual was found: {family} is positive and decreases along all solutions"]
 
 
 def _of_reach(
@@ -235,7 +235,7 @@ def _reach_lines(reach: CertifiedLimit) -> list[str]:
     if reach.beyond is None and reach.sharp:
         return [text, "which is within 1e-4 of what no Lyapunov function can exceed"]
     if reach.beyond is None:
-        return [text, "the search stopped there, as there seems to be no end"]
+        return [text, "the search stopped there and met no upper limit"]
     beyond = f"at {UpperBound(reach.beyond)} the search finds none of degree {degrees}"
     return [text, beyond if reach.sharp else f"{beyond}; in between it is not known"]
 
@@ -243,7 +243,7 @@ def _reach_lines(reach: CertifiedLimit) -> list[str]:
 def _limit_line(limit: Fraction | None) -> str:
     if limit is None:
         return "no necessary limit of |h'| is known for this law"
-    return f"necessary limit: from |h'| = {UpperBound(limit)} on nothing can be proved of these gains"
+    return f"necessary limit: no certificate of these gains exists for a bound |h'| >= {UpperBound(limit)}"
 
 
 def _settling_values(settling: Settling | None) -> dict[str, Any] | None:
@@ -341,5 +341,5 @@ def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory
     premise = on_trajectory(limit if lipschitz is None else lipschitz, run)
     if premise is None or lipschitz is not None:
         return premise
-    text = f"{premise.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {premise.unit}"
+    text = f"{premise.note}; no certificate was given, and none of these gains exceeds {limit:.4g} {premise.unit}"
     return replace(premise, certified=0.0, proved=False, note=text)

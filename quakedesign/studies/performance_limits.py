@@ -108,10 +108,9 @@ class Sensing:
     def __post_init__(self) -> None:
         require_known(self.measured, MEASURED[:2], "measured")
         if self._alone and self.rate_noise:
-            noise = f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s"
             raise ParameterError(
-                f"noise of the slip rate needs one that is measured. Received {noise}, measured {self.measured}. Leave "
-                "it out."
+                f"rate noise must be 0 unless the slip rate is measured. Received {float(self.rate_noise):.4g} m/s, "
+                f"measured {self.measured}. Omit the rate noise, or measure {MEASURED[0]}."
             )
 
     @property
@@ -367,8 +366,8 @@ def _limits_at_rest(
 ) -> Limits:
     if stress is not None or off:
         raise ParameterError(
-            f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
-            "out: the box and the disturbance of the fault are meant."
+            f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Omit it: "
+            "the limits are for the box and the disturbance of the fault."
         )
     task, step = uncertain_plant(fault), rational(fault.sampling_time)
     withdrawal, spread = _pressure_and_diffusivity(fault, pressure, diffusivity)
@@ -435,7 +434,7 @@ def _require_plain(fault: Fault, sensing: Sensing) -> None:
     if sensing.setup.noise or sensing.measured != MEASURED[0]:
         raise ParameterError(
             f"no limit of slow sliding is known for noise. Received {fault.friction.name}, measured "
-            f"{sensing.words()}. Leave noise out: what cannot be done without it cannot be done with it."
+            f"{sensing.words()}. Omit the noise: what is infeasible without noise is infeasible with it."
         )
     if more := sensing.setup.given().keys() - {"lag", "diffusion"}:
         raise ParameterError(

@@ -379,7 +379,7 @@ def sensor(
             "number of steps": inner_steps != 1,
         }
         for name in (name for name, there in entered.items() if there):
-            raise ParameterError(f"the {name} belongs to a differentiator. Received no bound. Give both or neither.")
+            raise ParameterError(f"the {name} needs a differentiator. Received no bound. Give it, or omit the {name}.")
         return noise
     if noise.rate_noise:
         raise ParameterError(
@@ -501,7 +501,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         if type(controller) is SampledController:  # the file does not tell a designed e-LQR from a user-defined law
             object.__setattr__(controller, "title", "law of the certificate")
     if claim.check() is not Verdict.PROVED:
-        raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
+        raise CertificateError(f"certificate must be valid. Received {path}: its claims do not follow. Prove it again.")
     return Choice(controller=controller, claim=claim)
 
 
@@ -512,7 +512,7 @@ def _apart(fault: Fault, claim: Any) -> list[str]:
         task, uncovered = claim.beside_healing(task, rational(fault.friction.rest_excess))
         if uncovered is not None:
             return [
-                f"healing beside this disturbance up to {uncovered:.3g} there, {fault.friction.rest_excess:.3g} here"
+                f"healing of the fault {fault.friction.rest_excess:.3g}, covered with its disturbance {uncovered:.3g}"
             ]
     differences: list[str] = claim.task.differences(task)
     return differences

@@ -51,7 +51,11 @@ def test_a_command_ends_with_the_number_that_it_returns(ends, value, code):
     ("error", "code", "said"),
     [
         (ParameterError("step must be positive"), 2, "quakedesign: step must be positive\n"),
-        (ValueError("a\nb"), 3, "quakedesign: defect: ValueError: a b. Set QUAKEDESIGN_TRACEBACK=1 for the place.\n"),
+        (
+            ValueError("a\nb"),
+            3,
+            "quakedesign: defect: ValueError: a b. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.\n",
+        ),
         (MemoryError(), 4, "quakedesign: out of memory. Raise the limit, or make the problem smaller.\n"),
         (
             OSError(errno.EIO, "it fails", "stdout"),

@@ -73,8 +73,8 @@ def test_jitter_steps_of_a_reading_and_of_a_differentiator_are_those_of_python(r
         assert part in told["measurement"]
     for alone, said in (
         (("--jitter", "1"), "jitter needs delay"),
-        (("--slip-quantum", "1 um"), "the quantum of the slip belongs to a differentiator"),
-        (("--differentiator-steps", "2"), "the number of steps belongs to a differentiator"),
+        (("--slip-quantum", "1 um"), "the quantum of the slip needs a differentiator"),
+        (("--differentiator-steps", "2"), "the number of steps needs a differentiator"),
     ):
         code, _, err = run(*SHORT, *alone)
         assert code == 2

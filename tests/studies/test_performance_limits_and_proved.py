@@ -179,7 +179,7 @@ def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
     ("told", "said"),
     [
         ({"slip_noise": -1}, "slip noise must be 0 or more"),
-        ({"measured": "slip", "rate_noise": 1}, "noise of the slip rate needs one that is measured"),
+        ({"measured": "slip", "rate_noise": 1}, "rate noise must be 0 unless the slip rate is measured"),
         ({"measured": "rate"}, "measured must be one of"),
     ],
 )
@@ -227,7 +227,7 @@ def test_the_figure_shows_the_earthquake_and_what_is_proved(designs):
 @pytest.mark.parametrize(("step", "said"), [(17.8, False), (17.9, True)])
 def test_a_fault_says_when_no_controller_can_hold_it_at_its_step(step, said):
     told = " ".join(beyond_control(dataclasses.replace(REAL, sampling_time=step)))
-    assert ("beyond 17.9 s none can" in told) is said  # 17.828 s
+    assert ("beyond 17.9 s no controller can" in told) is said  # 17.828 s
 
 
 @pytest.mark.parametrize("given", [{"pressure": 0.0}, {"pressure": -1.0}, {"diffusivity": 0.0}])

@@ -105,7 +105,7 @@ def test_a_differentiator_comes_with_its_premise():
 def test_without_a_certificate_the_premise_on_the_run_says_so():
     _, (premise,) = told(choice(LAB, "cta", BASE).controller, duration=0.02)
     assert (premise.name, premise.certified, premise.ratio, premise.holds) == ("on_trajectory", 0, None, False)
-    assert "no certificate is at hand, and none of these gains exceeds 1.2 m/s^3" in premise.note
+    assert "no certificate was given, and none of these gains exceeds 1.2 m/s^3" in premise.note
 
 
 def test_a_certified_bound_goes_with_the_scale(monkeypatch):

@@ -45,16 +45,16 @@ class Actuator:
         for before, after in pairwise(self.stages):
             if isinstance(before, FlowStage) and isinstance(after, SampledStage):
                 raise ParameterError(
-                    f"stages that act once per sample come first. Received {before.name} before {after.name}. "
-                    "Exchange these two stages."
+                    f"stages that act once per sample must come first. Received {before.name} before {after.name}. "
+                    f"Put {after.name} before {before.name}."
                 )
         if len(between := [stage.name for stage in self.sampled if stage.part]) > 1:
             raise ParameterError(
-                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Omit all but one."
+                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Keep one of these."
             )
         if len(self._stores) > 1:
             names = ", ".join(stage.name for stage in self._stores)
-            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Omit all but one.")
+            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Keep one of these.")
 
     @classmethod
     def meant_for(cls, sampling: "Sampling") -> "Actuator":
@@ -110,7 +110,7 @@ class Actuator:
             if times > 1:
                 raise ParameterError(
                     f"a substep must be at most {LONGEST / stage.fastest:.3g} s for the {stage.name}. "
-                    f"Received {substep:.3g} s. Take {math.ceil(times)} times as many substeps, or leave the stage out."
+                    f"Received {substep:.3g} s. Take {math.ceil(times)} times as many substeps, or omit this stage."
                 )
 
     def hold(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Any, Entries]:

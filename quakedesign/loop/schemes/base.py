@@ -252,7 +252,7 @@ class AperiodicClock:
             raise ParameterError(
                 f"shortest and longest interval of aperiodic sampling must be whole numbers of steps, 1 to "
                 f"{MOST_STEPS}, with shortest <= longest. Received {self.shortest!r} and {self.longest!r}. "
-                "Round both, or exchange them."
+                "Round both to whole numbers, and give the shorter one first."
             )
         Measurement(seed=self.seed)
 
