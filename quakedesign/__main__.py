@@ -7,7 +7,7 @@ from quakedesign.parallel import ending, leave
 from quakedesign.streams import has_room, lack_memory, lacks_memory, open_all, widen
 
 _OBJECTS = 100_000
-"""How many are made between two searches for garbage: libraries make as many when they load, and none is garbage."""
+"""Allocations between two garbage collections: loading the libraries makes as many objects, none of them garbage."""
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ from quakedesign.text import shown
 Kind = TypeVar("Kind")
 _allowed: ContextVar[bool] = ContextVar("allowed", default=False)
 _imported: set[str] = set()
-"""Modules of the user's, of which a class was named."""
+"""User modules whose classes were named."""
 _OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
 
 

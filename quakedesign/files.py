@@ -28,7 +28,7 @@ Json = dict[str, Any]
 """Object of a JSON file: values by key."""
 
 _MOST_DOTS = 400
-"""In a line of TOML: memory and time for a key of n parts grow as n²."""
+"""Largest number of dots in a line of TOML: memory and time for a key of n parts grow as n²."""
 
 
 def parse_toml(text: str) -> Json:
@@ -96,9 +96,9 @@ if sys.platform != "win32":
 FAMILY = ".quakedesign-"
 """Beginning of the names of temporary folders."""
 PREFIX = f"{FAMILY}{sha256(platform.node().encode()).hexdigest()[:8]}-"
-"""The same on this machine: on a disk shared by many, a lock may be known to one of them only."""
+"""The same with this machine's name: on a shared disk, a lock may be visible to one machine only."""
 ASIDE = "aside"
-"""What lies in this folder of a temporary folder has been moved there, and goes back where its place is empty."""
+"""Subfolder of a temporary folder for files moved aside; each is restored if its original place is empty."""
 
 _TRIALS, _PAUSE = 10, 0.02  # s; a sweep holds a lock for a shorter time
 _mine: set[Path] = set()

@@ -92,7 +92,7 @@ def in_background() -> Iterator[Background]:
 
 _NAMES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 SIGNALS = {getattr(signal, name): said for name, said in _NAMES.items() if hasattr(signal, name)}
-"""What is said of each; SIGHUP is not everywhere."""
+"""Message for each signal; SIGHUP does not exist on every platform."""
 PATIENCE = 3.0  # longest wait [s] for a library that swallows the signal or does not return
 
 

@@ -37,7 +37,7 @@ __all__ = [
 
 
 _PLACES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
-"""What a disk refuses, as against a defect."""
+"""Error numbers of a disk that cannot be written; all others are defects."""
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -63,7 +63,7 @@ class BlockChain:
     wells : tuple of float
         Positions along the fault [m], in increasing order.
     diffusivity : float, optional
-        of the pressure along a fault of several blocks [m²/s]; steady pressure unless given
+        Diffusivity of the pressure along the fault [m²/s]; without it the pressure is steady.
     """
 
     fault: Fault

@@ -321,7 +321,7 @@ TOLERANCE = Fraction(1, 100)
 """Relative difference of a π-group up to which faults known to three digits count as similar."""
 
 CLOCKS = ("reference.operation_time", "shear_modulus")
-"""What may fix the scale of time: the task, as in Table I of the paper, or the natural period 1/ω_n ∝ √(ρL²/G)."""
+"""Quantities that may set the time scale: the task, as in Table I of the paper, or the natural period ∝ √(ρL²/G)."""
 
 _SUPERSCRIPTS = str.maketrans("-/0123456789", "⁻ᐟ⁰¹²³⁴⁵⁶⁷⁸⁹")
 

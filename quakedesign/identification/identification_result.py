@@ -27,7 +27,7 @@ _EXPERIMENTS = {
     "longer sliding before the step, which fixes the trend, and steps up and down by a factor of 10": "sign",
     "slip from rest until friction stays": "drop residual",
 }
-"""Experiments that tell what is open: parameters, or the sign of a - b."""
+"""Experiments that determine open parameters, or the sign of a - b."""
 
 
 @checked_dataclass(frozen=True, kw_only=True)

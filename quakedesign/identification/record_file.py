@@ -37,7 +37,7 @@ _ARRAYS = {f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)}
 _MOST_NUMBERS = 16 * MOST_SAMPLES
 _UNIT_WORDS = {"", *"s sec ms min h m mm um µm μm mic micron microns nm cm Pa kPa MPa Mpa GPa N kN MN - 1 Hz".split()}
 _UNIT_WORDS |= {f"{each}/{time}" for each in "m mm um µm mic micron microns nm".split() for time in ("s", "sec")}
-"""What may stand in a line of units."""
+"""Words that a line of units may contain."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,7 +30,7 @@ WIDTH = 7.16  # width of two columns of a printed page [in]
 SMALL = 8  # font size [pt], still readable in print
 NATURAL, INDUCED, PROVED = "#000000", "#CC79A7", "#000000"
 ORIGINS = {"published": (0, (4, 2)), "designed": "solid"}
-"""Line style of every origin, in the order in which they stand side by side."""
+"""Line style of every origin, in the order of the bars."""
 PALE = 0.45
 _NOTE = 115  # characters of the smallest font in a line across a figure
 _LINE = 0.125  # line height of the smallest font [in]
@@ -178,7 +178,7 @@ Format = Literal["svg", "pdf", "png"]
 FORMATS: tuple[Format, ...] = ("svg", "pdf", "png")
 DEFAULT: tuple[Format, ...] = ("svg",)
 _STYLE: dict[str, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
-"""Letters stay letters: as such in SVG, as TrueType, which journals ask for, in PDF."""
+"""Text is stored as text in SVG, and as TrueType fonts, which journals require, in PDF."""
 _UNDATED: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
@@ -229,7 +229,7 @@ def file_names(name: str, formats: Sequence[str]) -> str:
 # Figures as SVG inside a page: compact, with the colours of the page, and with axis data to read values by pointer.
 
 _INKS = {"#000000": "var(--ink)", "#444444": "var(--soft)", "#b0b0b0": "var(--line)", "#cccccc": "var(--line)"}
-"""Colours of frames, letters and grids; those of the curves stay."""
+"""Page colours of frames, text and grids; curves keep their colours."""
 _PAPER = "#ffffff"
 
 

@@ -105,7 +105,7 @@ ASKED = {
     "pressure_at_rest": "the pressure that the task needs lies inside the limits of the law",
     "differentiator": "the slip rate is estimated by a differentiator that is fast enough",
 }
-"""What every premise asks, in words; those of users' laws by their own notes."""
+"""Condition of every premise in words; premises of user-defined laws have notes instead."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -48,7 +48,7 @@ PAPER = {
     "friction-coefficient": "figure 11",
     "errors-and-power": "figures 8 and 12",
 }
-"""Figures of the paper, by number, that each of ours is about."""
+"""Corresponding figures of the paper, by name of our figure."""
 
 
 def paper_figures(study: "PaperRuns") -> dict[str, Any]:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 # Scope of a proof: the simulated loop and its task, or the premises that fail, and by how much.
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
-"""Premises of a linear law's stability that its certified peaks do not need."""
+"""Premises of the stability of a linear law that its certified peaks do not require."""
 
 
 def grade(entry: "Entry") -> str:
@@ -102,7 +102,7 @@ def _hold_gaps(entry: "Entry") -> list[str]:
 # First sentences about a run: outcome, pressure, and whether this pressure was sufficient.
 
 _NEGLIGIBLE = 1e-6
-"""Of the larger end of a range of pressures: a smaller end is said to be zero."""
+"""Relative to the larger end of a range of pressures: a smaller end is printed as zero."""
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
@@ -453,7 +453,7 @@ _SAID = {
 _MOST_EVENTS = 8
 _LOCKED = 0.5  # share of the loading: a fault that slips less stores the rest
 FASTEST_PLATE = 1e-8
-"""Loading rate [m/s] above that of every plate: 0.3 m a year."""
+"""Loading rate [m/s] that no tectonic plate exceeds: 0.3 m per year."""
 _LABORATORY = 10.0  # length of a fault [m] below which a machine loads it
 
 

@@ -229,8 +229,8 @@ def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[list[Function]
 # Whether the sampling of a fault is fast enough for its instability.
 
 LARGEST_PRODUCT = 0.2
-"""Of T_s and the unstable pole: five samples while an error grows e-fold, so that what one sample has not seen grows by
-at most 22 % until the next one."""
+"""Largest adequate product of T_s and the unstable pole: an error grows by at most 22 % between two samples, and
+e-fold over five."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

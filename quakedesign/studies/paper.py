@@ -105,7 +105,7 @@ def printed(comparison: Compared) -> list[dict[str, Any]]:
 # Trade-off between certified peak and tracking error of designs for the sampled loop.
 
 ROOMS = (1.2, 1.4, 1.6, 2.2)
-"""What tracking may spend of the smallest certified slip-rate error; 1.6 is that of the default."""
+"""Slip-rate errors admitted for tracking, over the smallest certified one; the default design uses 1.6."""
 _PERIODS = 32  # duration of a run in natural periods; errors are evaluated in its second half
 
 

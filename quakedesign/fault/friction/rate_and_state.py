@@ -37,18 +37,18 @@ class RateAndState(FrictionLaw):
     Attributes
     ----------
     reference_coefficient : float
-        μ_0 [-], friction of steady sliding at the reference rate, positive.
+        Friction coefficient μ_0 [-] of steady sliding at the reference rate, positive.
     direct_effect, evolution_effect : float
-        a and b [-], positive; a < b weakens with rate.
+        Coefficients a and b [-], positive; friction weakens with rate for a < b.
     critical_slip : float
-        d_c [m], slip over which the state evolves, positive.
+        Slip d_c [m] over which the state evolves, positive.
     reference_rate : float
-        v_0 [m/s], positive, at which the fault is loaded in its natural cycle.
+        Rate v_0 [m/s], positive: loading rate of the natural cycle.
     slowest_rate, fastest_rate : float
-        v_s and v_f [m/s], ends of the working range, 0 < v_s ≤ v_0 ≤ v_f.
+        Ends v_s and v_f [m/s] of the working range, 0 < v_s ≤ v_0 ≤ v_f.
     stress_sensitivity : float
-        α [-], not negative: a change of the effective normal stress σ adds −(αθ/(bσ))σ' to θ' (Linker and Dieterich
-        1992, J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds below are for a constant σ.
+        Coefficient α [-], not negative: a change of the effective normal stress σ adds −(αθ/(bσ))σ' to θ' (Linker and
+        Dieterich 1992, J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds below are for a constant σ.
 
     Raises
     ------
