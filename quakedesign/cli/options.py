@@ -340,10 +340,10 @@ class RunOptions:
     perturbation: Push | None = None
 
     def way(self, law: "Controller | None", usual: str = "explicit") -> "tuple[Any, float | None, dict[str, Any]]":
-        """Scheme, step [s] and settings of a run, see `quakedesign.loop.schemes.own_way`."""
-        from quakedesign.loop.schemes import own_way
+        """Scheme, step [s] and settings of a run, see `quakedesign.loop.schemes.scheme_of_run`."""
+        from quakedesign.loop.schemes import scheme_of_run
 
-        return own_way(law, self.scheme, self.step, usual)
+        return scheme_of_run(law, self.scheme, self.step, usual)
 
     def load(self) -> "Load":
         """Load on the fault in addition to its own disturbance."""
@@ -501,7 +501,7 @@ def _stage(stage: type[Stage], values: Mapping[str, Any], step: float) -> Stage 
     """One stage; None if it is not requested."""
     first, *others = stage.options
     if values[first.name] != first.default:
-        return stage.asked(step, **{option.name: values[option.name] for option in stage.options})
+        return stage.from_options(step, **{option.name: values[option.name] for option in stage.options})
     for other in others:
         if values[other.name] is not None and other.default is None:
             raise ParameterError(

@@ -23,7 +23,7 @@ from quakedesign.fault.model import require_positive
 from quakedesign.files import require_room, temporary_folder, whole_folder, write_whole
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme, simulation_scheme
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.schemes.base import Sampled
 from quakedesign.simulation.block_run import decided
 from quakedesign.simulation.closed_loop import ClosedLoop
@@ -301,7 +301,7 @@ def controller_step(
         differs from that of the sensor.
     """
     fault.require_memoryless("a controller in C")
-    scheme, step, own = own_way(controller, scheme, step)
+    scheme, step, own = scheme_of_run(controller, scheme, step)
     period = fault.sampling_time if step is None else step
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme)
@@ -464,7 +464,7 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     state = ca.vertcat(measurement, ca.SX(2 - measured, 1), *own)
     moved = _after(loop, scheme, counter, state, step)
     later = [counter + 1, *(moved[i] for i, c in enumerate(changing) if c)]
-    later += [scheme.push(loop, counter, state, step), *own[:count]] if count else []
+    later += [scheme.integral_effect(loop, counter, state, step), *own[:count]] if count else []
     outputs = ca.cse([ca.vertcat(*later), scheme.pressure(loop, counter, state, step)])
     return ca.Function("sampled_step", [measurement, applied, memory], outputs), start
 

@@ -61,13 +61,13 @@ class Actuator:
         """Actuator with the delay, lag and diffusion path of a sampled law; no stages if it has none."""
         step, kinds = float(sampling.step), {kind.name: kind for kind in (Delay, Lag, Diffusion)}
         times: dict[str, Any] = {name: float(time) for name, time in sampling.path.items() if time}
-        return cls(stages=tuple(kinds[name].asked(step, **{name: time}) for name, time in times.items()))
+        return cls(stages=tuple(kinds[name].from_options(step, **{name: time}) for name, time in times.items()))
 
     def completed(self, other: "Actuator") -> "Actuator":
         """Actuator extended by those stages of another one whose kinds it does not have."""
         names = {stage.name for stage in self.stages}
         more = (stage for stage in other.stages if stage.name not in names)
-        along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.place))
+        along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.rank))
         return Actuator(stages=tuple(along))
 
     @property

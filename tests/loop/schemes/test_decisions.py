@@ -12,7 +12,7 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import Sampling, control_law
 from quakedesign.loop import discrete_law, schemes, simulation_scheme
 from quakedesign.loop.discrete_law import DiscreteLaw, acceleration, authority, held, rate_error, slip, slip_error, step
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.schemes.implicit import end_rate, end_slip
@@ -148,14 +148,14 @@ TOLD = {"weight": 0.25, "authority": 3e-8}
 
 def test_a_law_runs_as_asked_for_unless_it_is_one_of_samples():
     for controller in (None, FREE):
-        assert own_way(controller, None, None) == ("explicit", None, {})
-        assert own_way(controller, None, 0.5, "implicit") == ("implicit", 0.5, {})
-        assert own_way(controller, "continuous", 0.5) == ("continuous", 0.5, {})
+        assert scheme_of_run(controller, None, None) == ("explicit", None, {})
+        assert scheme_of_run(controller, None, 0.5, "implicit") == ("implicit", 0.5, {})
+        assert scheme_of_run(controller, "continuous", 0.5) == ("continuous", 0.5, {})
     told = simulation_scheme("compensated", **TOLD)
-    assert own_way(OWNED, None, None) == own_way(OWNED, "compensated", 0.1) == ("compensated", 0.1, TOLD)
-    assert own_way(OWNED, told, 0.1) == own_way(OWNED, told, None) == (told, 0.1, {})
+    assert scheme_of_run(OWNED, None, None) == scheme_of_run(OWNED, "compensated", 0.1) == ("compensated", 0.1, TOLD)
+    assert scheme_of_run(OWNED, told, 0.1) == scheme_of_run(OWNED, told, None) == (told, 0.1, {})
     plain = replace(FREE, sampling=Sampling(step=F(1, 10)))
-    assert own_way(plain, None, None, "implicit") == ("explicit", 0.1, {})
+    assert scheme_of_run(plain, None, None, "implicit") == ("explicit", 0.1, {})
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_a_law_of_samples_runs_as_it_was_designed(scheme, period, received):
     with pytest.raises(
         ParameterError, match=r"compensated, weight 0\.25, authority 3e-08 and the step 0\.1 s.*" + received
     ):
-        own_way(OWNED, scheme, period)
+        scheme_of_run(OWNED, scheme, period)
 
 
 def test_values_are_those_of_the_expressions():
