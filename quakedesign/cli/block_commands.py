@@ -67,7 +67,7 @@ def _scope(proof: Any, chain: "BlockChain") -> list[str]:
     from quakedesign.studies.several_blocks import farthest_balance
 
     meant = "the load of a pressure is the pressure that balances the blocks on the reference"
-    if chain.ages:
+    if chain.has_state:
         return [
             "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
             "pressure is the plan",
@@ -184,7 +184,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
     with progress() as tell:
         for place, law in enumerate(laws):
             tell(f"{law}: design, proof and run", place / len(laws))
-            runs.append(run_sliding_chain(chain, law, sliding=sliding) if chain.ages else run_of_chain(chain, law))
+            runs.append(run_sliding_chain(chain, law, sliding=sliding) if chain.has_state else run_of_chain(chain, law))
     rows = [list(_HEADS), ["", "slip rate", "slip", "slip rate", "slip", "from", "to"], *(one.row() for one in runs)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     about = "its balance" if len(chain.wells) < len(chain.blocks) else "the reference"
@@ -193,7 +193,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
         "from the reference in the run)",
     ]
     last = "proved without stick; run with stick, where an error may pass its bound"
-    if chain.ages:
+    if chain.has_state:
         meant = ["(largest slip rate, slip from the reference, pressure from the plan)"]
         stress = LowerBound(sliding["stress"]).quantity("Pa")
         last = f"proved for any shear stress of up to {stress}; run without inertia under a sine"
@@ -212,7 +212,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
 
 def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
     """Reject lag and stress of friction without a state."""
-    if not chain.ages and any(sliding.values()):
+    if not chain.has_state and any(sliding.values()):
         raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
 
 
@@ -231,7 +231,7 @@ def export_chain(
     from quakedesign.simulation.export import FILES, block_step, require_free, write_step
     from quakedesign.studies.several_blocks import chain_law
 
-    if chain.ages and law.certificate is None:
+    if chain.has_state and law.certificate is None:
         raise ParameterError(
             "export of blocks in slow sliding takes the law of a certificate. Received none. Use guarantee with --lag, "
             "--stress and --out, then export with --certificate."
@@ -266,9 +266,9 @@ def run_chain(
         hold(out)
     with progress() as tell:
         tell("design, proof and run", 0.0)
-        if chain.ages:
+        if chain.has_state:
             entered |= {"tell": lambda done: tell("run", done)}
-        one = run_sliding_chain(chain, **entered) if chain.ages else run_of_chain(chain, **entered)
+        one = run_sliding_chain(chain, **entered) if chain.has_state else run_of_chain(chain, **entered)
     proof: Any = one.proof
     values = _run_values(one)
     lines = [] if proof is None else _lines(proof, chain, one)

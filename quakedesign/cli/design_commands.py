@@ -182,7 +182,7 @@ def design(
         chain = chain_at_step(chain, options.setup())
         require_loads(chain, options.sliding)
         law = {"controller": block_law(options.controller, "all")} | (
-            {"sliding": options.sliding} if chain.ages else {}
+            {"sliding": options.sliding} if chain.has_state else {}
         )
         return run_chain(chain, out or Path(f"quakedesign-{chain.name}"), force, output, format, **law)
     loaded, arguments = options.problem(fault)

@@ -119,9 +119,11 @@ def guarantee(
     accepted = ("step", "out", "controller", "stress", "lag")
     if (several := several_blocks(fault, globals()["guarantee"], options, accepted, box)) is not None:
         setup = around.setup()
-        sliding = {"stress": stress, "lag": setup.lag}
-        require_loads(several, sliding)
-        return guarantee_chain(several, controller, setup.step, sliding if several.ages else None, out, force, output)
+        loads = {"stress": stress, "lag": setup.lag}
+        require_loads(several, loads)
+        return guarantee_chain(
+            several, controller, setup.step, loads if several.has_state else None, out, force, output
+        )
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)

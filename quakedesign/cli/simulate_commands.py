@@ -101,12 +101,12 @@ def simulate(
             raise ParameterError(
                 "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these."
             )
-        if blocks.ages and law.controller != "none":
+        if blocks.has_state and law.controller != "none":
             raise ParameterError(
                 "blocks in slow sliding run under the law of a certificate. Received --controller. Use guarantee with "
                 "--out, then simulate with --certificate."
             )
-        if blocks.ages:
+        if blocks.has_state:
             from quakedesign.simulation.slow_sliding import PLANTS as SLIDING
 
             plant = run.plant or "quasi-dynamic"

@@ -115,7 +115,7 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     named |= {
         f"friction.{name}": (_friction_unit(f.metadata), getattr(law, name)) for name, f in law.quantities().items()
     }
-    if not stretches(law):
+    if not is_homogeneous(law):
         named[_UNIT_FRICTION] = _FRICTION, 1
     return {n: Quantity(n, unit, rational(value, n)) for n, (unit, value) in named.items() if value is not None}
 
@@ -125,7 +125,7 @@ def _friction_unit(metadata: Mapping[str, str]) -> str:
     return str(metadata.get("directed_unit", metadata["unit"] or _FRICTION))
 
 
-def stretches(law: FrictionLaw) -> bool:
+def is_homogeneous(law: FrictionLaw) -> bool:
     """Whether μ is homogeneous of degree 1 (Euler) in those parameters that are friction coefficients."""
     import sympy as sp
 

@@ -99,9 +99,8 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     if text:
         raise RecordError(f"friction of a file must have one state with a positive evolution effect. Received {text}")
     if not identification.determined:
-        raise RecordError(
-            f"a fault file needs every parameter. Received {identification.record.name}: {identification.untold()[0]}."
-        )
+        named, unknown = identification.record.name, identification.undetermined()[0]
+        raise RecordError(f"a fault file needs every parameter. Received {named}: {unknown}.")
     law, box = _at_rate_of(fault, identification.law), fault.box
     if covers(law):
         law, box = cover(law, identification.box, box)

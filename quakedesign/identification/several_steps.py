@@ -19,7 +19,7 @@ from quakedesign.errors import RecordError
 from quakedesign.fault import FrictionLaw
 from quakedesign.identification.assessment import Assessment, Check, sign_check
 from quakedesign.identification.experiment import Coordinate, Experiment
-from quakedesign.identification.fitting import Fit, minimised, weighed
+from quakedesign.identification.fitting import Fit, minimised, weighted
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import Setup, identified_as, kinds_of, profiled
 from quakedesign.identification.loading import prepared
@@ -201,7 +201,7 @@ def _assessed(common: Identification, steps: Sequence[Identification], probabili
     return Assessment(
         checks=checks,
         factor=max(step.assessment.factor for step in steps),
-        open=(*common.untold(), *(check.sentence for check in checks if not check.passed)),
+        open=(*common.undetermined(), *(check.sentence for check in checks if not check.passed)),
         experiments=tuple(common.experiments(sign)),
     )
 
@@ -217,7 +217,7 @@ class _Joint(Experiment):
 
     def joined(self, values: Sequence[ndarray]) -> ndarray:
         """Weighted values of the samples of each step."""
-        return np.concatenate([weighed(w, v) for w, v in zip(self._weights, values, strict=True)])
+        return np.concatenate([weighted(w, v) for w, v in zip(self._weights, values, strict=True)])
 
     @cached_property
     def _weights(self) -> list[ndarray]:
@@ -231,7 +231,7 @@ class _Joint(Experiment):
         """Derivatives of `friction`; those in the coordinates of other steps are 0."""
         rows = []
         for each, weights, at in zip(self.parts, self._weights, self.places, strict=True):
-            own = weighed(weights, np.nan_to_num(each.slopes(fitted[at]), posinf=0, neginf=0))
+            own = weighted(weights, np.nan_to_num(each.slopes(fitted[at]), posinf=0, neginf=0))
             rows.append(np.zeros((len(own), len(self.coordinates))))
             rows[-1][:, at] = own
         return np.vstack(rows)

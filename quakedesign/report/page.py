@@ -306,7 +306,7 @@ def parameter_rows(fault: Fault) -> list[Row]:
 
     No disturbance for friction with a state: the disturbance of such a fault is the stress of its guarantee.
     """
-    refused = fault.friction.equilibrium.refused
+    refused = fault.friction.equilibrium.messages
     rows = [
         *_field_rows(fault, PLANT, "fault"),
         *_field_rows(fault.friction, fault.friction.quantities(), "friction"),

@@ -397,13 +397,13 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
 
     """
     N, states = len(chain.blocks), [f"state_{i + 1}" for i in range(len(law.update))]
-    measured = (("slip", "m"),) if chain.ages else (("slip", "m"), ("slip_rate", "m/s"))
+    measured = (("slip", "m"),) if chain.has_state else (("slip", "m"), ("slip_rate", "m/s"))
     measurement, memory = ca.SX.sym("measurement", len(measured) * N), ca.SX.sym("memory", 1 + len(states))
     count, z = ca.vertsplit(memory, [0, 1, 1 + len(states)])
     pressures, later = decided(chain, law, count, measurement[:N], measurement[N:], z)
     outputs = ca.cse([ca.vertcat(count + 1, later), ca.densify(pressures)])
     known = {"fault": chain.name, "blocks": str(N), "wells [m]": _text(chain.wells)}
-    if chain.ages:
+    if chain.has_state:
         task, course = chain.fault.reference, "d((1 - c)t/T + c s^3(10 - 15s + 6s^2)), s = min(t/T, 1)"
         values = f"d = {task.target_slip!r} m, T = {task.operation_time!r} s, c = {task.ramp or 0.0!r}"
         known |= {_PLAN: f"{planned_per_slip(chain)!r} Pa/m times r(t), r = {course}, {values}"}

@@ -110,7 +110,7 @@ def natural_peak(chain: BlockChain) -> float | None:
 
     None if no mode is unstable, for friction with a state, and for healing friction, which runs of blocks do not model.
     """
-    beyond = chain.ages or any(block.friction.rest_excess for block in chain.blocks)
+    beyond = chain.has_state or any(block.friction.rest_excess for block in chain.blocks)
     pole = None if beyond else _growth(chain)
     if not pole:
         return None
@@ -280,7 +280,7 @@ def chain_law(
         return guarantee(chain, controller, **sliding).proof
     claim: Any = load_guarantee(certificate)
     several = claim.kind == UNCERTAIN_PLANT
-    if chain.ages:
+    if chain.has_state:
         if not several:
             raise CertificateError(
                 f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of "

@@ -174,7 +174,7 @@ def guarantee(
     if isinstance(fault, BlockChain):
         fault = replace(fault, fault=with_accepted_fit(fault.fault, accept_poor_fit))
         setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
-        if fault.ages:
+        if fault.has_state:
             usual = (law, tuple(gains), plant or PRINTED) == (None, (), PRINTED) and controller in ("elqr", *BLOCK_LAWS)
             usual = usual and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
             usual = usual and not exact_value(spread, "", "spread")

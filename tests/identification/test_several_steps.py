@@ -153,7 +153,7 @@ def test_a_sign_needs_a_step_that_has_it_none_against_it_and_the_common_fit(sign
     difference = ParameterEstimate(
         name="a - b", unit="", value=sum(ends) / 2, low=ends[0], high=ends[1], least=ends[0], most=ends[1]
     )
-    common = SimpleNamespace(difference=difference, untold=lambda: (), experiments=lambda sign: ())
+    common = SimpleNamespace(difference=difference, undetermined=lambda: (), experiments=lambda sign: ())
     told = _assessed(common, [stub(*each) for each in signs], 0.5)
     assert [check.passed for check in told.checks] == [True, not reason]
     assert told.open == ((f"the sign of a - b is open: {reason}",) if reason else ())
