@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.app import app, console, new_file, progress, refuse, specified
+from quakedesign.cli.app import app, console, new_file, progress, reject, specified
 from quakedesign.cli.options import PLAIN, Force, Formats, Gains, Output, Scheduler, Seconds, Whole
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.files import hold
@@ -88,10 +88,10 @@ def synthesise(
     of_search = {"starts": starts, "seed": seed, "workers": workers, "scheduler": scheduler}
     of_trial, what = {"step": step, "scheme": scheme, "metric": metric}, f"the objective {objective}"
     if objective == "sampled":
-        refuse({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
+        reject({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
         synthesis, more = _sampled(law, fault, lipschitz, gain_range, degree, specified(of_trial))
     else:
-        refuse({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
+        reject({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
         from quakedesign.lyapunov.gains.synthesise import synthesise as search
 
         ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}

@@ -7,7 +7,6 @@ every controller.
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal
@@ -117,13 +116,11 @@ def guarantee(
     from quakedesign.synthesis import guarantee as guaranteed
 
     accepted = ("step", "out", "controller", "stress", "lag")
-    if (several := several_blocks(fault, globals()["guarantee"], options, accepted, box)) is not None:
+    if (chain := several_blocks(fault, globals()["guarantee"], options, accepted, box)) is not None:
         setup = around.setup()
-        loads = {"stress": stress, "lag": setup.lag}
-        require_loads(several, loads)
-        return guarantee_chain(
-            several, controller, setup.step, loads if several.has_state else None, out, force, output
-        )
+        sliding = {"stress": stress, "lag": setup.lag}
+        require_loads(chain, sliding)
+        return guarantee_chain(chain, controller, setup.step, sliding if chain.has_state else None, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)

@@ -31,9 +31,9 @@ from quakedesign.cli.options import (
     Texts,
     Whole,
     changed_options,
+    loop_elements,
     require_no_state_options,
     show_state_run,
-    surroundings,
 )
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.equilibrium import by_equilibrium
@@ -128,7 +128,7 @@ def simulate(
         chosen, load = law.choose(loaded, run.step, actuator.path()), run.load()
         way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
         period = loaded.sampling_time if step is None else step
-        substeps, chain, sensor = surroundings(chosen, period, run, actuator, sensors, seed)
+        substeps, chain, sensor = loop_elements(chosen, period, run, actuator, sensors, seed)
         with progress() as tell:
             tell("compiling", 0.0)
             trajectory, premises = run_single(
@@ -415,7 +415,7 @@ def campaign(
     controller = chosen.controller if chosen else None
     way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
-    around = surroundings(None if variation else chosen, period, run, actuator, sensors, 0)
+    around = loop_elements(None if variation else chosen, period, run, actuator, sensors, 0)
     problem = campaign_problem(
         loaded,
         controller,

@@ -93,7 +93,7 @@ def figure(
 def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *, legend: Any = None) -> Any:
     """Add to a figure its title above, and below it the legend of one axis (three columns) and the run settings."""
     drawing.suptitle(title, fontsize=SMALL + 2)
-    whole = "; ".join(part for part in (note, made(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
+    whole = "; ".join(part for part in (note, run_settings(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
     rows = wrap(whole, _NOTE, break_on_hyphens=False)
     height, bottom = drawing.get_figheight(), 0.05 + _LINE * len(rows)
     drawing.text(0.5, 0.03 / height, "\n".join(rows), ha="center", va="bottom", fontsize=SMALL - 1, color="#444444")
@@ -113,7 +113,7 @@ def named(axis: Any, title: str) -> None:
     axis.set_title(title, fontsize=SMALL)
 
 
-def made(runs: Iterable["Shown"]) -> str:
+def run_settings(runs: Iterable["Shown"]) -> str:
     """Scheme, step, method and plant of runs: differing settings after the labels of the entries, then common ones."""
     ways: dict[tuple[str, ...], list[str]] = {}
     for shown in runs:
@@ -296,7 +296,7 @@ def _side(axis: Any, label: str) -> dict[str, Any]:
 Drawn = tuple[bytes, Markup]
 
 
-def drawn_once(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
+def cached_figures(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
     """SVG files of figures by name, and their elements for a page; from the cache if the same were drawn before.
 
     Parameters

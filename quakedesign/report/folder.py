@@ -14,7 +14,7 @@ from quakedesign.files import require_room, whole_folder, write_whole
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.lyapunov import certificate_text
 from quakedesign.report.comparison_table import Comparison
-from quakedesign.report.drawing import DEFAULT, drawn_once, figure_bytes, write_results
+from quakedesign.report.drawing import DEFAULT, cached_figures, figure_bytes, write_results
 from quakedesign.report.page import CAPTIONS, page_html, reproduction, versions
 from quakedesign.report.paper_figures import PAPER
 from quakedesign.report.tables import csv_text
@@ -151,7 +151,7 @@ def _write_figures(
     draw = cache(shown.figures)
     tell("figures", 0.0)
     inside = {}
-    for name, (vector, inside[name]) in drawn_once(draw, CAPTIONS, shown).items():
+    for name, (vector, inside[name]) in cached_figures(draw, CAPTIONS, shown).items():
         for kind in formats:
             data = vector if kind == "svg" else figure_bytes(draw()[name], kind, name)
             (folder / "figures" / f"{name}.{kind}").write_bytes(data)

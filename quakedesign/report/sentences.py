@@ -138,11 +138,11 @@ def pressure_sentence(least: float, largest: float) -> str:
     """Range of a pressure [Pa], and whether it is withdrawal or injection."""
     nothing = _NEGLIGIBLE * max(abs(least), abs(largest))
     shown = (value if abs(value) > nothing else 0.0 for value in (least, largest))
-    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_way(value)}" for value in shown]
+    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_direction(value)}" for value in shown]
     return f"pressure from {parts[0]} to {parts[1]}"
 
 
-def _way(pressure: float) -> str:
+def _direction(pressure: float) -> str:
     return " (withdrawal)" if pressure < 0 else " (injection)" if pressure > 0 else ""
 
 
@@ -240,15 +240,15 @@ def guarantee_lines(entry: "Entry") -> list[str]:
     reason = entry.design.details.get("reason") if entry.guarantee.proved else None
     too_long = [f"{entry.design.other_step_first}: {reason}"] if reason else []
     first, *rest = entry.guarantee.lines()
-    return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_reach(entry)]
+    return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_longest_step_and_delay(entry)]
 
 
 def limit_lines(entry: "Entry") -> list[str]:
     """The limits in `guarantee_lines`: for every controller, and for designs of this kind."""
-    return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_reach(entry)]
+    return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_longest_step_and_delay(entry)]
 
 
-def _reach(entry: "Entry") -> list[str]:
+def _longest_step_and_delay(entry: "Entry") -> list[str]:
     """Longest T_s and delay for designs of the same kind, as far as the design search tests them."""
     certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}
     if not certified:
@@ -282,7 +282,7 @@ def remarks(entry: "Entry") -> list[str]:
     return every[_fitting(every) :]
 
 
-def beside_guarantee(lines: Sequence[str], entry: "Entry") -> list[str]:
+def without_stated_reason(lines: Sequence[str], entry: "Entry") -> list[str]:
     """Sentences about a controller, without a reason that its `guarantee_lines` already state."""
     reason, guaranteed = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
     stated = bool(reason) and str(reason) in guaranteed

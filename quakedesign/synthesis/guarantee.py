@@ -21,7 +21,7 @@ from quakedesign.guarantees import (
     TrackingGuarantee,
     TrackingProof,
 )
-from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
+from quakedesign.guarantees.exact.limit_theorems import infeasibility, too_slow
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.search.linear_design import nearest_setup
@@ -288,7 +288,7 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
     step = rational(fault.sampling_time) if setup.step is None else setup.step
     exact = ExactSetup.of(setup)
     delay = exact.delay
-    infeasible = hopeless(task, most, delay, setup.diffusion)
+    infeasible = infeasibility(task, most, delay, setup.diffusion)
     if infeasible and not wanted.gains:
         near = nearest_setup(task, step, measured=setup.measured, setup=exact) if law.name == "elqr" else None
         return TrackingGuarantee(fault=fault, proof=NoProof(reason=infeasible), nearest=near)

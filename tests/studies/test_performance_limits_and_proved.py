@@ -167,7 +167,7 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
 def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
     both = study(REAL, slip_noise="1e-6", rate_noise="1e-5", prove=False)
     errors = "the slip with errors of no more than 1 µm, the slip rate with errors of no more than 10 µm/s"
-    assert both.sensing.words() == errors
+    assert both.sensing.summary() == errors
     assert f"even for one that measures {errors} up to each sample" in " ".join(" ".join(limits_lines(both)).split())
     plain = study(REAL, prove=False).peak_slip_rate_error
     assert both.peak_slip_rate_error.impossible_beyond > plain.impossible_beyond

@@ -177,7 +177,7 @@ def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
     assert len(asked) == 1
     limited = SimpleNamespace(proved=True, controller="limited")
     designs_in_place_of_searches(monkeypatch, limited)
-    assert single._designed_behind(LAB, "cta", {"lag": 0.02}) == "limited"
+    assert single._designed_for_path(LAB, "cta", {"lag": 0.02}) == "limited"
 
 
 def test_a_design_without_a_proof_behind_its_path_is_refused_with_the_reason(monkeypatch):
