@@ -263,7 +263,7 @@ _placed = [0]
 _LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for added prefixes
 
 
-def require_room(path: Path) -> None:
+def require_writable(path: Path) -> None:
     """Reject a path that cannot be written, before the work begins, and clean up after killed processes there."""
     parent, length = path.absolute().parent, len(path.name.encode(errors="surrogatepass"))
     if length > _LONGEST_NAME:
@@ -285,7 +285,7 @@ _held: dict[Path, tuple[Path, int | None]] = {}
 """Folders that this command writes, with their locks."""
 
 
-def hold(folder: Path, *, make: bool = False) -> bool:
+def lock_folder(folder: Path, *, make: bool = False) -> bool:
     """Reject a folder that another command writes, and lock it until `release`; False if this process holds it already.
 
     Parameters
@@ -319,7 +319,7 @@ def release(folder: Path | None = None) -> None:
 @contextmanager
 def sole_writer(folder: Path, *, make: bool = False) -> Iterator[None]:
     """Lock a folder for a block, see `hold`."""
-    new = hold(folder, make=make)
+    new = lock_folder(folder, make=make)
     try:
         yield
     finally:

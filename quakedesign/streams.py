@@ -53,7 +53,7 @@ def widen() -> None:
         os.environ["COLUMNS"] = str(min(max(columns, _NARROWEST), _WIDEST))
 
 
-def has_room() -> bool:
+def has_memory() -> bool:
     """Whether the memory limit suffices to load the libraries: OpenBLAS otherwise ends the process with exit code 1."""
     if sys.platform == "win32":
         return True

@@ -19,7 +19,7 @@ from rich.text import Text
 
 from quakedesign.discovery import allow_code
 from quakedesign.errors import OutputError, ParameterError
-from quakedesign.files import require_room
+from quakedesign.files import require_writable
 from quakedesign.text import in_lines, visible
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -133,7 +133,7 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
         raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
     if os.path.isdir(path):
         raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
-    require_room(path)
+    require_writable(path)
 
 
 def require_different(places: Mapping[str, Path | None]) -> None:

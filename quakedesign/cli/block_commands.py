@@ -10,7 +10,7 @@ from quakedesign.cli.app import new_file, progress
 from quakedesign.cli.options import Output, changed_options
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational
-from quakedesign.files import hold, made_folder, require_room
+from quakedesign.files import lock_folder, made_folder, require_writable
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.text import counted
 
@@ -262,8 +262,8 @@ def run_chain(
 
     if out is not None:
         prepare(out, force=force)
-        require_room(out)
-        hold(out)
+        require_writable(out)
+        lock_folder(out)
     with progress() as tell:
         tell("design, proof and run", 0.0)
         if chain.has_state:

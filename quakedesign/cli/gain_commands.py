@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from quakedesign.cli.app import app, console, new_file, progress, reject, specified
 from quakedesign.cli.options import PLAIN, Force, Formats, Gains, Output, Scheduler, Seconds, Whole
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.files import hold
+from quakedesign.files import lock_folder
 
 if TYPE_CHECKING:
     from quakedesign.lyapunov.gains.synthesise import Synthesis
@@ -241,7 +241,7 @@ def gain_map(
 
     folder = out or Path(f"quakedesign-map-{law}")
     prepare(folder, force=force)
-    hold(folder)
+    lock_folder(folder)
     if range is not None and len(range) != 4:
         raise ParameterError(f"range needs four numbers, two for each gain. Received {len(range)}.")
     base = gains or tuple(str(v) for v in family(law)[0].law.gains.values())

@@ -37,7 +37,7 @@ from quakedesign.cli.options import (
 )
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.equilibrium import by_equilibrium
-from quakedesign.files import hold
+from quakedesign.files import lock_folder
 from quakedesign.parallel import remedy
 
 if TYPE_CHECKING:
@@ -261,7 +261,7 @@ def sampling(
     loaded.require_memoryless("a study of sampling")
     folder = out or Path(f"quakedesign-{loaded.name}-sampling")
     prepare(folder, force=force)
-    hold(folder)
+    lock_folder(folder)
     with progress() as tell:
         tell("gains", 0.0)
         law = (
@@ -431,7 +431,7 @@ def campaign(
         **variation,
     )
     folder = out or Path(f"quakedesign-{loaded.name}-campaign")
-    hold(folder, make=True)
+    lock_folder(folder, make=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
     remedy(f"the same command goes on from {folder}")
     with progress() as tell:

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
-from quakedesign.files import require_room, whole_folder, write_whole
+from quakedesign.files import require_writable, whole_folder, write_whole
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.lyapunov import certificate_text
 from quakedesign.report.comparison_table import Comparison
@@ -33,7 +33,7 @@ def prepare(out: Path, *, force: bool) -> None:
         )
     if os.path.exists(out) and not (out / "results.json").is_file():
         raise OutputError(f"only a folder with results.json is replaced. Received {out}. Choose another --out.")
-    require_room(out)
+    require_writable(out)
 
 
 def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import BlockChain, Fault
 from quakedesign.fault.model import require_positive
-from quakedesign.files import require_room, temporary_folder, whole_folder, write_whole
+from quakedesign.files import require_writable, temporary_folder, whole_folder, write_whole
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme, simulation_scheme
 from quakedesign.loop.schemes import scheme_of_run
@@ -425,7 +425,7 @@ def require_free(folder: Path, force: bool) -> None:
         )
     if os.path.exists(folder) and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= set(FILES)):
         raise OutputError(f"only a folder with {', '.join(FILES)} is replaced. Received {folder}. Choose another.")
-    require_room(folder)
+    require_writable(folder)
 
 
 def _software(scheme: Scheme) -> Sampled:

@@ -220,7 +220,7 @@ def run_question(
 
 def recall_run(question: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
     """Cached vectors, one a column, and backend with its reason as in the provenance of a run; None if not cached."""
-    if not question or (content := cache.recall("run", *question)) is None:
+    if not question or (content := cache.load("run", *question)) is None:
         return None
     with np.load(BytesIO(content), allow_pickle=False) as kept:
         entries = {name: str(kept[name]) for name in kept.files if name != "vectors"}
@@ -232,4 +232,4 @@ def keep_run(question: tuple[bytes, ...], vectors: "np.ndarray", told: dict[str,
     if question and told["backend"] == "compiled":
         content = BytesIO()
         np.savez(content, allow_pickle=False, vectors=vectors, **{name: np.array(text) for name, text in told.items()})
-        cache.keep("run", content.getvalue(), *question)
+        cache.store("run", content.getvalue(), *question)

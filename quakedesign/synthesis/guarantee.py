@@ -39,7 +39,7 @@ from quakedesign.synthesis.state_feedback import may_stick
 Result = TypeVar("Result")
 
 
-def answers(
+def guarantees_of(
     questions: Sequence[Callable[[], Result]],
     *,
     workers: int = 1,
@@ -69,7 +69,7 @@ def answers(
     """
     results: dict[int, Result | QuakedesignError] = {}
     with crew_or_here(workers, scheduler, executor) as crew:
-        for place, one in crew.answers(_called, [(call,) for call in questions]):
+        for place, one in crew.results(_called, [(call,) for call in questions]):
             results[place] = one
             if tell is not None:
                 tell(f"{len(results)} of {len(questions)} computed", len(results) / len(questions))

@@ -91,8 +91,8 @@ def test_the_place_of_a_defect_is_shown_on_request(monkeypatch):
 
 @pytest.mark.parametrize("deed", [lambda: 0, raising(ParameterError("no")), raising(ValueError("no"))])
 def test_folders_are_let_go_however_a_command_ends(ends, deed, tmp_path):
-    ends(lambda: (files.hold(tmp_path / "results"), deed())[1])
-    assert files.hold(tmp_path / "results"), "nobody holds it"
+    ends(lambda: (files.lock_folder(tmp_path / "results"), deed())[1])
+    assert files.lock_folder(tmp_path / "results"), "nobody holds it"
     files.release()
 
 
