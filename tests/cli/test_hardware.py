@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from quakedesign.cli import main
-from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.parallel import SerialExecutor, UserExecutor
 from quakedesign.simulation.campaign import running
 
 
@@ -150,7 +150,7 @@ def test_a_mean_goes_into_an_exported_controller(run, tmp_path):
 
 @pytest.mark.slow
 def test_a_campaign_takes_the_same_options(run, monkeypatch, tmp_path):
-    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(SerialExecutor()))
     options = (
         "--saturation",
         "20 kPa",

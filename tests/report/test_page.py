@@ -17,7 +17,7 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.cli.app import command_line, typed
+from quakedesign.cli.app import command_line, store_command
 from quakedesign.fault import parse_fault
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.report import page
@@ -172,9 +172,9 @@ def test_a_report_says_how_it_is_made_again(monkeypatch):
     assert made.date == "1970-01-02 00:00 UTC"
     assert parse_fault("\n".join(made.scenario), "again") == FAULT
     assert {"quakedesign", "clarabel", "Python"} <= set(made.versions)
-    typed(["design", "my fault.toml"])
+    store_command(["design", "my fault.toml"])
     assert command_line() == "quakedesign design 'my fault.toml'"
-    typed([])
+    store_command([])
     assert command_line() == ""
 
 

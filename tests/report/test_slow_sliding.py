@@ -374,4 +374,4 @@ def test_the_slip_that_a_task_takes_stands_beside_that_of_an_earthquake(comparis
     said = steady_start_sentence(whole, SHORT)
     assert said.endswith("; the task uses up 0.3 m of the 0.649 m of slip of an earthquake")
     for other in (run, SimpleNamespace(cycle=None)):
-        assert steady_start_sentence(other, SHORT).endswith("a locked fault there is not covered")
+        assert steady_start_sentence(other, SHORT).endswith("the way there from rest is not covered")

@@ -222,7 +222,7 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
     [
         (("guarantee", PATH, "--delay", "20 ms"), "Received --delay. Omit these."),
         (("guarantee", PATH, PATH), "takes one fault of several blocks at a time. Received more faults"),
-        (("guarantee", PATH, "--delay", "20 ms"), "the options --box, --controller, --force, --json, --lag, --out"),
+        (("guarantee", PATH, "--delay", "20 ms"), "among --box, --controller, --force, --json, --lag, --out"),
         (("limits", PATH, "--measured", "slip"), "Received --measured"),
         (("limits", PATH, "--pressure", "1 MPa"), "diffusivity of limits of several blocks need friction with a state"),
         (("limits", PATH, "--stress", "1 kPa"), "diffusivity of limits of several blocks need friction with a state"),
@@ -526,7 +526,7 @@ def test_a_law_of_slow_sliding_with_a_delay_is_neither_run_nor_exported(monkeypa
     monkeypatch.setattr(chains, "load_guarantee", lambda _: late)
     for command in ("simulate", "export"):
         assert run(command, SLIDING, "--certificate", tmp_path / "x.json") == 2
-        assert "for a law without delay" in " ".join(capsys.readouterr().err.split())
+        assert "of a law without delay" in " ".join(capsys.readouterr().err.split())
 
 
 def test_the_law_of_slow_sliding_is_exported_with_its_plan(monkeypatch, capsys, tmp_path):

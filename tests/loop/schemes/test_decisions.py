@@ -109,13 +109,13 @@ def test_a_constant_pressure_is_no_law_to_compensate():
 
 def test_the_compensated_scheme_starts_without_a_sample_and_in_the_middle_of_the_box():
     scheme, fault = simulation_scheme("compensated", weight=0.25), load_fault("real-fault")
-    assert scheme.starts[:5] == (0, 0, 0, 0, 0.25)
-    assert scheme.starts[6:] == (0, 0, -1e30, 1e30, 0, 0, 0)
-    assert scheme.own_size == len(scheme.starts) == 13
+    assert scheme.initial_memory[:5] == (0, 0, 0, 0, 0.25)
+    assert scheme.initial_memory[6:] == (0, 0, -1e30, 1e30, 0, 0, 0)
+    assert scheme.own_size == len(scheme.initial_memory) == 13
     limited = simulation_scheme("compensated", rest_width=7.0, rest_per_slip=3.0, rest_resolution=2.0)
-    assert limited.starts[5:] == (7, 3, 2, -1e30, 1e30, 0, 0, 0)
+    assert limited.initial_memory[5:] == (7, 3, 2, -1e30, 1e30, 0, 0, 0)
     within = simulation_scheme("compensated", rest_width=7.0, rest_least=-4.0, rest_largest=5.0, rest_fastest=6.0)
-    assert within.starts[5:] == (7, 0, 0, -4, 5, 6, 0, 0)
+    assert within.initial_memory[5:] == (7, 0, 0, -4, 5, 6, 0, 0)
     assert within.settings.items() >= {"rest_least": -4, "rest_largest": 5, "rest_fastest": 6}.items()
     assert "rest_least" not in limited.settings
     assert [limited.settings[f"rest_{name}"] for name in ("width", "per_slip", "resolution")] == [7, 3, 2]
