@@ -30,7 +30,7 @@ from quakedesign.guarantees.tracking_result import TrackingGuarantee
 from quakedesign.laws import Controller, published
 from quakedesign.loop import Actuator, Delay, Lag, Saturation, simulation_scheme
 from quakedesign.loop.actuators.base import Stage
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Sensor, SlipStage, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.parallel import SerialExecutor
@@ -178,7 +178,7 @@ class Apparatus:
             In place of LVDT and differentiator.
         """
         fault = self.fault()
-        name, own, numbers = own_way(law, None, None)
+        name, own, numbers = scheme_of_run(law, None, None)
         step = fault.sampling_time if own is None else own
         substeps = max(2, math.ceil(step * fault.specific_damping / _LARGEST_RATE))
         around = {"substeps": substeps, "actuator": self.actuator(), "measurement": measurement or self.sensor(step)}

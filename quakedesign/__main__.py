@@ -4,10 +4,10 @@ import gc
 import os
 
 from quakedesign.parallel import ending, leave
-from quakedesign.streams import has_room, lack_memory, lacks_memory, open_all, widen
+from quakedesign.streams import has_memory, lack_memory, lacks_memory, open_all, widen
 
 _OBJECTS = 100_000
-"""How many are made between two searches for garbage: libraries make as many when they load, and none is garbage."""
+"""Allocations between two garbage collections: loading the libraries makes as many objects, none of them garbage."""
 
 
 def main() -> None:
@@ -30,7 +30,7 @@ def main() -> None:
 
 
 def _run() -> None:
-    if not has_room():
+    if not has_memory():
         lack_memory()
     from quakedesign.cli import main as run
 

@@ -24,7 +24,7 @@ __all__ = ["attach", "checked", "checked_dataclass", "matches"]
 
 _ABBREVIATIONS = {"sp": "sympy", "np": "numpy", "pd": "pandas", "ca": "casadi"}
 _NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real, "SX": Real}
-"""SymPy and CasADi take numbers as they are."""
+"""Types of numbers accepted for each annotation; SymPy and CasADi accept Python numbers."""
 _WORDS = {
     "float": "a number",
     "SX": "an expression of CasADi",

@@ -56,13 +56,13 @@ def shipped(path: Path) -> Any:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
-def recall(kind: str, *question: bytes) -> bytes | None:
+def load(kind: str, *key: bytes) -> bytes | None:
     """Cached result for a key, or None."""
-    name = _name(kind, question)
+    name = _name(kind, key)
     try:
         with open(os.open(_own_folder() / name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
-            told = os.fstat(file.fileno())
-            if not stat.S_ISREG(told.st_mode) or not _own(told):
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode) or not _owned(status):
                 return None
             content = file.read()
             with suppress(OSError):  # an entry that is read again is not the oldest
@@ -73,9 +73,9 @@ def recall(kind: str, *question: bytes) -> bytes | None:
     return rest if digest == _digest(name, rest) else None
 
 
-def keep(kind: str, content: bytes, *question: bytes) -> None:
-    """Cache the result for a key, for `recall`, if the cache is in use."""
-    name = _name(kind, question)
+def store(kind: str, content: bytes, *key: bytes) -> None:
+    """Cache the result for a key, for `load`, if the cache is in use."""
+    name = _name(kind, key)
     with suppress(OSError):
         folder = _own_folder(make=True)
         descriptor, new = tempfile.mkstemp(prefix=".", dir=folder)
@@ -87,29 +87,29 @@ def keep(kind: str, content: bytes, *question: bytes) -> None:
             with suppress(OSError):
                 os.unlink(new)
             raise
-        _make_room(folder)
+        _evict(folder)
 
 
-def once(kind: str, work: Callable[[], bytes], *question: bytes) -> bytes:
+def once(kind: str, work: Callable[[], bytes], *key: bytes) -> bytes:
     """Cached result for a key, else the result of `work`, which is then cached."""
-    if (known := recall(kind, *question)) is None:
+    if (known := load(kind, *key)) is None:
         known = work()
-        keep(kind, known, *question)
+        store(kind, known, *key)
     return known
 
 
-def search_once(search: Callable[[], Any], *question: Any) -> Any:
+def search_once(search: Callable[[], Any], *inputs: Any) -> Any:
     """Cached or new result of a search: JSON-able numbers, texts and lists.
 
     Parameters
     ----------
     search : callable
-        Depends only on the question, and its result is not trusted.
-    *question
+        Depends only on the inputs, and its result is not trusted.
+    *inputs
         All input values of the search; if they cannot be pickled, the search runs each time.
     """
-    asked = stated(question) if in_use() else None
-    return search() if asked is None else json.loads(once("search", lambda: json.dumps(search()).encode(), asked))
+    key = stated(inputs) if in_use() else None
+    return search() if key is None else json.loads(once("search", lambda: json.dumps(search()).encode(), key))
 
 
 class CachedStatement(pickle.Pickler):
@@ -139,11 +139,11 @@ def stated(value: Any, writer: type[CachedStatement] = CachedStatement) -> bytes
 
 
 def _folder() -> Path | None:
-    told = os.environ.get(PLACE)
-    if told == "off" or sys.platform == "win32":  # Windows folders have no owner to check
+    setting = os.environ.get(PLACE)
+    if setting == "off" or sys.platform == "win32":  # Windows folders have no owner to check
         return None
-    if told:
-        return Path(told).absolute()
+    if setting:
+        return Path(setting).absolute()
     shared = os.environ.get("XDG_CACHE_HOME", "")
     if os.path.isabs(shared):
         return Path(shared) / "quakedesign"
@@ -166,34 +166,34 @@ def _own_folder(*, make: bool = False) -> Path:
     if make:
         place.parent.mkdir(parents=True, exist_ok=True)
         place.mkdir(mode=0o700, exist_ok=True)
-    told = place.lstat()
-    if not stat.S_ISDIR(told.st_mode) or not _own(told):
+    status = place.lstat()
+    if not stat.S_ISDIR(status.st_mode) or not _owned(status):
         raise PermissionError(place)
     return place
 
 
-def _own(told: os.stat_result) -> bool:
+def _owned(status: os.stat_result) -> bool:
     """Whether a file or folder belongs to this user, and nobody else may write it."""
-    return told.st_uid == os.getuid() and not told.st_mode & _OTHERS
+    return status.st_uid == os.getuid() and not status.st_mode & _OTHERS
 
 
-def _make_room(folder: Path) -> None:
+def _evict(folder: Path) -> None:
     """Remove the oldest files, if the total size is too large, until it is three quarters of the limit."""
     with os.scandir(folder) as entries:
         files = [(entry.stat(follow_symlinks=False), entry.path) for entry in entries]
-    size = sum(told.st_size for told, _ in files)
+    size = sum(status.st_size for status, _ in files)
     if size <= MOST_BYTES:
         return
-    for told, path in sorted(files, key=lambda file: file[0].st_mtime):
+    for status, path in sorted(files, key=lambda file: file[0].st_mtime):
         if size <= MOST_BYTES * 3 // 4:
             break
         with suppress(OSError):  # another process has removed it
             os.unlink(path)
-        size -= told.st_size
+        size -= status.st_size
 
 
-def _name(kind: str, question: tuple[bytes, ...]) -> str:
-    parts = b"".join(sha256(part).digest() for part in question)
+def _name(kind: str, key: tuple[bytes, ...]) -> str:
+    parts = b"".join(sha256(part).digest() for part in key)
     return f"{kind}-{sha256(_here() + parts).hexdigest()}"
 
 

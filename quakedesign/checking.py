@@ -82,7 +82,7 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
             verdict_of, said = _attraction(raw) if kind == ATTRACTION else _polynomial(raw)
             return verdict_of, said if fault is None else [
                 *said,
-                f'names no fault: nothing is said about "{fault.name}"',
+                f'names no fault: not compared with "{fault.name}"',
             ]
         certificate = Certificate.of(evidence_of(raw))
         verdict = certificate.check()
@@ -108,7 +108,7 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
             task, uncovered = claim.beside_healing(task, healing)
             if uncovered is not None:
                 raise CertificateError(
-                    f'healing of "{fault.name}" must be covered beside its disturbance, up to {uncovered:.3g}. '
+                    f'healing of "{fault.name}" must be at most {uncovered:.3g}, covered with its disturbance. '
                     f"Received {UpperBound(healing):.3g}"
                 )
         if claim.task != replace(task, name=claim.task.name):
@@ -128,7 +128,7 @@ def _plant(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     lines = [claim.sentence(), *entry_lines(guarantees.guarantee_document(claim))]
     return str(Verdict.PROVED), lines if fault is None else [
         *lines,
-        f'names no fault: nothing is said about "{fault.name}"',
+        f'names no fault: not compared with "{fault.name}"',
     ]
 
 
@@ -140,7 +140,7 @@ def _other_step(claim: Any, fault: "Fault") -> str:
     step = float(claim.held.step) if claim.sampled else fault.sampling_time
     if step == fault.sampling_time:
         return text
-    return f"{text}; NOT at its T_s = {fault.sampling_time:g} s, but at {step:.4g} s"
+    return f"{text}; proved at T_s = {step:.4g} s, NOT at its T_s = {fault.sampling_time:g} s"
 
 
 def _polynomial(raw: Any) -> tuple[str, list[str]]:

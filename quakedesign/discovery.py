@@ -16,7 +16,7 @@ from quakedesign.text import shown
 Kind = TypeVar("Kind")
 _allowed: ContextVar[bool] = ContextVar("allowed", default=False)
 _imported: set[str] = set()
-"""Modules of the user's, of which a class was named."""
+"""User modules whose classes were named."""
 _OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
 
 
@@ -103,7 +103,7 @@ def named(
             "module. If you trust it, add --allow-code, in Python allow_code=True."
         )
     if "__main__" in module.split("."):
-        raise UnknownNameError(f"{what} must not be of a program. Received {shown(name)}. Name a module without main.")
+        raise UnknownNameError(f"{what} must not be in __main__. Received {shown(name)}. Move it to another module.")
     if "" not in sys.path:  # an installed script does not search the current folder
         sys.path.append("")
     try:
@@ -113,7 +113,7 @@ def named(
     except BaseException as error:  # from user code: SystemExit would set the exit code
         raise UnknownNameError(
             f"{what} must be module:Class of a module that can be imported. Received {shown(name)}, which fails with "
-            f"{type(error).__name__}: {error}. Start where the module lies, or put it on PYTHONPATH."
+            f"{type(error).__name__}: {error}. Run in the folder of the module, or add it to PYTHONPATH."
         ) from error
     if not isclass(found) or not issubclass(found, kind) or isabstract(found) or not hasattr(found, "name"):
         raise UnknownNameError(

@@ -28,7 +28,7 @@ Json = dict[str, Any]
 """Object of a JSON file: values by key."""
 
 _MOST_DOTS = 400
-"""In a line of TOML: memory and time for a key of n parts grow as n²."""
+"""Largest number of dots in a line of TOML: memory and time for a key of n parts grow as n²."""
 
 
 def parse_toml(text: str) -> Json:
@@ -96,9 +96,9 @@ if sys.platform != "win32":
 FAMILY = ".quakedesign-"
 """Beginning of the names of temporary folders."""
 PREFIX = f"{FAMILY}{sha256(platform.node().encode()).hexdigest()[:8]}-"
-"""The same on this machine: on a disk shared by many, a lock may be known to one of them only."""
+"""The same with this machine's name: on a shared disk, a lock may be visible to one machine only."""
 ASIDE = "aside"
-"""What lies in this folder of a temporary folder has been moved there, and goes back where its place is empty."""
+"""Subfolder of a temporary folder for files moved aside; each is restored if its original place is empty."""
 
 _TRIALS, _PAUSE = 10, 0.02  # s; a sweep holds a lock for a shorter time
 _mine: set[Path] = set()
@@ -263,7 +263,7 @@ _placed = [0]
 _LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for added prefixes
 
 
-def require_room(path: Path) -> None:
+def require_writable(path: Path) -> None:
     """Reject a path that cannot be written, before the work begins, and clean up after killed processes there."""
     parent, length = path.absolute().parent, len(path.name.encode(errors="surrogatepass"))
     if length > _LONGEST_NAME:
@@ -285,7 +285,7 @@ _held: dict[Path, tuple[Path, int | None]] = {}
 """Folders that this command writes, with their locks."""
 
 
-def hold(folder: Path, *, make: bool = False) -> bool:
+def lock_folder(folder: Path, *, make: bool = False) -> bool:
     """Reject a folder that another command writes, and lock it until `release`; False if this process holds it already.
 
     Parameters
@@ -302,8 +302,8 @@ def hold(folder: Path, *, make: bool = False) -> bool:
         _held[place] = lock_of(place)
     except BlockingIOError:
         raise OutputError(
-            f"{folder} must be written by one command at a time. Received one that another writes to. Wait for it, or "
-            "choose another folder."
+            f"{folder} must be written by one command at a time. Received a folder that another command writes. Wait "
+            "for that command, or choose another folder."
         ) from None
     except OSError as error:
         raise OutputError(f"{folder} cannot be written: {error.strerror}. Choose another folder.") from None
@@ -319,7 +319,7 @@ def release(folder: Path | None = None) -> None:
 @contextmanager
 def sole_writer(folder: Path, *, make: bool = False) -> Iterator[None]:
     """Lock a folder for a block, see `hold`."""
-    new = hold(folder, make=make)
+    new = lock_folder(folder, make=make)
     try:
         yield
     finally:

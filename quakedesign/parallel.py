@@ -92,7 +92,7 @@ def in_background() -> Iterator[Background]:
 
 _NAMES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 SIGNALS = {getattr(signal, name): said for name, said in _NAMES.items() if hasattr(signal, name)}
-"""What is said of each; SIGHUP is not everywhere."""
+"""Message for each signal; SIGHUP does not exist on every platform."""
 PATIENCE = 3.0  # longest wait [s] for a library that swallows the signal or does not return
 
 
@@ -315,7 +315,7 @@ class Crew(ABC):
         """Argument in place of a value that many tasks use, so that it is sent to the workers only once."""
         return value
 
-    def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+    def results(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
         """Results of a task for many arguments, each with the index of its arguments, in any order.
 
         Raises
@@ -452,7 +452,7 @@ class SerialExecutor(Executor):
         return future
 
 
-class Here(Crew):
+class InProcess(Crew):
     """The calling process: one task after the other, each when its result is requested."""
 
     @property
@@ -467,12 +467,12 @@ class Here(Crew):
     def renew(self) -> None:
         """See `Crew.renew`: no worker dies."""
 
-    def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
-        """See `Crew.answers`."""
+    def results(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+        """See `Crew.results`."""
         return ((place, task(*given)) for place, given in enumerate(arguments))
 
 
-class Given(Crew):
+class UserExecutor(Crew):
     """A user-defined executor, which the user opens and closes.
 
     Parameters
@@ -497,8 +497,8 @@ class Given(Crew):
     def renew(self) -> None:
         """See `Crew.renew`."""
         raise SimulationError(
-            "the executor must keep its workers. Received a broken one. Ask again with a new executor: a campaign goes "
-            "on from its files."
+            "the executor must have live workers. Received a broken one. Run again with a new executor: a campaign "
+            "continues from its files."
         )
 
 
@@ -510,7 +510,7 @@ class _Sent:
     place: Any
 
 
-class Cluster(Given):
+class Cluster(UserExecutor):
     """A dask.distributed cluster, whose scheduler replaces dead workers by itself.
 
     Parameters
@@ -568,12 +568,12 @@ class Cluster(Given):
         """Twice the current number of threads of the cluster, so that none waits for the next batch."""
         return 2 * max(1, int(sum(self._client.nthreads().values())))
 
-    def answers(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
-        """See `Crew.answers`."""
+    def results(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+        """See `Crew.results`."""
         from distributed import KilledWorker
 
         try:
-            yield from super().answers(task, arguments)
+            yield from super().results(task, arguments)
         except (KilledWorker, CancelledError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
             raise SimulationError(
@@ -606,10 +606,10 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
     if scheduler and executor:
         raise ParameterError("give a scheduler or an executor. Received both. Omit one of them.")
     if executor is not None:
-        return Given(executor, workers)
+        return UserExecutor(executor, workers)
     return Cluster(scheduler) if scheduler else Processes(workers)
 
 
 def crew_or_here(workers: int, scheduler: str | None = None, executor: Executor | None = None) -> Crew:
     """As `crew_of`, but this process for one worker."""
-    return Here() if workers == 1 and not (scheduler or executor) else crew_of(workers, scheduler, executor)
+    return InProcess() if workers == 1 and not (scheduler or executor) else crew_of(workers, scheduler, executor)

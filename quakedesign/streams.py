@@ -10,7 +10,7 @@ if sys.platform != "win32":
     import resource
 
 LACKS_MEMORY = 4
-"""Exit code of a command that ran out of memory: nothing is said about its question."""
+"""Exit code of a command that ran out of memory, without a result."""
 _NARROWEST, _WIDEST = 20, 1000  # columns; help tables never end below 3, and huge ones fill the memory with blanks
 _LEAST = 600 * 2**20  # bytes of address space
 _SAID = ("cannot allocate memory", "failed to map", "out of memory", "can't start new thread", "std::bad_alloc")
@@ -53,7 +53,7 @@ def widen() -> None:
         os.environ["COLUMNS"] = str(min(max(columns, _NARROWEST), _WIDEST))
 
 
-def has_room() -> bool:
+def has_memory() -> bool:
     """Whether the memory limit suffices to load the libraries: OpenBLAS otherwise ends the process with exit code 1."""
     if sys.platform == "win32":
         return True

@@ -8,7 +8,7 @@ from itertools import takewhile
 from math import floor, log10
 from unicodedata import category
 
-_OBEYED = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, invisible formats, half characters, line separators
+_CONTROL_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, formats, surrogates, separators of lines
 _LONG = 8  # least length of a name that may be the beginning of a longer one
 _LONGEST_WORD = 200
 _LONGEST_MESSAGE = 2000
@@ -22,7 +22,7 @@ def visible(text: str) -> str:
     r"""Text with every control character, direction mark and line break as an escape such as ``\x1b`` or ``\n``."""
     if text.isascii() and text.isprintable():
         return text
-    return "".join(c.encode("unicode_escape").decode() if category(c) in _OBEYED else c for c in text)
+    return "".join(c.encode("unicode_escape").decode() if category(c) in _CONTROL_CATEGORIES else c for c in text)
 
 
 def one_line(message: str) -> str:

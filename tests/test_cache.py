@@ -17,8 +17,8 @@ import sys
 from quakedesign import cache
 for number in range(100):
     for size in (10, 100_000):
-        cache.keep("run", bytes([size % 251]) * size, b"%d" % size)
-        found = cache.recall("run", b"%d" % size)
+        cache.store("run", bytes([size % 251]) * size, b"%d" % size)
+        found = cache.load("run", b"%d" % size)
         assert found == bytes([size % 251]) * size, number
 """
 
@@ -44,91 +44,91 @@ def only(folder):
 
 
 def test_what_is_kept_is_found_again_and_is_private(folder):
-    assert cache.recall("run", b"how long?") is None
-    cache.keep("run", b"so long", b"how long?")
-    assert cache.recall("run", b"how long?") == b"so long"
-    assert [cache.recall("run", b"how", b" long?"), cache.recall("code", b"how long?")] == [None, None]
+    assert cache.load("run", b"how long?") is None
+    cache.store("run", b"so long", b"how long?")
+    assert cache.load("run", b"how long?") == b"so long"
+    assert [cache.load("run", b"how", b" long?"), cache.load("code", b"how long?")] == [None, None]
     assert (folder.stat().st_mode & 0o777, only(folder).stat().st_mode & 0o777) == (0o700, 0o600)
 
 
 @pytest.mark.parametrize("spoil", [lambda c: c[:-1] + b"!", lambda c: c[:-1], lambda c: b"", lambda c: b"!" + c[1:]])
 def test_a_file_that_is_not_what_was_written_counts_as_none(folder, spoil):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     only(folder).write_bytes(spoil(only(folder).read_bytes()))
-    assert cache.recall("run", b"how long?") is None
-    cache.keep("run", b"so long", b"how long?")
-    assert cache.recall("run", b"how long?") == b"so long"
+    assert cache.load("run", b"how long?") is None
+    cache.store("run", b"so long", b"how long?")
+    assert cache.load("run", b"how long?") == b"so long"
 
 
 def test_the_answer_to_another_question_is_not_taken_under_its_name(folder):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     first = only(folder)
-    cache.keep("run", b"so wide", b"how wide?")
+    cache.store("run", b"so wide", b"how wide?")
     other = next(file for file in folder.iterdir() if file != first)
     other.replace(first)
-    assert cache.recall("run", b"how long?") is None
+    assert cache.load("run", b"how long?") is None
 
 
 @pytest.mark.parametrize("mode", [0o720, 0o702, 0o777])
 def test_a_folder_that_others_may_write_is_not_used(folder, mode):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     folder.chmod(mode)
-    assert cache.recall("run", b"how long?") is None
-    cache.keep("run", b"so wide", b"how wide?")
+    assert cache.load("run", b"how long?") is None
+    cache.store("run", b"so wide", b"how wide?")
     assert len(list(folder.iterdir())) == 1
 
 
 def test_a_file_that_others_may_write_is_not_read(folder):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     only(folder).chmod(0o620)
-    assert cache.recall("run", b"how long?") is None
+    assert cache.load("run", b"how long?") is None
 
 
 def test_what_belongs_to_somebody_else_is_not_used(folder, monkeypatch):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     monkeypatch.setattr(os, "getuid", lambda: folder.stat().st_uid + 1)
-    assert cache.recall("run", b"how long?") is None
-    cache.keep("run", b"so wide", b"how wide?")
+    assert cache.load("run", b"how long?") is None
+    cache.store("run", b"so wide", b"how wide?")
     assert len(list(folder.iterdir())) == 1
 
 
 def test_what_is_no_file_is_not_waited_for(folder):
     """A pipe that nobody writes into would hold the command for ever."""
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     place = only(folder)
     place.unlink()
     os.mkfifo(place, 0o600)
-    asked = "from quakedesign import cache\nassert cache.recall('run', b'how long?') is None"
+    asked = "from quakedesign import cache\nassert cache.load('run', b'how long?') is None"
     subprocess.run([sys.executable, "-c", asked], check=True, timeout=60)
-    cache.keep("run", b"so long", b"how long?")
-    assert cache.recall("run", b"how long?") == b"so long"
+    cache.store("run", b"so long", b"how long?")
+    assert cache.load("run", b"how long?") == b"so long"
 
 
 def test_links_are_not_followed(folder, tmp_path, monkeypatch):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     only(folder).rename(tmp_path / "elsewhere")
     (folder / next(iter([cache._name("run", (b"how long?",))]))).symlink_to(tmp_path / "elsewhere")
-    assert cache.recall("run", b"how long?") is None
+    assert cache.load("run", b"how long?") is None
     (tmp_path / "link").symlink_to(folder)
     monkeypatch.setenv(cache.PLACE, str(tmp_path / "link"))
-    cache.keep("run", b"so wide", b"how wide?")
-    assert cache.recall("run", b"how wide?") is None
+    cache.store("run", b"so wide", b"how wide?")
+    assert cache.load("run", b"how wide?") is None
 
 
 @pytest.mark.parametrize("changed", ["_version", "_features"])
 def test_another_library_or_processor_has_answers_of_its_own(folder, monkeypatch, changed):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     monkeypatch.setattr(cache, "_here", cache._here.__wrapped__)
-    assert cache.recall("run", b"how long?") == b"so long"
+    assert cache.load("run", b"how long?") == b"so long"
     monkeypatch.setattr(cache, changed, lambda *_: "another")
-    assert cache.recall("run", b"how long?") is None
+    assert cache.load("run", b"how long?") is None
 
 
 def test_another_kernel_of_linear_algebra_has_answers_of_its_own(folder, monkeypatch):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     monkeypatch.setattr(cache, "_here", cache._here.__wrapped__)
     monkeypatch.setenv("OPENBLAS_CORETYPE", "another")
-    assert cache.recall("run", b"how long?") is None
+    assert cache.load("run", b"how long?") is None
 
 
 def test_other_sources_have_answers_of_their_own(folder, tmp_path, monkeypatch):
@@ -137,28 +137,28 @@ def test_other_sources_have_answers_of_their_own(folder, tmp_path, monkeypatch):
     monkeypatch.setattr(cache, "_here", cache._here.__wrapped__)
     monkeypatch.setattr(cache, "__file__", str(tmp_path / "package" / "cache.py"))
     source.write_text("a = 1")
-    cache.keep("run", b"so long", b"how long?")
-    assert cache.recall("run", b"how long?") == b"so long"
+    cache.store("run", b"so long", b"how long?")
+    assert cache.load("run", b"how long?") == b"so long"
     source.write_text("a = 2")
-    assert cache.recall("run", b"how long?") is None
+    assert cache.load("run", b"how long?") is None
 
 
 @pytest.mark.parametrize("place", ["/proc/nowhere/kept", "/dev/null/kept", "/dev/null"])
 def test_where_nothing_can_be_written_the_work_is_done_anew(monkeypatch, place):
     monkeypatch.setenv(cache.PLACE, place)
-    cache.keep("run", b"so long", b"how long?")
-    assert cache.recall("run", b"how long?") is None
+    cache.store("run", b"so long", b"how long?")
+    assert cache.load("run", b"how long?") is None
     assert cache.search_once(lambda: [1.5], "asked") == [1.5]
 
 
 def test_the_oldest_goes_when_there_is_too_much_and_what_was_asked_for_stays(folder, monkeypatch):
     monkeypatch.setattr(cache, "MOST_BYTES", 4500)
     for number in range(4):
-        cache.keep("run", bytes(1000), b"%d" % number)
+        cache.store("run", bytes(1000), b"%d" % number)
         os.utime(folder / cache._name("run", (b"%d" % number,)), (number, number))
-    assert cache.recall("run", b"0") == bytes(1000)
-    cache.keep("run", bytes(1000), b"4")
-    assert [cache.recall("run", b"%d" % number) is not None for number in range(5)] == [True, False, False, True, True]
+    assert cache.load("run", b"0") == bytes(1000)
+    cache.store("run", bytes(1000), b"4")
+    assert [cache.load("run", b"%d" % number) is not None for number in range(5)] == [True, False, False, True, True]
 
 
 def test_two_processes_at_once_never_see_half_a_file(folder):
@@ -202,15 +202,15 @@ def test_the_folder_is_that_of_the_system_unless_told(tmp_path, monkeypatch, tol
     for name in (cache.PLACE, "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv(told, str(tmp_path))
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     (found,) = tmp_path.rglob("quakedesign/run-*")
     assert found.relative_to(tmp_path).parts[0] in ("quakedesign", ".cache", "Library")
 
 
 def test_no_cache_takes_and_keeps_nothing(folder):
-    cache.keep("run", b"so long", b"how long?")
+    cache.store("run", b"so long", b"how long?")
     Output(no_cache=True)
     assert not cache.in_use()
-    assert cache.recall("run", b"how long?") is None
-    cache.keep("run", b"so wide", b"how wide?")
+    assert cache.load("run", b"how long?") is None
+    cache.store("run", b"so wide", b"how wide?")
     assert len(list(folder.iterdir())) == 1

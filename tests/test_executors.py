@@ -16,8 +16,8 @@ from quakedesign.fault import load_fault
 from quakedesign.lyapunov import certificate_text
 from quakedesign.lyapunov.gains.synthesise import synthesise
 from quakedesign.lyapunov.maps.gain_map import gain_map
-from quakedesign.parallel import Cluster, Given, Here, Processes, SerialExecutor, crew_of, crew_or_here
-from quakedesign.synthesis import answers
+from quakedesign.parallel import Cluster, InProcess, Processes, SerialExecutor, UserExecutor, crew_of, crew_or_here
+from quakedesign.synthesis import guarantees_of
 
 MAP = {"ranges": (("0.5", "3"), ("1", "4")), "points": 4, "levels": ("1", "0.5"), "degree": 4, "interior": 2}
 GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")
@@ -47,7 +47,7 @@ def guaranteed(**who):
     fault, patch = load_fault("real-fault"), load_fault("crustal-patch")
     one = partial(qd.guarantee, fault)
     asked = [partial(one, gains=GAINS), partial(qd.guarantee, patch), partial(one, gains=GAINS, step=F(1, 10))]
-    first, refused, other = answers(asked, **who)
+    first, refused, other = guarantees_of(asked, **who)
     assert "slow sliding needs a diffusion path or a lag" in str(refused)
     return first.to_dict(), str(refused), other.to_dict()
 
@@ -66,27 +66,27 @@ def test_any_executor_will_do():
 
 def test_progress_of_several_answers():
     told = []
-    found = answers([lambda i=i: i * i for i in range(3)], tell=lambda what, done: told.append((what, done)))
+    found = guarantees_of([lambda i=i: i * i for i in range(3)], tell=lambda what, done: told.append((what, done)))
     assert found == [0, 1, 4]
     assert told == [("1 of 3 computed", 1 / 3), ("2 of 3 computed", 2 / 3), ("3 of 3 computed", 1)]
 
 
 def test_the_process_that_asks_does_what_is_wanted_and_no_more():
     done = []
-    waiting = Here().answers(done.append, [(1,), (2,)])
+    waiting = InProcess().results(done.append, [(1,), (2,)])
     assert next(waiting) == (0, None)
     assert done == [1]
-    assert Here().submit(abs, -3).result() == 3
+    assert InProcess().submit(abs, -3).result() == 3
 
 
 def test_who_is_asked():
-    assert isinstance(crew_or_here(1), Here)
+    assert isinstance(crew_or_here(1), InProcess)
     with crew_or_here(2) as crew:
         assert isinstance(crew, Processes)
     with crew_of(1) as crew:
         assert isinstance(crew, Processes)
     for chosen in (crew_or_here(1, executor=SerialExecutor()), crew_of(3, executor=SerialExecutor())):
-        assert isinstance(chosen, Given)
+        assert isinstance(chosen, UserExecutor)
     with pytest.raises(ParameterError, match="give a scheduler or an executor"):
         crew_or_here(1, "tcp://127.0.0.1:9", SerialExecutor())
 
@@ -106,7 +106,7 @@ def test_what_many_tasks_take_is_sent_once_and_again_where_it_is_lost(scheduler)
         first.cancel()  # as when all workers that had it are gone
         assert crew.submit(length, sent).result() == len("a programme")
         assert sent.place is not first
-    assert Here().shared("a programme") == "a programme"
+    assert InProcess().shared("a programme") == "a programme"
 
 
 @pytest.mark.filterwarnings("ignore:Creating scratch directories")
@@ -128,7 +128,7 @@ def kills(_place):
 @pytest.mark.filterwarnings("ignore:Creating scratch directories")
 def test_workers_of_a_cluster_that_die_are_told(scheduler):
     with Cluster(scheduler) as crew, pytest.raises(SimulationError, match="workers of the cluster must live"):
-        list(crew.answers(kills, [(1,)]))
+        list(crew.results(kills, [(1,)]))
 
 
 def test_an_executor_of_the_user_is_not_replaced():
@@ -136,8 +136,8 @@ def test_an_executor_of_the_user_is_not_replaced():
         def submit(self, task, /, *arguments, **named):
             raise BrokenExecutor
 
-    with pytest.raises(SimulationError, match="executor must keep its workers"):
-        list(Given(Broken()).answers(abs, [(1,), (2,)]))
+    with pytest.raises(SimulationError, match="executor must have live workers"):
+        list(UserExecutor(Broken()).results(abs, [(1,), (2,)]))
 
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, True])

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from quakedesign.errors import CertificateError, OutputError, ScenarioError
-from quakedesign.files import discard_all, parse_toml, read_text, require_room
+from quakedesign.files import discard_all, parse_toml, read_text, require_writable
 
 
 def read(path):
@@ -51,7 +51,7 @@ def test_certificates_are_read_alike(tmp_path):
 @pytest.mark.parametrize("name", ["a" * 300, chr(0x1D49C) * 60, "nul\0", "x/" * 3000 + "y"])
 def test_a_place_that_cannot_be_is_refused_before_the_work(name, tmp_path):
     with pytest.raises(OutputError, match=r"must have a name of at most 200 bytes|folder that can be written"):
-        require_room(tmp_path / name)
+        require_writable(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
     discard_all()  # nothing is kept of a place that cannot be
 
@@ -61,7 +61,7 @@ def test_the_longest_name_has_room_for_its_neighbours(tmp_path):
 
     target = tmp_path / ("a" * 200)
     for _ in range(2):
-        require_room(target)
+        require_writable(target)
         with whole_folder(target) as partial:
             (partial / "file").write_text("x")
     assert [p.name for p in tmp_path.iterdir()] == [target.name]

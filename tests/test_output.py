@@ -99,8 +99,8 @@ def test_a_folder_in_no_folder_is_one_clear_message(tmp_path):
 HOLDING = """
 import sys
 from pathlib import Path
-from quakedesign.files import hold
-hold(Path(sys.argv[1]), make=True)
+from quakedesign.files import lock_folder
+lock_folder(Path(sys.argv[1]), make=True)
 print("held", flush=True)
 sys.stdin.readline()
 """
@@ -114,19 +114,19 @@ def test_a_folder_is_written_by_one_command_at_a_time(tmp_path):
         assert other.stdout.readline() == b"held\n"
         for spelling in (place, place.parent / ".." / "above" / "results"):
             with pytest.raises(OutputError, match="must be written by one command at a time"):
-                output.hold(spelling)
+                output.lock_folder(spelling)
         with pytest.raises(OutputError, match="one command at a time"), output.whole_folder(place):
             pass
         with pytest.raises(SystemExit) as stop:
             main(["campaign", "lab-fault", "--samples", "1", "--duration", "1", "--force", "--out", str(place)])
         assert stop.value.code == 2
-        assert output.hold(place.with_name("another"))
+        assert output.lock_folder(place.with_name("another"))
         output.release()
     finally:
         other.kill()
         other.communicate()
-    assert output.hold(place), "a lock ends with its process"
-    assert not output.hold(place), "a command may hold what it holds"
+    assert output.lock_folder(place), "a lock ends with its process"
+    assert not output.lock_folder(place), "a command may hold what it holds"
     output.release(place)
     with output.whole_folder(place) as new:
         (new / "a").touch()
@@ -152,30 +152,30 @@ def _nothing_stays_held():
 
 def test_one_folder_is_let_go_and_the_others_are_kept(tmp_path):
     one, other = tmp_path / "one", tmp_path / "other"
-    assert output.hold(one)
-    assert output.hold(other)
+    assert output.lock_folder(one)
+    assert output.lock_folder(other)
     output.release(one)
-    assert output.hold(one)
-    assert not output.hold(other)
+    assert output.lock_folder(one)
+    assert not output.lock_folder(other)
     with output.sole_writer(other):
         pass
-    assert not output.hold(other), "who holds it already goes on holding it"
+    assert not output.lock_folder(other), "who holds it already goes on holding it"
     output.release()
-    assert output.hold(other)
-    assert output.hold(one)
+    assert output.lock_folder(other)
+    assert output.lock_folder(one)
 
 
 def test_folders_above_are_made_where_they_are_wanted(tmp_path):
-    assert output.hold(tmp_path / "none" / "results")
+    assert output.lock_folder(tmp_path / "none" / "results")
     assert os.listdir(tmp_path) == []
     for _ in range(2):
         output.release()
-        assert output.hold(tmp_path / "a" / "b" / "results", make=True)
+        assert output.lock_folder(tmp_path / "a" / "b" / "results", make=True)
     output.release()
     assert os.listdir(tmp_path / "a" / "b") == []
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match=r"results cannot be written: (Not a directory|File exists)\. Choose another"):
-        output.hold(tmp_path / "file" / "results", make=True)
+        output.lock_folder(tmp_path / "file" / "results", make=True)
 
 
 def test_everybody_may_read_what_is_written_whatever_the_mask(tmp_path):
@@ -200,4 +200,4 @@ def test_a_refusal_within_a_made_folder_keeps_its_words(tmp_path):
 )
 def test_why_there_is_no_room(tmp_path, place, reason):
     with pytest.raises(OutputError, match=f"must be in a folder that can be written.*{reason}"):
-        output.require_room(tmp_path / place)
+        output.require_writable(tmp_path / place)

@@ -212,9 +212,9 @@ def test_a_law_that_is_typed_and_exits_is_one_error(code, capsys):
 
 @pytest.mark.parametrize("name", ["venv.__main__:x", "__main__:Controller", "quakedesign.__main__:main"])
 def test_programs_are_no_modules_of_laws(name, code):
-    with pytest.raises(UnknownNameError, match="must not be of a program"):
+    with pytest.raises(UnknownNameError, match="must not be in __main__"):
         control_law(name)
-    with pytest.raises(UnknownNameError, match="must not be of a program"):
+    with pytest.raises(UnknownNameError, match="must not be in __main__"):
         qd.load_fault(with_law(name), allow_code=True)
 
 

@@ -14,7 +14,7 @@ from quakedesign.files import (
     is_temporary,
     lock_of,
     number_placed,
-    require_room,
+    require_writable,
     sweep,
     sweep_system,
     temporary_folder,
@@ -72,11 +72,11 @@ def test_what_a_killed_process_left_goes_and_what_was_there_is_there(tmp_path, h
     process = holder(program, target)
     count = 1 if program is FILE else 2  # beside what is half written, a folder has its lock
     assert len(left(tmp_path)) == count
-    require_room(target)
+    require_writable(target)
     assert len(left(tmp_path)) == count, "the process lives"
     process.kill()
     process.communicate()
-    require_room(target)
+    require_writable(target)
     assert os.listdir(tmp_path) == ["results"]
     assert (target if program is FILE else target / "old").read_text() == "old"
 

@@ -27,7 +27,7 @@ def work(kind):
 
 if __name__ == "__main__":
     with ending(), Processes(2) as crew:
-        list(crew.answers(work, [(sys.argv[1],)] * 2))
+        list(crew.results(work, [(sys.argv[1],)] * 2))
 """
 KINDS = ["idle", "busy", *(["foreign"] if sys.platform == "linux" else [])]
 
@@ -93,9 +93,9 @@ def test_interruptions_of_the_whole_group_are_one_line_from_the_start(start, tmp
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 def test_a_worker_that_was_killed_is_replaced_and_answers_keep_their_places():
     with Processes(2) as crew:
-        (answer,) = crew.answers(os.getpid, [()])
+        (answer,) = crew.results(os.getpid, [()])
         os.kill(answer[1], signal.SIGKILL)
-        found = dict(crew.answers(divmod, [(i, 7) for i in range(20)]))
+        found = dict(crew.results(divmod, [(i, 7) for i in range(20)]))
     assert found == {i: divmod(i, 7) for i in range(20)}
 
 
@@ -104,13 +104,13 @@ def test_a_death_that_closes_the_pipes_of_a_process_about_to_start_is_a_death(mo
     with Processes(1) as crew:
         broken = crew._pool
         monkeypatch.setattr(broken, "submit", lambda *_: os.close(-1))
-        assert dict(crew.answers(divmod, [(5, 7)])) == {0: (0, 5)}
+        assert dict(crew.results(divmod, [(5, 7)])) == {0: (0, 5)}
         assert crew._pool is not broken
 
 
 def test_an_error_of_a_task_is_that_of_the_caller():
     with pytest.raises(ZeroDivisionError), Processes(1) as crew:
-        list(crew.answers(divmod, [(1, 0)]))
+        list(crew.results(divmod, [(1, 0)]))
 
 
 class Mortal(Crew):
@@ -138,19 +138,19 @@ def test_workers_have_three_lives():
     """A single task that twice kills who does it is done by the third; one that kills three is given up."""
     third = Mortal(0, 1)
     with third as crew:
-        assert list(crew.answers(divmod, [(9, 7)])) == [(0, (1, 2))]
+        assert list(crew.results(divmod, [(9, 7)])) == [(0, (1, 2))]
     assert (len(third.begun), third.renewed) == (3, 2)
     with pytest.raises(SimulationError, match="died 3 times, with 1 tasks left"):
-        list(Mortal(0, 1, 2, 3).answers(divmod, [(9, 7)]))
+        list(Mortal(0, 1, 2, 3).results(divmod, [(9, 7)]))
 
 
 def test_what_was_answered_before_a_death_is_not_asked_for_again():
     crew, tasks = Mortal(0), [(i, 7) for i in range(5)]
-    found = [(place, answer, crew.renewed) for place, answer in crew.answers(divmod, tasks)]
+    found = [(place, answer, crew.renewed) for place, answer in crew.results(divmod, tasks)]
     assert {place: answer for place, answer, _ in found} == {i: divmod(*given) for i, given in enumerate(tasks)}
     assert sorted(place for place, _, lives in found if lives) == [i for i, _ in crew.begun[5:]]
     assert len(found) == 5
-    assert list(Mortal().answers(divmod, [])) == []
+    assert list(Mortal().results(divmod, [])) == []
 
 
 def test_one_worker_is_enough_and_none_is_refused():

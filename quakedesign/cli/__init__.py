@@ -16,7 +16,7 @@ from quakedesign.cli import (
     proof_commands,
     simulate_commands,
 )
-from quakedesign.cli.app import app, typed
+from quakedesign.cli.app import app, store_command
 from quakedesign.discovery import user_code
 from quakedesign.errors import QuakedesignError
 from quakedesign.files import release
@@ -37,7 +37,7 @@ __all__ = [
 
 
 _PLACES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
-"""What a disk refuses, as against a defect."""
+"""Error numbers of a disk that cannot be written; all others are defects."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -50,14 +50,14 @@ def main(arguments: list[str] | None = None) -> None:
         warnings.simplefilter("ignore")
         os.environ.setdefault("PYTHONWARNINGS", "ignore")
     try:
-        typed(sys.argv[1:] if arguments is None else arguments)
+        store_command(sys.argv[1:] if arguments is None else arguments)
         with ending(), user_code():
             code = app(arguments, exit_on_error=False, print_error=False, result_action="return_value")
         sys.exit(code if isinstance(code, int) else 0)
     except QuakedesignError as error:
-        _refuse(str(error))
+        _reject(str(error))
     except CycloptsError as error:
-        _refuse(_with_help(error))
+        _reject(_with_help(error))
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
@@ -68,9 +68,9 @@ def main(arguments: list[str] | None = None) -> None:
             raise
         if isinstance(error, OSError) and (error.errno in _PLACES or error.filename == "stdout"):
             where = error.filename or "the output"
-            _refuse(f"{where} cannot be written: {error.strerror}. Choose another place, or make room.")
+            _reject(f"{where} cannot be written: {error.strerror}. Choose another place, or make room.")
         defect = one_line(f"{type(error).__name__}: {error}")
-        print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the place.", file=sys.stderr)
+        print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.", file=sys.stderr)
         sys.exit(3)
     finally:
         release()
@@ -84,6 +84,6 @@ def _with_help(error: CycloptsError) -> str:
     return f"{error}{hyphen} See {' '.join(('quakedesign', *(error.command_chain or ())))} --help."
 
 
-def _refuse(reason: str) -> None:
+def _reject(reason: str) -> None:
     print(f"quakedesign: {one_line(reason)}", file=sys.stderr)
     sys.exit(2)

@@ -19,7 +19,7 @@ from rich.text import Text
 
 from quakedesign.discovery import allow_code
 from quakedesign.errors import OutputError, ParameterError
-from quakedesign.files import require_room
+from quakedesign.files import require_writable
 from quakedesign.text import in_lines, visible
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -27,14 +27,14 @@ _log = logging.getLogger("quakedesign")
 _typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
 
 
-def typed(arguments: Sequence[str]) -> None:
-    """Store the typed command for `command_line`; enable output until `hush`, and forbid code named by files."""
+def store_command(arguments: Sequence[str]) -> None:
+    """Store the typed command for `command_line`; enable output until `set_output`, and forbid code named by files."""
     _typed.set(tuple(arguments))
     allow_code(False)
-    hush(quiet=False, level="warning")
+    set_output(quiet=False, level="warning")
 
 
-def hush(*, quiet: bool, level: str) -> None:
+def set_output(*, quiet: bool, level: str) -> None:
     """Switch off text output if `quiet`, and log on stderr from a logging level on."""
     _quiet.set(quiet)
     for handler in _log.handlers[:]:
@@ -73,7 +73,7 @@ def specified(options: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in options.items() if value is not None}
 
 
-def refuse(options: Mapping[str, Any], what: str) -> None:
+def reject(options: Mapping[str, Any], what: str) -> None:
     """Reject given options that cannot be combined with `what`."""
     if names := list(specified(options)):
         raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Omit {', '.join(names)}.")
@@ -133,7 +133,7 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
         raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
     if os.path.isdir(path):
         raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
-    require_room(path)
+    require_writable(path)
 
 
 def require_different(places: Mapping[str, Path | None]) -> None:

@@ -10,7 +10,7 @@ from quakedesign.cli.app import new_file, progress
 from quakedesign.cli.options import Output, changed_options
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational
-from quakedesign.files import hold, made_folder, require_room
+from quakedesign.files import lock_folder, made_folder, require_writable
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.text import counted
 
@@ -49,7 +49,7 @@ def several_blocks(
         named = ", ".join(f"--{name.replace('_', '-')}" for name in sorted(others))
         has = {*accepted, "json"} - {"state"} | ({"force", "box"} & options.keys())
         raise ParameterError(
-            f"{command.__name__} has, of a fault of several blocks, the options "
+            f"options of {command.__name__} for a fault of several blocks must be among "
             f"{', '.join(f'--{name}' for name in sorted(has)).replace('_', '-')}. Received {named}. Omit these."
         )
     if chosen.get("accept_poor_fit"):
@@ -67,7 +67,7 @@ def _scope(proof: Any, chain: "BlockChain") -> list[str]:
     from quakedesign.studies.several_blocks import farthest_balance
 
     meant = "the load of a pressure is the pressure that balances the blocks on the reference"
-    if chain.ages:
+    if chain.has_state:
         return [
             "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
             "pressure is the plan",
@@ -184,7 +184,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
     with progress() as tell:
         for place, law in enumerate(laws):
             tell(f"{law}: design, proof and run", place / len(laws))
-            runs.append(run_sliding_chain(chain, law, sliding=sliding) if chain.ages else run_of_chain(chain, law))
+            runs.append(run_sliding_chain(chain, law, sliding=sliding) if chain.has_state else run_of_chain(chain, law))
     rows = [list(_HEADS), ["", "slip rate", "slip", "slip rate", "slip", "from", "to"], *(one.row() for one in runs)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     about = "its balance" if len(chain.wells) < len(chain.blocks) else "the reference"
@@ -193,8 +193,8 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
         "from the reference in the run)",
     ]
     last = "proved without stick; run with stick, where an error may pass its bound"
-    if chain.ages:
-        meant = ["(largest slip rate, slip from the reference, pressure beside the plan)"]
+    if chain.has_state:
+        meant = ["(largest slip rate, slip from the reference, pressure from the plan)"]
         stress = LowerBound(sliding["stress"]).quantity("Pa")
         last = f"proved for any shear stress of up to {stress}; run without inertia under a sine"
     lines = [
@@ -212,7 +212,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
 
 def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
     """Reject lag and stress of friction without a state."""
-    if not chain.ages and any(sliding.values()):
+    if not chain.has_state and any(sliding.values()):
         raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
 
 
@@ -231,7 +231,7 @@ def export_chain(
     from quakedesign.simulation.export import FILES, block_step, require_free, write_step
     from quakedesign.studies.several_blocks import chain_law
 
-    if chain.ages and law.certificate is None:
+    if chain.has_state and law.certificate is None:
         raise ParameterError(
             "export of blocks in slow sliding takes the law of a certificate. Received none. Use guarantee with --lag, "
             "--stress and --out, then export with --certificate."
@@ -262,13 +262,13 @@ def run_chain(
 
     if out is not None:
         prepare(out, force=force)
-        require_room(out)
-        hold(out)
+        require_writable(out)
+        lock_folder(out)
     with progress() as tell:
         tell("design, proof and run", 0.0)
-        if chain.ages:
+        if chain.has_state:
             entered |= {"tell": lambda done: tell("run", done)}
-        one = run_sliding_chain(chain, **entered) if chain.ages else run_of_chain(chain, **entered)
+        one = run_sliding_chain(chain, **entered) if chain.has_state else run_of_chain(chain, **entered)
     proof: Any = one.proof
     values = _run_values(one)
     lines = [] if proof is None else _lines(proof, chain, one)

@@ -25,7 +25,7 @@ from quakedesign.cli.options import (
 )
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import rational
-from quakedesign.files import hold
+from quakedesign.files import lock_folder
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
@@ -182,13 +182,13 @@ def design(
         chain = chain_at_step(chain, options.setup())
         require_loads(chain, options.sliding)
         law = {"controller": block_law(options.controller, "all")} | (
-            {"sliding": options.sliding} if chain.ages else {}
+            {"sliding": options.sliding} if chain.has_state else {}
         )
         return run_chain(chain, out or Path(f"quakedesign-{chain.name}"), force, output, format, **law)
     loaded, arguments = options.problem(fault)
     folder = out or Path(f"quakedesign-{loaded.name}")
     prepare(folder, force=force)
-    hold(folder)
+    lock_folder(folder)
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.folder import write_folder
 
@@ -310,7 +310,7 @@ def figures(
     loaded, arguments = options.problem(fault)
     folder = out or Path(f"quakedesign-{loaded.name}-figures")
     prepare(folder, force=force)
-    hold(folder)
+    lock_folder(folder)
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.paper_figures import paper_study
     from quakedesign.report.sentences import run_sentences

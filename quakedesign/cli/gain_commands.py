@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.app import app, console, new_file, progress, refuse, specified
+from quakedesign.cli.app import app, console, new_file, progress, reject, specified
 from quakedesign.cli.options import PLAIN, Force, Formats, Gains, Output, Scheduler, Seconds, Whole
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.files import hold
+from quakedesign.files import lock_folder
 
 if TYPE_CHECKING:
     from quakedesign.lyapunov.gains.synthesise import Synthesis
@@ -57,7 +57,7 @@ def synthesise(
         inverse of the settling time from initial errors of at most the bound on |h'|. beta: widest certified range of
         the control coefficient. sampled: smallest simulated error of proved gains on a fault.
     lipschitz
-        Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the need of the fault.
+        Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the largest |h'| of the fault.
     gain_range
         b_m and b_M, the range of the control coefficient β; 1 1 by default, for sampled that of the fault. For beta
         the certified range contains this range and has the same middle.
@@ -66,7 +66,7 @@ def synthesise(
     degree
         Degree of V; repeat for more. By default the two lowest; higher degrees find better gains and take longer.
     starts
-        Number of starting points, 4 by default; sampled has its own.
+        Number of starting points, 4 by default; not for sampled.
     seed
         Seed of the random starting points, 0 by default.
     workers
@@ -88,10 +88,10 @@ def synthesise(
     of_search = {"starts": starts, "seed": seed, "workers": workers, "scheduler": scheduler}
     of_trial, what = {"step": step, "scheme": scheme, "metric": metric}, f"the objective {objective}"
     if objective == "sampled":
-        refuse({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
+        reject({"--bound": bound, **{f"--{name}": value for name, value in of_search.items()}}, what)
         synthesis, more = _sampled(law, fault, lipschitz, gain_range, degree, specified(of_trial))
     else:
-        refuse({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
+        reject({"FAULT": fault, **{f"--{name}": value for name, value in of_trial.items()}}, what)
         from quakedesign.lyapunov.gains.synthesise import synthesise as search
 
         ranges = {"lipschitz": lipschitz or "1", "gain_range": gain_range or ("1", "1")}
@@ -241,7 +241,7 @@ def gain_map(
 
     folder = out or Path(f"quakedesign-map-{law}")
     prepare(folder, force=force)
-    hold(folder)
+    lock_folder(folder)
     if range is not None and len(range) != 4:
         raise ParameterError(f"range needs four numbers, two for each gain. Received {len(range)}.")
     base = gains or tuple(str(v) for v in family(law)[0].law.gains.values())

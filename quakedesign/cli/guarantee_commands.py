@@ -34,7 +34,7 @@ from quakedesign.cli.options import (
 )
 from quakedesign.errors import ParameterError, QuakedesignError, SimulationError
 from quakedesign.exact import rational
-from quakedesign.files import hold, made_folder, require_room
+from quakedesign.files import lock_folder, made_folder, require_writable
 
 # ----------------------------------------------------------------------
 # The command about the sampled loop.
@@ -77,7 +77,7 @@ def guarantee(
     Parameters
     ----------
     controller
-        elqr, or a sliding mode: cta, dia. Of several blocks: centralised (default), or decentralised.
+        elqr, or a sliding mode: cta, dia. For several blocks: centralised (default) or decentralised.
     objective
         Design objective: tracking, or peak for the smallest certified slip-rate error.
     gains
@@ -113,15 +113,15 @@ def guarantee(
     from quakedesign.cli.block_commands import guarantee_chain, require_loads, several_blocks
     from quakedesign.fault import load_fault, with_accepted_fit
     from quakedesign.studies.fault_facts import box_sentences
-    from quakedesign.synthesis import answers
     from quakedesign.synthesis import guarantee as guaranteed
+    from quakedesign.synthesis import guarantees_of
 
     accepted = ("step", "out", "controller", "stress", "lag")
-    if (several := several_blocks(fault, globals()["guarantee"], options, accepted, box)) is not None:
+    if (blocks := several_blocks(fault, globals()["guarantee"], options, accepted, box)) is not None:
         setup = around.setup()
-        sliding = {"stress": stress, "lag": setup.lag}
-        require_loads(several, sliding)
-        return guarantee_chain(several, controller, setup.step, sliding if several.ages else None, out, force, output)
+        loads = {"stress": stress, "lag": setup.lag}
+        require_loads(blocks, loads)
+        return guarantee_chain(blocks, controller, setup.step, loads if blocks.has_state else None, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)
@@ -136,7 +136,7 @@ def guarantee(
     with progress() as tell:
         if not more and scheduler is None and workers == 1:
             calls = [partial(calls[0], progress=tell)]
-        results: Any = answers(calls, workers=workers, scheduler=scheduler, tell=tell if more else None)
+        results: Any = guarantees_of(calls, workers=workers, scheduler=scheduler, tell=tell if more else None)
     entries = {"class": disturbance_class, "seconds": perf_counter() - began}
     if not more:
         if isinstance(results[0], QuakedesignError):
@@ -188,8 +188,8 @@ def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | No
     if len(names) == 1:
         new_file(out, "certificate file", force=force)
         return [out]
-    require_room(out)
-    hold(out)
+    require_writable(out)
+    lock_folder(out)
     files = [out / f"{name}-guarantee.json" for name in names]
     for path in (path for path in files if out.exists()):
         new_file(path, "certificate file", force=force)
@@ -253,8 +253,8 @@ def blocks(
     loaded.friction.require(blocks=fault)
     files = {count: out / f"{loaded.name}-{count}-blocks.json" for count in range(least, most + 1)} if out else {}
     if out is not None:
-        require_room(out)
-        hold(out)
+        require_writable(out)
+        lock_folder(out)
     for path in files.values() if out is not None and out.exists() else ():
         new_file(path, "certificate file", force=force)
     result = one_block(loaded, range(least, most + 1), wells=wells, coupling=coupling, step=step)
@@ -320,7 +320,7 @@ def limits(
         from quakedesign.report.folder import prepare
 
         prepare(out, force=force)
-        hold(out)
+        lock_folder(out)
     from quakedesign.report.drawing import file_names
     from quakedesign.report.limits_table import limits_lines, write_limits
     from quakedesign.studies import limits as all_limits

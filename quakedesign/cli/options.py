@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 from cyclopts import Group, Parameter
 
-from quakedesign.cli.app import hush, print_json, print_lines, refuse, specified
+from quakedesign.cli.app import print_json, print_lines, reject, set_output, specified
 from quakedesign.errors import ParameterError, UnitError
 from quakedesign.exact import rational
 from quakedesign.fault.equilibrium import by_equilibrium
@@ -211,7 +211,7 @@ class Output:
 
             allow_code(True)
         if (self.quiet, self.log_level) != (False, "warning"):
-            hush(quiet=self.quiet, level=self.log_level)
+            set_output(quiet=self.quiet, level=self.log_level)
 
     def show(self, values: dict[str, Any], text: Iterable[str] | Callable[[], object]) -> None:
         """Print facts as JSON, or else as text: lines, or a function that prints them."""
@@ -340,10 +340,10 @@ class RunOptions:
     perturbation: Push | None = None
 
     def way(self, law: "Controller | None", usual: str = "explicit") -> "tuple[Any, float | None, dict[str, Any]]":
-        """Scheme, step [s] and settings of a run, see `quakedesign.loop.schemes.own_way`."""
-        from quakedesign.loop.schemes import own_way
+        """Scheme, step [s] and settings of a run, see `quakedesign.loop.schemes.scheme_of_run`."""
+        from quakedesign.loop.schemes import scheme_of_run
 
-        return own_way(law, self.scheme, self.step, usual)
+        return scheme_of_run(law, self.scheme, self.step, usual)
 
     def load(self) -> "Load":
         """Load on the fault in addition to its own disturbance."""
@@ -452,7 +452,7 @@ _ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
 _SENSORS = Group("Sensors (schemes that sample)")
 
 
-def _asks_every_stage(options: type[Options]) -> type[Options]:
+def _with_stage_options(options: type[Options]) -> type[Options]:
     """Frozen dataclass with the options that the stages of the package declare."""
     declared = [option for stage in stages().values() for option in stage.options]
     fields = [(option.name, _annotation(option), option.default) for option in declared]
@@ -467,7 +467,7 @@ def _annotation(option: Option) -> Any:
 
 
 @Parameter(name="*", group=_ACTUATOR)
-@_asks_every_stage
+@_with_stage_options
 class ActuatorOptions:
     """Stages between law and fault, for schemes that sample: what each declares where it is defined."""
 
@@ -501,7 +501,7 @@ def _stage(stage: type[Stage], values: Mapping[str, Any], step: float) -> Stage 
     """One stage; None if it is not requested."""
     first, *others = stage.options
     if values[first.name] != first.default:
-        return stage.asked(step, **{option.name: values[option.name] for option in stage.options})
+        return stage.from_options(step, **{option.name: values[option.name] for option in stage.options})
     for other in others:
         if values[other.name] is not None and other.default is None:
             raise ParameterError(
@@ -589,7 +589,7 @@ class SensorOptions(EstimateOptions):
         )
 
 
-def surroundings(
+def loop_elements(
     chosen: "Choice | None",
     step: float,
     run: "RunOptions",
@@ -621,7 +621,7 @@ _HELD = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
 _OF_LAW = ("step", "delay", "lag", "diffusion")  # given by a certificate
 _PUMP = ("delay", "jitter", "quantum", "saturation", "withdrawal", "rate_limit")
 _READING = {"slip_noise": "deviation", "bandwidth": "bandwidth", "slip_quantum": "quantum", "seed": "seed"}
-_AROUND = ("fault", "controller", "gains", "state", "out", "force", "json")
+_COMMON = ("fault", "controller", "gains", "state", "out", "force", "json")
 
 
 @Parameter(name="*", group=_GROUP)
@@ -812,7 +812,7 @@ def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], optio
     from quakedesign.loop.sensing import Transducer
 
     claim = options["law"].choose(fault).claim
-    refuse({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, whose law has its own")
+    reject({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, whose law has its own")
     entries = {"stress": float(claim.task.stress)} | options["state"].of_control()
     entries |= _instruments(fault, {**changed, "step": float(claim.held.step)}, options)
     if entries["transducer"] is None and claim.held.slip_noise:
@@ -834,7 +834,7 @@ def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any
 
 def _named(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()) -> dict[str, Any]:
     """Given options under the argument names of a run; rejects options that do not apply."""
-    if foreign := [name for name in changed if name not in (*taken, *_AROUND)]:
+    if foreign := [name for name in changed if name not in (*taken, *_COMMON)]:
         kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
         raise ParameterError(
             f"{', '.join(foreign)} cannot be used for {kind}. Received {fault.friction.name}. "

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from quakedesign.cli.app import app, new_file, refuse
+from quakedesign.cli.app import app, new_file, reject
 from quakedesign.cli.options import PLAIN, Box, ExactSeconds, Force, Gains, Output
 from quakedesign.errors import ParameterError, PolynomialError
 
@@ -70,11 +70,11 @@ def certify(
     about_fault = {"FAULT": fault, "--box": box, "--feedback": feedback, "--step": step, "--peaks": peaks}
     about_rate = {"--lipschitz": lipschitz, "--maximize": maximize, "--gain-range": gain_range}
     if law_of(law).loop_field().domain == "reals":
-        refuse(about_rate, f"{law}, which needs a FAULT instead")
+        reject(about_rate, f"{law}, which needs a FAULT instead")
         if fault is None:
             raise ParameterError(f"certify {law} needs a fault. Received none. Give a preset or a file after {law}.")
         return _certify_on_fault(fault, gains, box, feedback or "error", step, peaks, out, force, output)
-    refuse(about_fault, f"{law}, which needs --lipschitz instead")
+    reject(about_fault, f"{law}, which needs --lipschitz instead")
     return _certify_for_rate(law, gains, lipschitz, maximize, gain_range or ("1", "1"), out, output)
 
 

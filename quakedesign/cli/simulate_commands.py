@@ -31,13 +31,13 @@ from quakedesign.cli.options import (
     Texts,
     Whole,
     changed_options,
+    loop_elements,
     require_no_state_options,
     show_state_run,
-    surroundings,
 )
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.equilibrium import by_equilibrium
-from quakedesign.files import hold
+from quakedesign.files import lock_folder
 from quakedesign.parallel import remedy
 
 if TYPE_CHECKING:
@@ -101,12 +101,12 @@ def simulate(
             raise ParameterError(
                 "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these."
             )
-        if blocks.ages and law.controller != "none":
+        if blocks.has_state and law.controller != "none":
             raise ParameterError(
                 "blocks in slow sliding run under the law of a certificate. Received --controller. Use guarantee with "
                 "--out, then simulate with --certificate."
             )
-        if blocks.ages:
+        if blocks.has_state:
             from quakedesign.simulation.slow_sliding import PLANTS as SLIDING
 
             plant = run.plant or "quasi-dynamic"
@@ -128,7 +128,7 @@ def simulate(
         chosen, load = law.choose(loaded, run.step, actuator.path()), run.load()
         way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
         period = loaded.sampling_time if step is None else step
-        substeps, chain, sensor = surroundings(chosen, period, run, actuator, sensors, seed)
+        substeps, chain, sensor = loop_elements(chosen, period, run, actuator, sensors, seed)
         with progress() as tell:
             tell("compiling", 0.0)
             trajectory, premises = run_single(
@@ -261,7 +261,7 @@ def sampling(
     loaded.require_memoryless("a study of sampling")
     folder = out or Path(f"quakedesign-{loaded.name}-sampling")
     prepare(folder, force=force)
-    hold(folder)
+    lock_folder(folder)
     with progress() as tell:
         tell("gains", 0.0)
         law = (
@@ -415,7 +415,7 @@ def campaign(
     controller = chosen.controller if chosen else None
     way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
-    around = surroundings(None if variation else chosen, period, run, actuator, sensors, 0)
+    around = loop_elements(None if variation else chosen, period, run, actuator, sensors, 0)
     problem = campaign_problem(
         loaded,
         controller,
@@ -431,7 +431,7 @@ def campaign(
         **variation,
     )
     folder = out or Path(f"quakedesign-{loaded.name}-campaign")
-    hold(folder, make=True)
+    lock_folder(folder, make=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
     remedy(f"the same command goes on from {folder}")
     with progress() as tell:

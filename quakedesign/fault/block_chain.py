@@ -63,7 +63,7 @@ class BlockChain:
     wells : tuple of float
         Positions along the fault [m], in increasing order.
     diffusivity : float, optional
-        of the pressure along a fault of several blocks [m²/s]; steady pressure unless given
+        Diffusivity of the pressure along the fault [m²/s]; without it the pressure is steady.
     """
 
     fault: Fault
@@ -138,7 +138,7 @@ class BlockChain:
 
         Empty without a diffusivity.
         """
-        wells, slow = [rational(v) for v in self.wells], self._slow
+        wells, slow = [rational(v) for v in self.wells], self._diffusing
         diffusivity = rational(self.diffusivity or 0)
         points = sorted({*self.middles, *wells})
         rows = []
@@ -158,13 +158,13 @@ class BlockChain:
         """Share of the pressures of `flow` (columns) in each block (rows) [-]; `shares` without a diffusivity."""
         if self.diffusivity is None:
             return self.shares
-        wells, slow = [rational(v) for v in self.wells], self._slow
+        wells, slow = [rational(v) for v in self.wells], self._diffusing
         places = [slow.index(i) if i in slow else len(slow) + wells.index(x) for i, x in enumerate(self.middles)]
         size = len(slow) + len(wells)
         return tuple(tuple(Fraction(j == place) for j in range(size)) for place in places)
 
     @property
-    def _slow(self) -> list[int]:
+    def _diffusing(self) -> list[int]:
         """Blocks whose pressure diffuses."""
         wells = {rational(v) for v in self.wells}
         return [] if self.diffusivity is None else [i for i, x in enumerate(self.middles) if x not in wells]
@@ -192,7 +192,7 @@ class BlockChain:
         return self.blocks[0].friction
 
     @property
-    def ages(self) -> bool:
+    def has_state(self) -> bool:
         """Whether friction has a state, such as rate-and-state friction."""
         return bool(self.friction.state_names)
 

@@ -167,14 +167,14 @@ class Table:
         with self.problems.collected():
             if near:
                 named = " ".join(f"{self._name(key)} is not a known key.{question}" for key, question in near.items())
-                raise ScenarioError(f"{named} Known here are {', '.join(self._keys)}.")
+                raise ScenarioError(f"{named} Use one of {', '.join(self._keys)}.")
 
     def report_missing(self, but: Collection[str] = ()) -> None:
         """Report the missing entries, except those in `but`."""
         missing = [self._name(key) for key in self._missing if key not in but]
         with self.problems.collected():
             if missing:
-                raise ScenarioError(f"{', '.join(missing)} must be given. Received nothing. Compare with a preset.")
+                raise ScenarioError(f"{', '.join(missing)} must be given. Received no value. Add each, as in a preset.")
 
     def _key(self, entry: FileEntry) -> str:
         """Key of an entry in the file: its name, or a spelling of its symbol, ``Dc`` or ``d_c`` for :math:`d_c`."""

@@ -16,14 +16,14 @@ class FaultEquilibrium:
     name: str
     coordinates: str  # Coordinates of the plant: beginning of a sentence that its equations complete
     poles: str  # Equilibrium of the poles in words, a format of the slip rate [m/s]
-    refused: Mapping[str, str]  # Message for each quantity that does not apply, by name
+    messages: Mapping[str, str]  # Message for each quantity that does not apply, by name
 
 
 AT_REST = FaultEquilibrium(
     name="rest",
     coordinates="Slip x₁ and slip rate x₂, measured from the equilibrium without pressure,",
     poles="",
-    refused={
+    messages={
         "ramp": "ramp needs friction with a state, whose reference has a constant rate. Received the ramp {value!r} "
         "with {law}, whose reference is smooth already. Omit ramp.",
         "simulate_state": "the friction law must have a state. Received {law}. Use simulate.",
@@ -33,7 +33,7 @@ STEADY_SLIDING = FaultEquilibrium(
     name="sliding",
     coordinates="Slip x₁, slip rate v, the stretch s of the spring, whose far end rests, and the state of friction",
     poles=" about steady sliding at {:.4g} m/s",
-    refused={
+    messages={
         "disturbance": "friction with a state takes the bound of a shear stress, not a disturbance. Received "
         "{value!r}. Give --stress.",
         "diffusivity": "diffusivity along the fault needs friction without a state. Received {law}. Omit diffusivity, "
@@ -44,8 +44,8 @@ STEADY_SLIDING = FaultEquilibrium(
         "into the fault file, and run limits: it names unstable modes that no well reaches.",
         "no_diffusion": "diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.",
         "plant": "plant is for friction without a state, got {value!r} with {law}, which never rests: omit it.",
-        "stick_slip": "friction with a state never rests, so that the stick-slip plant is no other. Received {law}. "
-        "Omit plant.",
+        "stick_slip": "plant must be omitted for friction with a state, which never rests. Received stick-slip with "
+        "{law}. Omit plant.",
     },
 )
 

@@ -35,7 +35,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
         For another law.
     """
     friction = friction_law(law)
-    task = {key: entry for key, entry in TASK.items() if key not in friction.equilibrium.refused}
+    task = {key: entry for key, entry in TASK.items() if key not in friction.equilibrium.messages}
     if needs_target := law not in _COME_TO_REST:
         task["target_slip"] = replace(task["target_slip"], required=True)
     lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []

@@ -365,7 +365,7 @@ def _authority(parts: Json) -> Fraction:
 
 def _assumed(parts: Json, table: Table) -> tuple[str, ...]:
     """Remark on a disturbance that is missing or of frequency 0, for friction without a state."""
-    if "disturbance" in parts["friction"].equilibrium.refused:
+    if "disturbance" in parts["friction"].equilibrium.messages:
         return ()
     if "disturbance" not in table.entries:
         return (_UNDISTURBED,)

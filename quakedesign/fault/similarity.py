@@ -115,7 +115,7 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     named |= {
         f"friction.{name}": (_friction_unit(f.metadata), getattr(law, name)) for name, f in law.quantities().items()
     }
-    if not stretches(law):
+    if not is_homogeneous(law):
         named[_UNIT_FRICTION] = _FRICTION, 1
     return {n: Quantity(n, unit, rational(value, n)) for n, (unit, value) in named.items() if value is not None}
 
@@ -125,7 +125,7 @@ def _friction_unit(metadata: Mapping[str, str]) -> str:
     return str(metadata.get("directed_unit", metadata["unit"] or _FRICTION))
 
 
-def stretches(law: FrictionLaw) -> bool:
+def is_homogeneous(law: FrictionLaw) -> bool:
     """Whether μ is homogeneous of degree 1 (Euler) in those parameters that are friction coefficients."""
     import sympy as sp
 
@@ -321,7 +321,7 @@ TOLERANCE = Fraction(1, 100)
 """Relative difference of a π-group up to which faults known to three digits count as similar."""
 
 CLOCKS = ("reference.operation_time", "shear_modulus")
-"""What may fix the scale of time: the task, as in Table I of the paper, or the natural period 1/ω_n ∝ √(ρL²/G)."""
+"""Quantities that may set the time scale: the task, as in Table I of the paper, or the natural period ∝ √(ρL²/G)."""
 
 _SUPERSCRIPTS = str.maketrans("-/0123456789", "⁻ᐟ⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -487,8 +487,8 @@ def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Faul
     exact = scaled_parameters(quantities(source), scales)
     if exact.pop(_UNIT_FRICTION, radical(1)) != radical(1):
         raise ParameterError(
-            f"{source.friction.name} cannot be multiplied by a factor, so the scales must leave friction as it is. "
-            f"Received the factor {scales.of('slip_m/normal_m')} for slip_m/normal_m."
+            f"slip_m/normal_m must have the factor 1, because {source.friction.name} cannot be multiplied by a factor. "
+            f"Received the factor {scales.of('slip_m/normal_m')}. Give slip_m and normal_m one factor."
         )
     parts: dict[str, dict[str, float]] = {"": {}, "friction": {}, "reference": {}, "disturbance": {}}
     for dotted, value in exact.items():

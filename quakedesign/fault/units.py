@@ -56,7 +56,7 @@ def _words_of_units() -> frozenset[str]:
     return frozenset(word for text in texts for word in re.findall(r"[^\W\d]\w*", text))
 
 
-def _is_no_unit(written: str) -> bool:
+def _is_unknown_unit(written: str) -> bool:
     """Whether a word is not a unit of pint (name, name with a prefix, or plural), decided without loading pint."""
     words, singular = _words_of_units(), written.removesuffix("s")
     ends = {end[i:] for end in (written, singular) for i in range(len(end)) if not i or end[:i] in words}
@@ -106,7 +106,7 @@ def si_value(quantity: object, unit: str, name: str) -> float:
     number, written = (Decimal(split[1]), split[2]) if split else (None, quantity)
     remedy = nearest_name(written, _PLAIN.get(unit, ())) or " Check its spelling."
     unknown = f"{received}, whose unit is unknown.{remedy}"
-    if number is not None and _is_no_unit(written):
+    if number is not None and _is_unknown_unit(written):
         raise UnitError(unknown)
     import pint
 

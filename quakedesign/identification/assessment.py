@@ -13,7 +13,7 @@ from numpy import ndarray
 
 from quakedesign.files import Json
 from quakedesign.identification.experiment import TREND, TREND_IN_TIME
-from quakedesign.identification.fitting import Fit, weighed
+from quakedesign.identification.fitting import Fit, weighted
 from quakedesign.identification.loading import Loading
 from quakedesign.identification.record import Record, scatter
 from quakedesign.identification.sliding_experiment import START_STATE
@@ -185,7 +185,7 @@ def _halves(fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndar
     assert record.load_point is not None
     path = record.load_point[used]
     hinge = np.maximum(path - np.interp(begins[-1], time, path), 0)
-    extra = weighed(fit.weights, hinge)
+    extra = weighted(fit.weights, hinge)
     across = extra - fit.slopes @ np.linalg.lstsq(fit.slopes, extra, rcond=None)[0]
     size = float(np.linalg.norm(across))
     score = 0.0 if size <= 1e-6 * np.linalg.norm(extra) else float(across @ fit.whitened) / size / fit.noise

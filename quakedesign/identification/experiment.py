@@ -60,7 +60,7 @@ class Experiment(ABC):
     def best_law(self, fitted: ndarray) -> FrictionLaw:
         """The law with the values of given coordinates."""
         values = {name: v for name, v in self.outward(fitted).items() if name in self.law.quantities()}
-        return holding(self.law, values)
+        return with_values(self.law, values)
 
     def resolved(self, fitted: ndarray, accuracy: float) -> "Experiment":
         """The same experiment, simulated to an accuracy of friction [-] at given coordinates."""
@@ -94,19 +94,19 @@ def fitted_quantities(
     return {symbol: values.get(name, getattr(law, name)) for name, symbol in law.symbols().items()}
 
 
-def holding(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
+def with_values(law: FrictionLaw, values: Mapping[str, float]) -> FrictionLaw:
     """A law with other values, even with an evolution effect that is not positive, which no fault can have."""
     if values.get("evolution_effect", 1.0) > 0:
         return replace(law, **values)  # type: ignore[type-var]
     own = {name: getattr(law, name) for name in law.quantities()} | law._options()
-    return law._holding({**own, **values})
+    return law._with_values({**own, **values})
 
 
 TREND, TREND_IN_TIME = "trend", "trend_in_time"
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Around(Experiment):
+class _Transformed(Experiment):
     """An experiment in other coordinates than those of its `whole`."""
 
     whole: Any
@@ -135,7 +135,7 @@ class _Around(Experiment):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Widened(_Around):
+class Widened(_Transformed):
     """An experiment, `whole`, with further coordinates, which come last and change friction in proportion to `columns`.
 
     Trends add to friction; their columns are displacement [m] or time [s]. Delays of changes of rate [s] act through
@@ -186,7 +186,7 @@ def _about_zero(name: str, unit: str, most: float) -> Coordinate:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Difference(_Around):
+class Difference(_Transformed):
     """An experiment whose first coordinate is replaced by its difference from others, all by index."""
 
     first: int

@@ -93,15 +93,14 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
     """
     text = ""
     if getattr(identification.law, "evolution_effect", 1.0) <= 0:
-        text = "an evolution effect that is not positive. It strengthens with rate: there is nothing to control."
+        text = "an evolution effect that is not positive: friction strengthens with rate and needs no control."
     if len(identification.law.state_names) > 1:
         text = "two states. Omit --states for a file."
     if text:
-        raise RecordError(f"a fault file holds friction with one state whose effect is positive. Received {text}")
+        raise RecordError(f"friction of a file must have one state with a positive evolution effect. Received {text}")
     if not identification.determined:
-        raise RecordError(
-            f"a fault file needs every parameter. Received {identification.record.name}: {identification.untold()[0]}."
-        )
+        named, unknown = identification.record.name, identification.undetermined()[0]
+        raise RecordError(f"a fault file needs every parameter. Received {named}: {unknown}.")
     law, box = _at_rate_of(fault, identification.law), fault.box
     if covers(law):
         law, box = cover(law, identification.box, box)
@@ -154,7 +153,7 @@ def law_remarks(identification: Identification, fault: Fault) -> list[str]:
     if identification.rival is None or named.equilibrium is not law.equilibrium or named.name == law.name:
         return []
     why = "the record prefers" if named.name == identification.rival.law else "the record was fitted without it, by"
-    return [f"{fault.name} names {named.name}, {why} {law.name}; --law {named.name} takes the other"]
+    return [f"{fault.name} names {named.name}, {why} {law.name}; --law {named.name} fits that one"]
 
 
 def next_command(identification: Identification, path: str | Path | None) -> str:
@@ -217,9 +216,9 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
     """
     whole, law = identified_fault(identification, fault), identification.law
     if covers(law):
-        text = "friction and uncertainty below hold every law of the boxes"
+        text = "friction and uncertainty below cover all laws in the boxes"
     else:
-        text = "friction below is the best fit: a fault file holds no ranges of this law; "
+        text = "friction below is the best fit: a fault file cannot contain ranges of this law; "
         spread = _spread(identification)
         text += _too_wide(identification) or f"design --spread {spread} covers a, b and D_c of the box"
     remarks = [

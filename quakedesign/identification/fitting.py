@@ -20,8 +20,8 @@ from quakedesign.identification.experiment import Experiment
 
 CONFIDENCE = 0.95
 _SHARE_OF_NOISE = 3e-3
-_ALONE = 0.4  # share of an outlier that its neighbours may reach on the same side; more is an unexplained peak
-_UNFELT = 1e-7  # share of the largest slope, below which a slope is rounding
+_NEIGHBOUR_SHARE = 0.4  # largest share of an outlier in its neighbours on the same side; more is an unexplained peak
+_ROUNDING_SLOPE = 1e-7  # share of the largest slope, below which a slope is rounding
 _SHARE_OF_EXCESS = 2e-3  # excess by which a search may still improve when it ends
 _CANDIDATES = 64  # random starting points, simulated once
 _COARSE = 40  # steps of a search before it is compared with the others
@@ -69,7 +69,7 @@ class Fit:
     @cached_property
     def whitened(self) -> ndarray:
         """Used residuals, made independent with the variance of one measurement."""
-        return weighed(self.weights, self.residuals)
+        return weighted(self.weights, self.residuals)
 
     @property
     def squares(self) -> float:
@@ -118,15 +118,15 @@ class Fit:
 
     def distance(self, fitted: ndarray) -> float:
         """`excess` of given coordinates; infinite if the experiment does not exist."""
-        squares = float(np.sum(weighed(self.weights, self.measured - self.experiment.friction(fitted)) ** 2))
+        squares = float(np.sum(weighted(self.weights, self.measured - self.experiment.friction(fitted)) ** 2))
         return self.excess(squares) if np.isfinite(squares) else np.inf
 
     def along(self, place: int) -> ndarray:
         """Changes of all coordinates, to first order, when one changes by 1 and the others stay optimal."""
         slopes, moves = self.slopes, np.zeros(len(self.fitted))
         scale = np.linalg.norm(slopes, axis=0)
-        others = (scale > _UNFELT * np.max(scale)) & (np.arange(len(scale)) != place)
-        moves[others] = np.linalg.lstsq(slopes[:, others] / scale[others], -slopes[:, place], rcond=_UNFELT)[0]
+        others = (scale > _ROUNDING_SLOPE * np.max(scale)) & (np.arange(len(scale)) != place)
+        moves[others] = np.linalg.lstsq(slopes[:, others] / scale[others], -slopes[:, place], rcond=_ROUNDING_SLOPE)[0]
         moves[others] /= scale[others]
         moves[place] = 1
         return moves
@@ -134,7 +134,7 @@ class Fit:
     @cached_property
     def slopes(self) -> ndarray:
         """Derivatives of friction by the fitted coordinates, whitened as `whitened`."""
-        return weighed(self.weights, _finite(self.experiment.slopes(self.fitted)))
+        return weighted(self.weights, _finite(self.experiment.slopes(self.fitted)))
 
     @cached_property
     def deviations(self) -> ndarray:
@@ -149,7 +149,7 @@ class Fit:
         return np.asarray(np.sqrt(np.sum(spread**2, axis=0)) / scale * self.noise * np.sqrt(self.correlation))
 
 
-def weighed(weights: ndarray, values: ndarray) -> ndarray:
+def weighted(weights: ndarray, values: ndarray) -> ndarray:
     """Values of all samples, or columns of them, times the weights of `Fit`; samples of weight 0 are left out."""
     if weights.ndim == 2:
         used = np.any(weights != 0, axis=0)
@@ -215,8 +215,8 @@ def _starts(
     usable = [candidates[i] for i in order if np.isfinite(costs[i])]
     if not usable:
         raise RecordError(
-            "an experiment must be one that a spring can hold without a jump. No set of parameters gives one for this "
-            "record. Check the stiffness, or give a record with measured slip."
+            "sliding must be without a jump for at least one set of parameters. Received a record for which all "
+            f"{_CANDIDATES} tested sets jump. Check the stiffness, or give a record with measured slip."
         )
     starts = usable if near is None else [near, *usable]
     return experiment.resolved(starts[0], scatter), starts
@@ -233,7 +233,7 @@ def minimised(
 ) -> tuple[ndarray, float]:
     """Coordinates with the least sum of squares near a start, and this sum; `fixed` ones do not change.
 
-    Residuals have the weights of `weighed`.
+    Residuals have the weights of `weighted`.
     """
     free = np.ones(len(start), dtype=bool) if fixed is None else ~fixed
     low, high = experiment.bounds
@@ -244,14 +244,14 @@ def minimised(
         full[free] = part
         return np.asarray(full)
 
-    first = weighed(weights, experiment.friction(whole) - measured)
+    first = weighted(weights, experiment.friction(whole) - measured)
     if not np.all(np.isfinite(first)):
         return whole, np.inf
     size = max(float(np.sqrt(np.mean(first**2))), 1e-300)
     solution = least_squares(
-        lambda part: weighed(weights, experiment.friction(at(part)) - measured) / size,
+        lambda part: weighted(weights, experiment.friction(at(part)) - measured) / size,
         np.clip(whole[free], np.nextafter(low, high)[free], np.nextafter(high, low)[free]),
-        jac=lambda part: weighed(weights, _finite(experiment.slopes(at(part)))[:, free]) / size,
+        jac=lambda part: weighted(weights, _finite(experiment.slopes(at(part)))[:, free]) / size,
         bounds=(low[free], high[free]),
         x_scale="jac",
         ftol=_SHARE_OF_EXCESS / len(first),
@@ -298,7 +298,7 @@ def outliers(residuals: ndarray) -> ndarray:
     outlying = np.zeros(len(residuals), dtype=bool)
     for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         beside = off[[i for i in (begin - 1, end) if 0 <= i < len(off)]]
-        alone = np.max(beside * np.sign(off[begin])) < _ALONE * np.min(np.abs(off[begin:end]))
+        alone = np.max(beside * np.sign(off[begin])) < _NEIGHBOUR_SHARE * np.min(np.abs(off[begin:end]))
         outlying[begin:end] = alone and end - begin <= _LONGEST_OUTLIER
     return outlying
 

@@ -27,7 +27,7 @@ _EXPERIMENTS = {
     "longer sliding before the step, which fixes the trend, and steps up and down by a factor of 10": "sign",
     "slip from rest until friction stays": "drop residual",
 }
-"""Experiments that tell what is open: parameters, or the sign of a - b."""
+"""Experiments that determine open parameters, or the sign of a - b."""
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -78,7 +78,7 @@ class Outlier:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rival:
+class OtherLaw:
     """Another law with as many parameters, which explains the record less well."""
 
     law: str  # its name
@@ -112,7 +112,7 @@ class Identification:
         Assumptions of the fit.
     seed : int
         Seed of the random starts.
-    rival : Rival or None
+    rival : OtherLaw or None
         Law that was also fitted but not selected, if no law was given.
     assessment : Assessment
         Tests of the assumptions, and the verdict.
@@ -126,7 +126,7 @@ class Identification:
     law: FrictionLaw
     notes: tuple[str, ...]
     seed: int
-    rival: Rival | None = None
+    rival: OtherLaw | None = None
     assessment: Assessment = Assessment(checks=(), factor=1.0)
 
     def __repr__(self) -> str:
@@ -183,11 +183,11 @@ class Identification:
         coordinates = self.fit.experiment.coordinates
         if missing := {c.name for c in coordinates} - set(values):
             raise ParameterError(
-                f"values must hold all that was fitted. Received none of {', '.join(sorted(missing))}."
+                f"values must contain every fitted parameter. Received no {', '.join(sorted(missing))}. Add these."
             )
         return self.fit.distance(self.fit.experiment.near(values)) <= self.fit.threshold(len(coordinates))
 
-    def untold(self) -> list[str]:
+    def undetermined(self) -> list[str]:
         """Sentences about parameters that the record does not determine; empty if it determines all."""
         open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith(_BESIDE))]
         texts, only = [], self.difference
@@ -205,7 +205,7 @@ class Identification:
             "law": self.law.name,
             **self.assessment.to_dict(),
             "identified": self.identified,
-            "not_identifiable": self.untold(),
+            "not_identifiable": self.undetermined(),
             "parameters": {name: estimate.to_dict() for name, estimate in self.estimates.items()},
             "difference": None if difference is None else {"of": difference.name, **difference.to_dict()},
             "chosen": {

@@ -34,12 +34,12 @@ from quakedesign.identification.experiment import (
     trended,
 )
 from quakedesign.identification.fitting import BetterFit, Fit, Profile, advantage, fit, minimised, settled
-from quakedesign.identification.identification_result import Identification, ParameterEstimate, Rival, estimate
+from quakedesign.identification.identification_result import Identification, OtherLaw, ParameterEstimate, estimate
 from quakedesign.identification.loading import Loading, prepared
 from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
 from quakedesign.identification.sliding_experiment import START_RATE, START_STATE, STIFFNESS, SlidingExperiment
 from quakedesign.identification.two_states import SECOND_EFFECT, with_two_states
-from quakedesign.identification.weakening_experiment import START, Drawn, MeasuredSlip
+from quakedesign.identification.weakening_experiment import START, MeasuredSlip, SpringLoaded
 
 _EFFECTS = 1e-5, 1.0, (2e-3, 3e-2)
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
@@ -201,7 +201,7 @@ def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
         Coordinate(name=START, unit="", low=-size, high=2 * size, start=start, logarithmic=False),
     )
     drawn, normal = record.load_point - record.load_point[0], record.normal
-    experiment = Drawn(
+    experiment = SpringLoaded(
         law=_template(law), load_point=drawn, normal=normal, coordinates=coordinates, stiffness=stiffness
     )
     notes = ("the block sticks at first and has not slipped before", "without inertia")
@@ -217,7 +217,7 @@ _TRENDS = {"": "without a trend", TREND: "with a trend in displacement", TREND_I
 _ONE_TREND = {"displacement": {TREND}, "time": {TREND_IN_TIME}}
 TREND_CHOICES = "auto", *_ONE_TREND, "none"
 _STAYS = 0.5  # standard deviations: a smaller delay needs no correction
-_UNFELT = 0.1  # negligible effect of a rate error, in standard deviations of the whole record
+_NEGLIGIBLE = 0.1  # negligible effect of a rate error, in standard deviations of the whole record
 _UNSEEN = 1e-5  # of the range of friction: resolution that no machine reaches
 _CHANCE = 0.01  # probability that a trend or an unsteady beginning is fitted to noise, which changes a - b
 
@@ -371,7 +371,7 @@ class _Choice:
         record, loading = prepared(self.raw, (), pieces)
         return replace(self, record=record, loading=loading, by_load=original)
 
-    def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, Rival | None, dict[str, tuple[_Fitted, float]]]:
+    def _chosen(self, fits: list[_Fitted]) -> tuple[_Fitted, OtherLaw | None, dict[str, tuple[_Fitted, float]]]:
         """Best law, with trend and unsteady beginning where likelier; rival law; alternative fits.
 
         Alternatives are fits with other trends, and of the rival law if the record hardly distinguishes the laws.
@@ -380,7 +380,7 @@ class _Choice:
         fits = sorted((_with_noise(each, noise) for each in fits), key=lambda fitted: fitted.best.squares)
         if len(fits) > 1:
             squares, excess = advantage(fits[0].best, fits[1].best)
-            rival = Rival(law=fits[1].kind.name, squares=squares, excess=excess)
+            rival = OtherLaw(law=fits[1].kind.name, squares=squares, excess=excess)
         better = self._extended(fits[0])
         better, others = self._trend(self._without_start(_with_noise(better, self._noise(better))))
         noise = self._noise(better)
@@ -422,7 +422,7 @@ class _Choice:
         unsteady = unsteady_beginning(result.difference, values, self.loading) if self.loading is not None else ""
         sign = sign_check(result.difference, doubted, shift, unsteady)
         checks = checks if sign is None else (*checks, sign)
-        undetermined = (*result.untold(), *([sign.sentence] if sign is not None and not sign.passed else []))
+        undetermined = (*result.undetermined(), *([sign.sentence] if sign is not None and not sign.passed else []))
         return Assessment(checks=checks, factor=factor, open=undetermined, experiments=tuple(result.experiments(sign)))
 
     def _late_trend(self, result: Identification) -> float | None:
@@ -481,7 +481,7 @@ class _Choice:
             values = best.experiment.outward(best.fitted)
             effects = [values.get(name, 0.0) for name in _EFFECTS_OF]
             size, strengthens = max(map(abs, effects)), effects[0] - sum(effects[1:])
-            negligible = best.noise * _UNFELT / float(np.sqrt(np.sum(best.counts)))
+            negligible = best.noise * _NEGLIGIBLE / float(np.sqrt(np.sum(best.counts)))
             before = best.experiment.friction(best.fitted)
             for place, error in enumerate(loading.pieces.errors.tolist()):
                 if not negligible < size * error < size:
@@ -494,7 +494,7 @@ class _Choice:
                     moved = setup.experiment.resolved(best.fitted, best.accuracy).friction(best.fitted) - before
                     moved += strengthens * np.log1p(error) * (place == 0)  # at an unchanged reference rate
                     columns += [moved] * bool(np.all(np.isfinite(moved)))
-        columns = [each for each in columns if np.linalg.norm(each * np.sqrt(best.counts)) > _UNFELT * best.noise]
+        columns = [each for each in columns if np.linalg.norm(each * np.sqrt(best.counts)) > _NEGLIGIBLE * best.noise]
         return np.array(columns).T.reshape(len(best.measured), len(columns))
 
     def _extended(self, fitted: _Fitted) -> _Fitted:

@@ -25,9 +25,9 @@ _MOST_DELAYS = 4
 _HOLD, _SLOW = 3.0, 0.05  # standard deviations of a rate from 0, and their share of the largest rate: less is a hold
 _LARGE_CHANGE = 1.25  # ratio of rates above which a change is a step, not a drift
 _LEAST_CHANGE = 0.03  # relative to the faster rate: changes friction by 3 % of a or b
-_ODDS = 4.0  # required improvement of a fit by a new piece, in variances times log n
+_PIECE_PENALTY = 4.0  # required improvement of a fit by a new piece, in variances times log n
 _ROUGH = 6.0  # deviations from the pieces over the noise from sample to sample: more is motion
-_SLIGHT = 0.01  # share of the whole path
+_PATH_TOLERANCE = 0.01  # share of the whole path
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,13 +82,13 @@ def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: floa
         squares.append(float(left @ left))
         noise = max(squares[-1] / len(u) * _spread(left), floor)
         before = squares[max(len(squares) - 1 - _PATIENCE, 0)]
-        little = _PATIENCE * _ODDS * np.log(len(u)) * noise
+        little = _PATIENCE * _PIECE_PENALTY * np.log(len(u)) * noise
         if squares[-1] < floor * len(u) or (len(squares) > _PATIENCE and before - squares[-1] < little):
             break
     knots = _needed(u, y, knots, floor)
     rates, line = _hinges(u, y, knots)
     off = np.abs(y - line) * size
-    rough = len(knots) >= _MOST_PIECES or np.percentile(off, 99) > max(_ROUGH * scatter + step, _SLIGHT * size)
+    rough = len(knots) >= _MOST_PIECES or np.percentile(off, 99) > max(_ROUGH * scatter + step, _PATH_TOLERANCE * size)
     begins = np.concatenate([[time[0]], t[0] + knots * span])
     nearest = time[np.clip(np.searchsorted(time, begins - 1e-6 * span / len(time)), 0, len(time) - 1)]
     begins = np.where(np.abs(begins - nearest) < 1e-4 * span / len(time), nearest, begins)
@@ -197,7 +197,7 @@ def prepared(record: Record, rates: Sequence[float] = (), fixed: Pieces | None =
     if load is None:
         if len(rates):
             raise RecordError(
-                "--rates go with a column of the load point, which says when they change. Received none. Add it."
+                "--rates needs a column of the load point for the times of changes. Received none. Add this column."
             )
         return thinned(record), None
     if fixed is not None:
@@ -285,7 +285,7 @@ def _needed(u: ndarray, y: ndarray, knots: ndarray, floor: float) -> ndarray:
     """
     left = y - _hinges(u, y, knots)[1]
     noise = max(float(left @ left) / len(u) * _spread(left), floor)
-    allowed = _ODDS * np.log(len(u)) * noise
+    allowed = _PIECE_PENALTY * np.log(len(u)) * noise
     while len(knots):
         rates, _ = _hinges(u, y, knots)
         changes = np.abs(np.diff(rates)) / np.maximum(np.maximum(np.abs(rates[1:]), np.abs(rates[:-1])), 1e-300)

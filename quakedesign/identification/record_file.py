@@ -37,7 +37,7 @@ _ARRAYS = {f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)}
 _MOST_NUMBERS = 16 * MOST_SAMPLES
 _UNIT_WORDS = {"", *"s sec ms min h m mm um µm μm mic micron microns nm cm Pa kPa MPa Mpa GPa N kN MN - 1 Hz".split()}
 _UNIT_WORDS |= {f"{each}/{time}" for each in "m mm um µm mic micron microns nm".split() for time in ("s", "sec")}
-"""What may stand in a line of units."""
+"""Words that a line of units may contain."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +99,7 @@ def _text(text: str, path: str | Path) -> list[Column]:
     first = next((i for i, line in enumerate(lines[:_PREAMBLE]) if _numbers(line)), None)
     if first is None:
         raise RecordError(f"a record must have samples. Received {path}, which has no line of numbers.")
-    sign = _sign(lines[first])
+    sign = _separator(lines[first])
     columns = _headings(lines[:first], len(_cells(lines[first], sign)), sign)
     table = _table(text, first, sign, columns, lines[first])
     return [
@@ -111,12 +111,12 @@ def _numbers(line: str) -> bool:
     """Whether a line has at least two numbers or dates, among them the first cell that is not empty."""
     if not line.strip() or line.strip()[0] in _COMMENTS:
         return False
-    cells = [cell.strip() for cell in _cells(line, _sign(line))]
+    cells = [cell.strip() for cell in _cells(line, _separator(line))]
     numeric = [_CELL.fullmatch(cell) is not None for cell in cells if cell.lower() not in _MISSING]
     return sum(numeric) > 1 and numeric[0]
 
 
-def _sign(line: str) -> str:
+def _separator(line: str) -> str:
     """Separator of the columns of a line of numbers; a pattern of blanks if there is no other."""
     return next((sign for sign in (";", "\t", ",") if sign in line.strip()), r"\s+")
 
@@ -149,7 +149,7 @@ def _headings(before: list[str], count: int, sign: str) -> list[Column]:
 
 def _heading_cells(line: str, sign: str) -> list[str]:
     """Cells of a line of headings, whose separator may differ from that of the numbers below."""
-    own = sign if sign == r"\s+" or sign in line else _sign(line)
+    own = sign if sign == r"\s+" or sign in line else _separator(line)
     cells = _BLANK_HEADING.findall(line) if own == r"\s+" else _cells(line, own)
     return [cell.strip() for cell in cells]
 
@@ -157,12 +157,12 @@ def _heading_cells(line: str, sign: str) -> list[str]:
 def _refuse_count(named: list[Column], count: int, sign: str) -> None:
     if sign == "," and len(named) < count <= 2 * len(named):
         raise RecordError(
-            f"a line must hold {len(named)} values, one a column. Received {count}: decimal commas between commas "
-            "cannot be told apart. Put semicolons between the columns, or write decimal points."
+            f"a line must have {len(named)} values, one for each column. Received {count}: commas separate the columns "
+            "and are decimal signs. Separate the columns by semicolons, or write decimal points."
         )
     raise RecordError(
-        f"a line must hold {len(named)} values, one a column. Received {count} under the headings "
-        f"{shown(', '.join(column.heading for column in named))}. Write one heading a column, without blanks inside."
+        f"a line must have {len(named)} values, one for each column. Received {count} under the headings "
+        f"{shown(', '.join(column.heading for column in named))}. Write one heading without blanks for each column."
     )
 
 

@@ -19,7 +19,7 @@ from quakedesign.errors import RecordError
 from quakedesign.fault import FrictionLaw
 from quakedesign.identification.assessment import Assessment, Check, sign_check
 from quakedesign.identification.experiment import Coordinate, Experiment
-from quakedesign.identification.fitting import Fit, minimised, weighed
+from quakedesign.identification.fitting import Fit, minimised, weighted
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import Setup, identified_as, kinds_of, profiled
 from quakedesign.identification.loading import prepared
@@ -80,7 +80,7 @@ def read_steps(
             shared = np.isin((record.origin + record.time).round(9), (other.origin + other.time).round(9))
             if shared.sum() > 1:
                 raise RecordError(
-                    f"--steps windows must not overlap: part them. Received {shared.sum()} samples of {window} twice."
+                    f"--steps windows must not overlap. Received {shared.sum()} samples of {window} twice. Shorten one."
                 )
             record = part(record, ~shared, record.name)
         parts.append(replace(record, name=f"{record.name} {window}"))
@@ -195,13 +195,13 @@ def _assessed(common: Identification, steps: Sequence[Identification], probabili
     signs = {np.sign(c.value) for step in steps for c in step.assessment.checks if c.name == "sign" and c.passed}
     sign = sign_check(common.difference, {})
     if sign is not None and sign.passed and signs != {np.sign(sign.value)}:
-        why = "steps do not agree" if signs else "no step has one by itself"
+        why = "the steps disagree" if signs else "no step alone determines it"
         sign = replace(sign, passed=False, sentence=f"the sign of a - b is open: {why}")
     checks = (one, *([sign] if sign is not None else []))
     return Assessment(
         checks=checks,
         factor=max(step.assessment.factor for step in steps),
-        open=(*common.untold(), *(check.sentence for check in checks if not check.passed)),
+        open=(*common.undetermined(), *(check.sentence for check in checks if not check.passed)),
         experiments=tuple(common.experiments(sign)),
     )
 
@@ -217,7 +217,7 @@ class _Joint(Experiment):
 
     def joined(self, values: Sequence[ndarray]) -> ndarray:
         """Weighted values of the samples of each step."""
-        return np.concatenate([weighed(w, v) for w, v in zip(self._weights, values, strict=True)])
+        return np.concatenate([weighted(w, v) for w, v in zip(self._weights, values, strict=True)])
 
     @cached_property
     def _weights(self) -> list[ndarray]:
@@ -231,7 +231,7 @@ class _Joint(Experiment):
         """Derivatives of `friction`; those in the coordinates of other steps are 0."""
         rows = []
         for each, weights, at in zip(self.parts, self._weights, self.places, strict=True):
-            own = weighed(weights, np.nan_to_num(each.slopes(fitted[at]), posinf=0, neginf=0))
+            own = weighted(weights, np.nan_to_num(each.slopes(fitted[at]), posinf=0, neginf=0))
             rows.append(np.zeros((len(own), len(self.coordinates))))
             rows[-1][:, at] = own
         return np.vstack(rows)

@@ -17,7 +17,7 @@ from numpy import ndarray
 from scipy.linalg import solve_banded
 
 from quakedesign.fault import FrictionLaw
-from quakedesign.identification.experiment import Coordinate, Experiment, fitted_quantities, holding
+from quakedesign.identification.experiment import Coordinate, Experiment, fitted_quantities, with_values
 from quakedesign.symbolic.casadi_printer import to_casadi, vectorised
 from quakedesign.symbolic.plant import x1
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
@@ -47,7 +47,7 @@ def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.S
 
 _MOST_STEPS = 30  # mean number of steps per sample; more mean instability, or samples far too sparse for the law
 _SAFETY = 0.9
-_WILD = 1e3  # error of friction above which, or if not finite, it does not give the next length
+_USABLE_ERROR = 1e3  # error of friction above which, or if not finite, it does not give the next length
 _SHORTEST = 1e-8  # share of the time between two samples
 STIFFNESS = "stiffness"
 START_STATE = "start_state"  # logarithm of the ratio of the state at the first sample to that of steady sliding
@@ -131,7 +131,7 @@ class SlidingExperiment(Experiment):
         law, rates = Experiment.best_law(self, fitted), self.rates(fitted)
         ends = {"slowest_rate": float(f"{np.min(rates) / 2:.2g}"), "fastest_rate": float(f"{2 * np.max(rates):.2g}")}
         effect = {"evolution_effect": getattr(law, "evolution_effect", 1.0)}
-        return holding(law, {n: end for n, end in (ends | effect).items() if n in law.quantities()})
+        return with_values(law, {n: end for n, end in (ends | effect).items() if n in law.quantities()})
 
     def resolved(self, fitted: ndarray, accuracy: float) -> "SlidingExperiment":
         """The same experiment with the steps that an accuracy of friction requires at given coordinates.
@@ -196,7 +196,7 @@ def _steps(
                 return None
             after, error = trial(y, [length, *between], fitted)
             off = float(error)
-            factor = min(max((accuracy / max(off, 1e-300)) ** (1 / ORDER), 0.1), 5.0) if off <= _WILD else 0.1
+            factor = min(max((accuracy / max(off, 1e-300)) ** (1 / ORDER), 0.1), 5.0) if off <= _USABLE_ERROR else 0.1
             if factor >= 1:
                 taken.append(length)
                 y, rest = after, (0.0 if length == rest else rest - length)

@@ -52,7 +52,7 @@ class _TwoStates(RateAndState):
     def state_rates(self, slip: sp.Expr, rate: sp.Expr, *state: sp.Expr) -> tuple[sp.Expr, ...]:
         """θ' and θ_2' [-]."""
         first, second = state
-        other = self._holding(
+        other = self._with_values(
             {name: getattr(self, name) for name in self.quantities()} | {"critical_slip": self.second_slip}
         )
         return self.ageing(rate, first), other.ageing(rate, second)

@@ -72,7 +72,7 @@ class MeasuredSlip(_Weakening):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drawn(_Weakening):
+class SpringLoaded(_Weakening):
     """A block at rest until its strength is reached, which then slips until the spring balances friction.
 
     Slip never decreases. With a soft spring, friction falls faster than the spring force and the block jumps. No

@@ -55,13 +55,13 @@ class Layer:
         """ĉ_n [-]."""
         return Fraction((-1) ** number * 4) / (_PI * (2 * number + 1))
 
-    def left_out(self, step: Fraction) -> tuple[Fraction, Fraction, Fraction]:
+    def truncation_bound(self, step: Fraction) -> tuple[Fraction, Fraction, Fraction]:
         """h [-], λ̂_N [1/s] and f [-] of a well whose pressure steps are at least `step` [s] apart."""
         rate, rounding = self.rate(MODES), 6 * MODES * _SHORT
         return abs(self.share(MODES)) * (1 + 1 / (rate * step)), rate, rounding * (1 + self.time / step)
 
     @property
-    def left_out_in_all(self) -> Fraction:
+    def truncation_integral(self) -> Fraction:
         """Bound of ∫|E| [s]."""
         return abs(self.share(MODES)) / self.rate(MODES) + 6 * MODES * _SHORT * self.time
 
@@ -71,7 +71,7 @@ class Layer:
         return self.time / 2 - sum((self.share(n) / self.rate(n) for n in range(MODES)), Fraction(0))
 
     @property
-    def awaited_in_all(self) -> Fraction:
+    def response_integral(self) -> Fraction:
         """Bound of ∫|F| [s²], F(t) = −∫_t^∞ E."""
         return abs(self.share(MODES)) / self.rate(MODES) ** 2 + 6 * MODES * _SHORT * self.time**2
 
@@ -120,7 +120,7 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
         last = replace(last, jump=tuple(map(tuple, kicked)))
         late = fading.weight(last.duration)  # at the sample, which comes before the next step
     else:
-        share, fading, late = layer.awaited_in_all / layer.left_out_in_all, None, Fraction(1)
+        share, fading, late = layer.response_integral / layer.truncation_integral, None, Fraction(1)
         behind = loop.states.index("behind")
         flow = [list(row) for row in loop.flow]
         flow[slip_rate][behind] -= gain * layer.area * flow[behind][behind]
@@ -142,7 +142,7 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
 def _share_and_fading(loop: PeriodicLoop, layer: Layer) -> tuple[Fraction, Fading]:
     """Largest |bY| over the bound of |b·R|, and its decay."""
     (own,) = loop.fading.values()
-    height, rate, floor = layer.left_out(loop.period)
+    height, rate, floor = layer.truncation_bound(loop.period)
     awaited = height / rate, floor * layer.time
     most = sum(awaited)
     return most / (height + floor), replace(own, height=awaited[0] / most, floor=awaited[1] / most)

@@ -230,9 +230,9 @@ def _connected(
     sampled = (*["root"] * (law.root is not None), *["reference_rate"] * bool(law.of_reference))
     left_out, fading = dict[str, Signal](), dict[str, Fading]()
     if modes and lag:
-        left_out["left_out"] = {"behind": layer.left_out_in_all / lag}
+        left_out["left_out"] = {"behind": layer.truncation_integral / lag}
     elif modes:
-        height, rate, floor = layer.left_out(step)
+        height, rate, floor = layer.truncation_bound(step)
         most, entry = height + floor, system.column(of_left_out)
         left_out["left_out"] = {"stepped": most}
         fading["left_out"] = Fading(

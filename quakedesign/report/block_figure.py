@@ -31,7 +31,7 @@ def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> 
                 times, values[:, i] / factor, color=shades[i], linestyle=_LINES[i % 3], linewidth=0.8, label=label
             )
         axis.set_ylabel(f"{title} [{name}]", fontsize=SMALL)
-    if chain.ages:
+    if chain.has_state:
         axes[0, 1].set_yscale("log")
     factor, name = scaled(float(np.abs(run.pressure).max(initial=0.0)) or 1.0, "Pa")
     for j in range(run.pressure.shape[1]):

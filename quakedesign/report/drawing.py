@@ -30,7 +30,7 @@ WIDTH = 7.16  # width of two columns of a printed page [in]
 SMALL = 8  # font size [pt], still readable in print
 NATURAL, INDUCED, PROVED = "#000000", "#CC79A7", "#000000"
 ORIGINS = {"published": (0, (4, 2)), "designed": "solid"}
-"""Line style of every origin, in the order in which they stand side by side."""
+"""Line style of every origin, in the order of the bars."""
 PALE = 0.45
 _NOTE = 115  # characters of the smallest font in a line across a figure
 _LINE = 0.125  # line height of the smallest font [in]
@@ -93,7 +93,7 @@ def figure(
 def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *, legend: Any = None) -> Any:
     """Add to a figure its title above, and below it the legend of one axis (three columns) and the run settings."""
     drawing.suptitle(title, fontsize=SMALL + 2)
-    whole = "; ".join(part for part in (note, made(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
+    whole = "; ".join(part for part in (note, run_settings(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
     rows = wrap(whole, _NOTE, break_on_hyphens=False)
     height, bottom = drawing.get_figheight(), 0.05 + _LINE * len(rows)
     drawing.text(0.5, 0.03 / height, "\n".join(rows), ha="center", va="bottom", fontsize=SMALL - 1, color="#444444")
@@ -113,7 +113,7 @@ def named(axis: Any, title: str) -> None:
     axis.set_title(title, fontsize=SMALL)
 
 
-def made(runs: Iterable["Shown"]) -> str:
+def run_settings(runs: Iterable["Shown"]) -> str:
     """Scheme, step, method and plant of runs: differing settings after the labels of the entries, then common ones."""
     ways: dict[tuple[str, ...], list[str]] = {}
     for shown in runs:
@@ -178,7 +178,7 @@ Format = Literal["svg", "pdf", "png"]
 FORMATS: tuple[Format, ...] = ("svg", "pdf", "png")
 DEFAULT: tuple[Format, ...] = ("svg",)
 _STYLE: dict[str, Any] = {"svg.fonttype": "none", "pdf.fonttype": 42, "ps.fonttype": 42}
-"""Letters stay letters: as such in SVG, as TrueType, which journals ask for, in PDF."""
+"""Text is stored as text in SVG, and as TrueType fonts, which journals require, in PDF."""
 _UNDATED: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
@@ -229,7 +229,7 @@ def file_names(name: str, formats: Sequence[str]) -> str:
 # Figures as SVG inside a page: compact, with the colours of the page, and with axis data to read values by pointer.
 
 _INKS = {"#000000": "var(--ink)", "#444444": "var(--soft)", "#b0b0b0": "var(--line)", "#cccccc": "var(--line)"}
-"""Colours of frames, letters and grids; those of the curves stay."""
+"""Page colours of frames, text and grids; curves keep their colours."""
 _PAPER = "#ffffff"
 
 
@@ -296,7 +296,7 @@ def _side(axis: Any, label: str) -> dict[str, Any]:
 Drawn = tuple[bytes, Markup]
 
 
-def drawn_once(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
+def cached_figures(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str], shown: Any) -> dict[str, Drawn]:
     """SVG files of figures by name, and their elements for a page; from the cache if the same were drawn before.
 
     Parameters

@@ -10,11 +10,11 @@ from markupsafe import Markup
 
 from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
-from quakedesign.files import require_room, whole_folder, write_whole
+from quakedesign.files import require_writable, whole_folder, write_whole
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.lyapunov import certificate_text
 from quakedesign.report.comparison_table import Comparison
-from quakedesign.report.drawing import DEFAULT, drawn_once, figure_bytes, write_results
+from quakedesign.report.drawing import DEFAULT, cached_figures, figure_bytes, write_results
 from quakedesign.report.page import CAPTIONS, page_html, reproduction, versions
 from quakedesign.report.paper_figures import PAPER
 from quakedesign.report.tables import csv_text
@@ -33,7 +33,7 @@ def prepare(out: Path, *, force: bool) -> None:
         )
     if os.path.exists(out) and not (out / "results.json").is_file():
         raise OutputError(f"only a folder with results.json is replaced. Received {out}. Choose another --out.")
-    require_room(out)
+    require_writable(out)
 
 
 def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
@@ -151,7 +151,7 @@ def _write_figures(
     draw = cache(shown.figures)
     tell("figures", 0.0)
     inside = {}
-    for name, (vector, inside[name]) in drawn_once(draw, CAPTIONS, shown).items():
+    for name, (vector, inside[name]) in cached_figures(draw, CAPTIONS, shown).items():
         for kind in formats:
             data = vector if kind == "svg" else figure_bytes(draw()[name], kind, name)
             (folder / "figures" / f"{name}.{kind}").write_bytes(data)

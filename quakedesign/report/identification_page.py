@@ -50,7 +50,7 @@ def identification_lines(result: Identification | Steps, *, verbose: bool = Fals
     but = [f"But {each}." for each in assessment.cautions]
     more = [f"open too: {each}" for each in assessment.open[1:4] if unclear]
     more += [f"would tell: {each}" for each in assessment.experiments if unclear]
-    more += [*(f"- {each}" for each in result.untold()), f"try: {'; '.join(result.to_try())}"] if refused else []
+    more += [*(f"- {each}" for each in result.undetermined()), f"try: {'; '.join(result.to_try())}"] if refused else []
     failed = [check.sentence for check in assessment.checks if not check.passed]
     more += [f"not passed: {each}" for each in failed if each not in (*assessment.open, *assessment.cautions)]
     shown = [each for each in result.estimates.values() if verbose or not each.name.startswith(DELAY)]
@@ -125,7 +125,7 @@ def _warnings(identification: Identification) -> list[str]:
     if critical is not None and evolves and not _SHORT <= critical.value <= _LONG:
         size = critical.value
         long = f"{1e9 * size:.3g} nm is far shorter" if size < _SHORT else f"{100 * size:.3g} cm is far longer"
-        notes.append(f"D_c of {long} than the some 1 to 100 µm of laboratories: check the unit of the displacement")
+        notes.append(f"D_c of {long} than in laboratories (1 µm to 100 µm): check the unit of the displacement")
     if (correlated := identification.fit.correlated) is not None and correlated.share:
         size = identification.fit.noise * correlated.share**0.5
         length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
@@ -224,7 +224,7 @@ def identification_figure(identification: Identification) -> Any:
         _profile(axis, each, fit)
         axis.tick_params(labelleft=i == 0)
         axis.set_ylabel("" if i else "distance [deviations]", fontsize=SMALL)
-    note = f"dashed: twice the noise, {fit.noise:.3g}; crosses beyond eight times it stand at its edge; profiles: "
+    note = f"dashed: twice the noise, {fit.noise:.3g}; crosses at the edge: beyond eight times the noise; profiles: "
     note += "dashed at 95 % of one parameter, dotted of all at once"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
     return finish(drawing, title, [], note, legend=axes["friction"])

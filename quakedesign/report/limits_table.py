@@ -51,7 +51,7 @@ def _meaning(limits: Limits) -> list[str]:
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
     signals = "knows slip, slip rate and disturbance"
     if limits.sensing.noisy:
-        signals = f"measures {limits.sensing.words()}"
+        signals = f"measures {limits.sensing.summary()}"
     lines = [
         "infeasible: every controller, linear or not, fails for some friction of the box and some disturbance of the "
         "stated size, which may jump",
@@ -162,7 +162,7 @@ def limits_figure(limits: Limits) -> Any:
         if limits.sensing.noisy:
             exact = [float(peak) for _, peak in limits.smallest_peaks(measured=False)]
             axis.fill_between(
-                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and with measurements of {limits.sensing.words()}"
+                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and with measurements of {limits.sensing.summary()}"
             )
         axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
     if limits.achieved:

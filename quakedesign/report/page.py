@@ -27,7 +27,6 @@ from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.lyapunov import Verdict
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
-    beside_guarantee,
     cycle_sentences,
     domain_sentence,
     feedforward_rows,
@@ -37,6 +36,7 @@ from quakedesign.report.sentences import (
     run_sentences,
     scheme_sentence,
     sentences,
+    without_stated_reason,
 )
 from quakedesign.report.summary import SUMMARY_COLUMNS, summary, summary_cells
 from quakedesign.report.tables import COLUMNS, rows
@@ -105,7 +105,7 @@ ASKED = {
     "pressure_at_rest": "the pressure that the task needs lies inside the limits of the law",
     "differentiator": "the slip rate is estimated by a differentiator that is fast enough",
 }
-"""What every premise asks, in words; those of users' laws by their own notes."""
+"""Condition of every premise in words; premises of user-defined laws have notes instead."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,7 +136,7 @@ def accounts(comparison: "Compared") -> list[Account]:
     return [_account(entry) for origin in ("designed", "published") for entry in comparison.of(origin)]
 
 
-def _cards(every: Iterable[Account]) -> list[Account]:
+def _shared_accounts(every: Iterable[Account]) -> list[Account]:
     """Accounts; controllers with equal statements share one."""
     cards: dict[tuple[Any, ...], Account] = {}
     for one in every:
@@ -162,7 +162,7 @@ def _account(entry: "Entry") -> Account:
         guarantee=[line for line in guaranteed if line not in (*limits, *compensated)],
         run=run,
         limits=limits,
-        verdict=beside_guarantee([sentence for sentence in sentences(entry) if sentence not in run], entry),
+        verdict=without_stated_reason([sentence for sentence in sentences(entry) if sentence not in run], entry),
         proof=[
             *compensated,
             *([f"it runs in the scheme {sampling.scheme}, once every {float(sampling.step):g} s"] if sampling else []),
@@ -306,7 +306,7 @@ def parameter_rows(fault: Fault) -> list[Row]:
 
     No disturbance for friction with a state: the disturbance of such a fault is the stress of its guarantee.
     """
-    refused = fault.friction.equilibrium.refused
+    refused = fault.friction.equilibrium.messages
     rows = [
         *_field_rows(fault, PLANT, "fault"),
         *_field_rows(fault.friction, fault.friction.quantities(), "friction"),
@@ -445,7 +445,7 @@ def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Repro
             plant=[mathml(equation) for equation in plant_latex(comparison.fault)],
             **_tables(comparison),
             accounts=every,
-            cards=_cards(every),
+            cards=_shared_accounts(every),
             schemes=scheme_sentence(comparison),
             limits=_limits(comparison, every),
             feedforward_columns=FEEDFORWARD_COLUMNS,
@@ -501,11 +501,11 @@ def _limits(comparison: "Compared", every: list[Account]) -> list[str]:
 
 
 _of_runs = by_equilibrium(
-    rest=lambda fault, comparison: (*REST_LIMITS, _way(comparison)), sliding=lambda fault, comparison: SLIDING_LIMITS
+    rest=lambda fault, comparison: (*REST_LIMITS, _loop_stages(comparison)), sliding=lambda _, __: SLIDING_LIMITS
 )
 
 
-def _way(comparison: "Compared") -> str:
+def _loop_stages(comparison: "Compared") -> str:
     """Actuator stages and diffusion path of the runs, in words."""
     paths = (e.design.setup.path.items() for e in comparison.of("designed"))
     stages = dict.fromkeys(f"{_WAYS[name]} {float(time):.4g} s" for path in paths for name, time in path if time)

@@ -48,7 +48,7 @@ PAPER = {
     "friction-coefficient": "figure 11",
     "errors-and-power": "figures 8 and 12",
 }
-"""Figures of the paper, by number, that each of ours is about."""
+"""Corresponding figures of the paper, by name of our figure."""
 
 
 def paper_figures(study: "PaperRuns") -> dict[str, Any]:
@@ -195,7 +195,7 @@ def _notes(axis: Any, basis: "Entry") -> None:
     """Write the reference values of the ratios into the free panel."""
     run = basis.run
     assert run is not None
-    lines = [f"1 stands for {basis.label}:", ""]
+    lines = [f"ratio 1 is {basis.label}:", ""]
     for name, title in BARS.items():
         lines.append(
             f"{title.replace(chr(10), ' ')}: {getattr(run.metrics, name):.3g} {_superscript(run.metrics.unit(name))}"

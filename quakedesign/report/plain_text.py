@@ -63,9 +63,7 @@ def _similarity_lines(result: Mapping[str, Any]) -> list[str]:
         worst = max(abs(group["ratio"] - 1) for group in result["differing"])
         count = len(result["differing"])
         return [f"similar within {percent:g} %: {count} π-groups differ, by at most {100 * worst:.2g} %"]
-    lines = [
-        f"NOT similar within {percent:g} %: the two loops are no copies of each other, because these groups differ:"
-    ]
+    lines = [f"NOT similar within {percent:g} %: neither loop is a scaled copy of the other, as these π-groups differ:"]
     lines += [f"  {g['formula']}: {_short(g['source'])} and {_short(g['target'])}{_ratio(g)}" for g in far]
     return lines + [f"  {name} is not the same quantity in both faults" for name in result["unmatched"]]
 

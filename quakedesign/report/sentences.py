@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 # Scope of a proof: the simulated loop and its task, or the premises that fail, and by how much.
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
-"""Premises of a linear law's stability that its certified peaks do not need."""
+"""Premises of the stability of a linear law that its certified peaks do not require."""
 
 
 def grade(entry: "Entry") -> str:
@@ -102,7 +102,7 @@ def _hold_gaps(entry: "Entry") -> list[str]:
 # First sentences about a run: outcome, pressure, and whether this pressure was sufficient.
 
 _NEGLIGIBLE = 1e-6
-"""Of the larger end of a range of pressures: a smaller end is said to be zero."""
+"""Relative to the larger end of a range of pressures: a smaller end is printed as zero."""
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
@@ -138,11 +138,11 @@ def pressure_sentence(least: float, largest: float) -> str:
     """Range of a pressure [Pa], and whether it is withdrawal or injection."""
     nothing = _NEGLIGIBLE * max(abs(least), abs(largest))
     shown = (value if abs(value) > nothing else 0.0 for value in (least, largest))
-    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_way(value)}" for value in shown]
+    parts = [f"{value / 1e6 + 0.0:.3g} MPa{_direction(value)}" for value in shown]
     return f"pressure from {parts[0]} to {parts[1]}"
 
 
-def _way(pressure: float) -> str:
+def _direction(pressure: float) -> str:
     return " (withdrawal)" if pressure < 0 else " (injection)" if pressure > 0 else ""
 
 
@@ -240,15 +240,15 @@ def guarantee_lines(entry: "Entry") -> list[str]:
     reason = entry.design.details.get("reason") if entry.guarantee.proved else None
     too_long = [f"{entry.design.other_step_first}: {reason}"] if reason else []
     first, *rest = entry.guarantee.lines()
-    return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_reach(entry)]
+    return [*too_long, f"guarantee: {first.removeprefix('proved: ')}", *rest, *_longest_step_and_delay(entry)]
 
 
 def limit_lines(entry: "Entry") -> list[str]:
     """The limits in `guarantee_lines`: for every controller, and for designs of this kind."""
-    return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_reach(entry)]
+    return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_longest_step_and_delay(entry)]
 
 
-def _reach(entry: "Entry") -> list[str]:
+def _longest_step_and_delay(entry: "Entry") -> list[str]:
     """Longest T_s and delay for designs of the same kind, as far as the design search tests them."""
     certified = {p.name: p.certified for p in entry.design.premises if p.name in ("sampling_time", "delay")}
     if not certified:
@@ -256,7 +256,7 @@ def _reach(entry: "Entry") -> list[str]:
     step, delay = (LowerBound(Fraction(certified[name])) for name in ("sampling_time", "delay"))
     law = entry.design.controller
     own = f"at T_s = {law.sampling_time:.6g} s" if law and law.sampling_time else "at the fault's own T_s"
-    late = f"for delays up to at least {delay:.3g} s" if delay else "no delay was found with one"
+    late = f"for delays up to at least {delay:.3g} s" if delay else "none was found with a delay"
     return [f"designs have a guarantee for T_s up to at least {step:.3g} s, and {own} {late}"]
 
 
@@ -282,7 +282,7 @@ def remarks(entry: "Entry") -> list[str]:
     return every[_fitting(every) :]
 
 
-def beside_guarantee(lines: Sequence[str], entry: "Entry") -> list[str]:
+def without_stated_reason(lines: Sequence[str], entry: "Entry") -> list[str]:
     """Sentences about a controller, without a reason that its `guarantee_lines` already state."""
     reason, guaranteed = entry.design.details.get("reason"), " ".join(guarantee_lines(entry))
     stated = bool(reason) and str(reason) in guaranteed
@@ -371,10 +371,10 @@ def _premises(entry: "Entry") -> list[str]:
     else:
         scheme = entry.run.provenance["scheme"] if entry.run else AS_IN_THE_PAPER
         texts += (
-            [] if scheme == AS_IN_THE_PAPER else [f"in this run has zero-order hold over every step, scheme {scheme}"]
+            [] if scheme == AS_IN_THE_PAPER else [f"this run has a zero-order hold over every step (scheme {scheme})"]
         )
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
-        texts.append(f"it would stay inside for T_s up to about {entry.largest_step:g} s")
+        texts.append(f"the run satisfies the proved bound on |h'| for T_s up to about {entry.largest_step:g} s")
     return texts
 
 
@@ -453,7 +453,7 @@ _SAID = {
 _MOST_EVENTS = 8
 _LOCKED = 0.5  # share of the loading: a fault that slips less stores the rest
 FASTEST_PLATE = 1e-8
-"""Loading rate [m/s] above that of every plate: 0.3 m a year."""
+"""Loading rate [m/s] that no tectonic plate exceeds: 0.3 m per year."""
 _LABORATORY = 10.0  # length of a fault [m] below which a machine loads it
 
 
@@ -470,7 +470,7 @@ def state_run_lines(result: dict[str, Any]) -> list[str]:
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa",
     ]
     if result["resting"]:
-        lines.append("steady sliding is unstable here, but nothing disturbs it: start late, or give a pressure")
+        lines.append("steady sliding is unstable here, but nothing disturbs it: use --start late, or set a pressure")
     if outcome["kind"] == "creep" and result["slip"] < _LOCKED * result["loading_rate"] * result["duration"]:
         lines.append(
             "it is not in steady creep: it slips far less than it is loaded, and the run ends before the event; set a "
@@ -509,7 +509,7 @@ def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
     """Beginning of run and proof of slow sliding, and the share of an earthquake's slip in their task."""
     task = fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
-    text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; bringing a locked fault there is not"
+    text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; the way there from rest is not"
     share = (
         ""
         if slip is None

@@ -157,7 +157,7 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
     others = [(e.design.title, e.proof.scope) for e in designed if e.proof and e.proof.scope]
     if others and best is not None and best.proof is not None and not best.proof.scope:
         yield f"{', '.join(title for title, _ in others)}: proved {others[0][1]}"
-    yield from _alike(designed)
+    yield from _equal_bounds(designed)
     published: dict[str, list[str]] = {}
     for entry in comparison.of("published"):
         published.setdefault(_published(grade(entry)), []).append(entry.design.title)
@@ -193,7 +193,7 @@ def _published(verdict: str) -> str:
     return f"not proved here: the proof is for continuous time{violated}{verdict}"
 
 
-def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
+def _equal_bounds(designed: Sequence["Entry"]) -> Iterator[str]:
     """Reason why two sliding modes have the same bounds."""
     sliding = [(e, e.proof, e.guarantee.compensation) for e in designed if e.guarantee and e.guarantee.compensation]
     same = [entry for entry, proof, law in sliding if proof and law.deadbeat]
@@ -208,7 +208,7 @@ def _alike(designed: Sequence["Entry"]) -> Iterator[str]:
 # ----------------------------------------------------------------------
 # The table with units in its cells, for pages.
 
-_NUMBERED = (f"{of} {kind}" for of in ("slip rate", "slip error") for kind in ("proved", "worst found", "run"))
+_NUMBERED = (f"{of} {kind}" for of in ("slip rate", "slip error") for kind in ("proved", "worst case found", "run"))
 SUMMARY_COLUMNS = ("controller", "outcome", *_NUMBERED, "pressure")
 
 

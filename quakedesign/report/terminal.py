@@ -8,7 +8,6 @@ from rich.table import Table
 from quakedesign.report.comparison_table import Comparison
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
-    beside_guarantee,
     cycle_sentences,
     domain_sentence,
     feedforward_rows,
@@ -19,6 +18,7 @@ from quakedesign.report.sentences import (
     remarks,
     run_sentences,
     scheme_sentence,
+    without_stated_reason,
 )
 from quakedesign.report.summary import summary, summary_lines
 from quakedesign.report.tables import COLUMNS, rows
@@ -71,7 +71,7 @@ def _whole(entry: "Entry") -> list[str]:
     others = [premise for premise in entry.design.premises if premise not in entry.design.conditions]
     return [
         *guarantee_lines(entry),
-        *beside_guarantee([headline(entry), *remarks(entry)], entry),
+        *without_stated_reason([headline(entry), *remarks(entry)], entry),
         _gains(entry),
         *map(_line, entry.design.conditions),
         *(["of the certificate of its base gains, in continuous time:"] if others else []),

@@ -97,7 +97,7 @@ def decided(chain: BlockChain, law: Any, count: ca.SX, x: ca.SX, v: ca.SX, z: ca
         States of the law.
     """
     weights, time = ca.DM(np.array(measured_by(chain.shares), dtype=float)), count * float(law.step)
-    if chain.ages:
+    if chain.has_state:
         r, unit = SlidingReference(task=chain.fault.reference).slip(time), MPA
         seen = weights @ x - r
     else:

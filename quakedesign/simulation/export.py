@@ -20,10 +20,10 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import BlockChain, Fault
 from quakedesign.fault.model import require_positive
-from quakedesign.files import require_room, temporary_folder, whole_folder, write_whole
+from quakedesign.files import require_writable, temporary_folder, whole_folder, write_whole
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme, simulation_scheme
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.schemes.base import Sampled
 from quakedesign.simulation.block_run import decided
 from quakedesign.simulation.closed_loop import ClosedLoop
@@ -301,7 +301,7 @@ def controller_step(
         differs from that of the sensor.
     """
     fault.require_memoryless("a controller in C")
-    scheme, step, own = own_way(controller, scheme, step)
+    scheme, step, own = scheme_of_run(controller, scheme, step)
     period = fault.sampling_time if step is None else step
     require_positive(step=period)
     chosen = _software(simulation_scheme(scheme, **own) if isinstance(scheme, str) else scheme)
@@ -397,13 +397,13 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
 
     """
     N, states = len(chain.blocks), [f"state_{i + 1}" for i in range(len(law.update))]
-    measured = (("slip", "m"),) if chain.ages else (("slip", "m"), ("slip_rate", "m/s"))
+    measured = (("slip", "m"),) if chain.has_state else (("slip", "m"), ("slip_rate", "m/s"))
     measurement, memory = ca.SX.sym("measurement", len(measured) * N), ca.SX.sym("memory", 1 + len(states))
     count, z = ca.vertsplit(memory, [0, 1, 1 + len(states)])
     pressures, later = decided(chain, law, count, measurement[:N], measurement[N:], z)
     outputs = ca.cse([ca.vertcat(count + 1, later), ca.densify(pressures)])
     known = {"fault": chain.name, "blocks": str(N), "wells [m]": _text(chain.wells)}
-    if chain.ages:
+    if chain.has_state:
         task, course = chain.fault.reference, "d((1 - c)t/T + c s^3(10 - 15s + 6s^2)), s = min(t/T, 1)"
         values = f"d = {task.target_slip!r} m, T = {task.operation_time!r} s, c = {task.ramp or 0.0!r}"
         known |= {_PLAN: f"{planned_per_slip(chain)!r} Pa/m times r(t), r = {course}, {values}"}
@@ -425,7 +425,7 @@ def require_free(folder: Path, force: bool) -> None:
         )
     if os.path.exists(folder) and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= set(FILES)):
         raise OutputError(f"only a folder with {', '.join(FILES)} is replaced. Received {folder}. Choose a new folder.")
-    require_room(folder)
+    require_writable(folder)
 
 
 def _software(scheme: Scheme) -> Sampled:
@@ -464,7 +464,7 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     state = ca.vertcat(measurement, ca.SX(2 - measured, 1), *own)
     moved = _after(loop, scheme, counter, state, step)
     later = [counter + 1, *(moved[i] for i, c in enumerate(changing) if c)]
-    later += [scheme.push(loop, counter, state, step), *own[:count]] if count else []
+    later += [scheme.integral_effect(loop, counter, state, step), *own[:count]] if count else []
     outputs = ca.cse([ca.vertcat(*later), scheme.pressure(loop, counter, state, step)])
     return ca.Function("sampled_step", [measurement, applied, memory], outputs), start
 

@@ -187,7 +187,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})
     found, unknown = control_step(scheme.__class__, DiscreteLaw.of(controller, 0.0)), ca.SX.sym("unknown")
     own = [symbol.name for symbol in integral_symbols(controller)]
-    names = [*own, *(f"memory_{i}" for i in range(len(scheme.starts))), "held"]
+    names = [*own, *(f"memory_{i}" for i in range(len(scheme.initial_memory))), "held"]
     state, seen = ca.SX.sym("state", len(names)), ca.SX.sym("seen", len(_SEEN))
     signals = [
         seen[:2],
@@ -207,7 +207,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
         )
     used = [i for i in range(len(names)) if ca.depends_on(later, state[i]) and not ca.is_equal(later[i], state[i])]
     fixed = [i for i in range(len(names)) if i not in used]
-    starts = ca.DM([*[0.0] * len(own), *scheme.starts, 0.0])
+    starts = ca.DM([*[0.0] * len(own), *scheme.initial_memory, 0.0])
     later, pressure = ca.substitute([later[used], pressure], [state[fixed]], [ca.SX(starts[fixed])])
     step = ca.Function("step", [state[used], seen], [later, pressure])
     return control.NonlinearIOSystem(

@@ -156,7 +156,7 @@ def sampled_scheme(
     """Scheme with the loop setup of the controller, from the arguments of `simulate`.
 
     An actuator without stages and a measurement without noise are ignored, so that every scheme accepts them. `numbers`
-    are those of a sampled law for its scheme, see `own_way`.
+    are those of a sampled law for its scheme, see `scheme_of_run`.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.model import require_nonnegative
 from quakedesign.laws import Controller
 from quakedesign.loop import Actuator, Scheme
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.sensing import Sensor, Transducer
 from quakedesign.simulation.closed_loop import Load, Variation
 from quakedesign.simulation.earthquake import natural_peak
@@ -166,7 +166,7 @@ def simulate(
         if controller is None:
             return _uncontrolled(fault, plant_name, method, duration, samples, inapplicable)
         law, path = _sampled_law(fault, controller, actuator, inapplicable)
-        own_way(controller, scheme, step)
+        scheme_of_run(controller, scheme, step)
         return simulate_sliding(
             fault,
             law.of_slip,
@@ -192,7 +192,7 @@ def simulate(
                 f"{fault.friction.name}. Give a load, a variation or a measurement."
             )
         require_tolerance(rtol)
-        way, period, own = own_way(controller, scheme, step, "continuous")
+        way, period, own = scheme_of_run(controller, scheme, step, "continuous")
         period, own = with_aperiodic_clock(controller, way, period, own)
         setting = RunSetting.of(fault, period, duration, samples, settled_from)
         if variation:

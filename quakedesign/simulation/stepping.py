@@ -220,7 +220,7 @@ def run_key(
 
 def recall_run(key: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
     """Cached vectors, one a column, and backend with its reason as in the provenance of a run; None if not cached."""
-    if not key or (content := cache.recall("run", *key)) is None:
+    if not key or (content := cache.load("run", *key)) is None:
         return None
     with np.load(BytesIO(content), allow_pickle=False) as kept:
         entries = {name: str(kept[name]) for name in kept.files if name != "vectors"}
@@ -232,4 +232,4 @@ def store_run(key: tuple[bytes, ...], vectors: "np.ndarray", entries: dict[str, 
     if key and entries["backend"] == "compiled":
         content = BytesIO()
         np.savez(content, allow_pickle=False, vectors=vectors, **{name: np.array(entries[name]) for name in entries})
-        cache.keep("run", content.getvalue(), *key)
+        cache.store("run", content.getvalue(), *key)

@@ -83,7 +83,7 @@ class ChainLimits:
         """The result as lines of at most 80 characters."""
         chain = self.chain
         assumed = [f"(box {chain.fault.box.name}, every block at its steepest friction, for constant disturbances)"]
-        if chain.ages:
+        if chain.has_state:
             V = quantity(float(mean_rate(chain.fault)), "m/s")
             assumed = [f"(linearised about steady sliding of every block at {V} and the pressure 0,"]
             assumed += [f"without inertia, constants as they are, T_s = {chain.fault.sampling_time:g} s)"]
@@ -101,14 +101,14 @@ class ChainLimits:
             + "  slips of the blocks",
             *(f"{place:4}{mode.row()}" for place, mode in enumerate(self.modes, 1)),
         ]
-        if chain.ages and self.stress is None:
+        if chain.has_state and self.stress is None:
             parts += ["", "--stress gives the pressure, T_s and distance of wells that every controller needs"]
         if self.slip_rate_error:
             rates = ", ".join(quantity(v, "m/s") for v in self.slip_rate_error)
             parts += ["", f"infeasible: slip-rate errors below {rates}"]
         escaping = sum(not mode.reached for mode in self.modes)
         if escaping:
-            parts += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')} out of reach"]
+            parts += ["", f"infeasible for every controller: {counted(escaping, 'unstable mode')}, reached by no well"]
         most, needs = max(b.effective_normal_stress for b in chain.blocks), [m.pressure or 0 for m in self.modes]
         if chain.diffusivity and max(needs, default=0) > most:
             parts += ["", f"a mode needs more than the effective normal stress, {quantity(most, 'Pa')}: move the wells"]
@@ -118,7 +118,7 @@ class ChainLimits:
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; null if no well reaches a mode, if it oscillates, or without a stress."""
         modes, values = [asdict(mode) for mode in self.modes], {"fault": self.chain.name, "feasible": self.feasible}
-        if not self.chain.ages:
+        if not self.chain.has_state:
             shown = ("pole", "shape", "reached", "pressure")
             return values | {"modes": [{name: mode[name] for name in shown} for mode in modes]}
         beside = {name: getattr(self, name) for name in ("stress", "largest_pressure", "diffusivity")}
@@ -156,7 +156,7 @@ def chain_limits(
     ParameterError
         For modes that floating point cannot distinguish, and for numbers that are not positive.
     """
-    if not chain.ages:
+    if not chain.has_state:
         if {stress, pressure, diffusivity} != {None}:
             raise ParameterError(
                 "stress, pressure and diffusivity of limits of several blocks need friction with a state. Received "

@@ -113,12 +113,12 @@ def _results(
     name: str, gains: tuple[Number, ...], lipschitz: Number | None, maximize: str | None, ends: "Ends"
 ) -> "Results":
     if maximize == "lipschitz":
-        return _of_reach(name, gains, largest_lipschitz(name, gains, gain_range=ends), ends, lipschitz)
+        return _of_limit(name, gains, largest_lipschitz(name, gains, gain_range=ends), ends, lipschitz)
     if maximize in ("beta", "beta-factor"):
         reach = largest_gain_range(
             name, gains, lipschitz=str(lipschitz), nominal=ends[0], symmetric=maximize == "beta-factor"
         )
-        return _of_reach(name, gains, reach, ends, lipschitz)
+        return _of_limit(name, gains, reach, ends, lipschitz)
     return _at(name, gains, str(lipschitz), ends, decay=maximize == "decay")
 
 
@@ -142,11 +142,11 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
     """Verdict for one bound, with the decay if requested."""
     loop = closed_loop(name, gains, lipschitz=lipschitz, gain_range=ends)
     limit, bound, fast = necessary_limit(loop, name), rational(lipschitz, "lipschitz"), None
-    hopeless = limit is not None and bound >= limit
-    if decay and not hopeless:
+    infeasible = limit is not None and bound >= limit
+    if decay and not infeasible:
         fast = fastest_settling(name, gains, lipschitz=lipschitz, gain_range=ends, start=bound or Fraction(1))
     refuted = None if fast else refute(loop, name)
-    certificate = fast[0] if fast else refuted or (None if hopeless else proof(loop, name))
+    certificate = fast[0] if fast else refuted or (None if infeasible else proof(loop, name))
     proved = certificate is not None and refuted is None
     kind = "none" if proved else against(loop, refuted)
     excluded = [] if proved or kind == "exact" else _excluded(loop)
@@ -160,9 +160,9 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
         counterexample=kind,
         dual=excluded,
     )
-    lines = [_limit_line(limit), *(["the bound is at or beyond that limit"] if hopeless else [])]
+    lines = [_limit_line(limit), *(["the bound is at or beyond that limit"] if infeasible else [])]
     lines += _settling_lines(settling) if settling else ["no decay rate was found"] if decay else []
-    return certificate, values, lines + _nothing_lines(certificate, kind, excluded)
+    return certificate, values, lines + _refutation_lines(certificate, kind, excluded)
 
 
 def _excluded(loop: Loop) -> list[int]:
@@ -176,7 +176,7 @@ def _excluded(loop: Loop) -> list[int]:
     return list(takewhile(lambda degree: dual(loop, degree) is not None, small))
 
 
-def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[int]) -> list[str]:
+def _refutation_lines(certificate: Certificate | None, kind: str, excluded: list[int]) -> list[str]:
     if _verdict(certificate) is Verdict.PROVED:
         return []
     if kind == "exact":
@@ -185,10 +185,10 @@ def _nothing_lines(certificate: Certificate | None, kind: str, excluded: list[in
     if not excluded:
         return [_AGAINST[kind], "no exact dual was found"]
     family = f"no sum of even signed monomials of degree {degrees}"
-    return [_AGAINST[kind], f"an exact dual was found: {family} is positive and falls, whatever the proof"]
+    return [_AGAINST[kind], f"an exact dual was found: {family} is positive and decreases along all solutions"]
 
 
-def _of_reach(
+def _of_limit(
     name: str, gains: tuple[Number, ...], reach: CertifiedLimit, ends: Ends, lipschitz: Number | None
 ) -> Results:
     """Largest certified L̄ or range of β of given gains."""
@@ -219,7 +219,7 @@ def _of_reach(
         scale_limit=_text(least),
         solves=reach.solves,
     )
-    lines = [*_reach_lines(reach), *_nothing_lines(reach.certificate, kind, excluded), _limit_line(limit)]
+    lines = [*_reach_lines(reach), *_refutation_lines(reach.certificate, kind, excluded), _limit_line(limit)]
     if scale is not None:
         lines.append(f"the bound {lipschitz} needs gains scaled by lambda >= {UpperBound(scale)}")
     return reach.certificate, values, lines
@@ -235,7 +235,7 @@ def _reach_lines(reach: CertifiedLimit) -> list[str]:
     if reach.beyond is None and reach.sharp:
         return [text, "which is within 1e-4 of what no Lyapunov function can exceed"]
     if reach.beyond is None:
-        return [text, "the search stopped there, as there seems to be no end"]
+        return [text, "the search stopped there and met no upper limit"]
     beyond = f"at {UpperBound(reach.beyond)} the search finds none of degree {degrees}"
     return [text, beyond if reach.sharp else f"{beyond}; in between it is not known"]
 
@@ -243,7 +243,7 @@ def _reach_lines(reach: CertifiedLimit) -> list[str]:
 def _limit_line(limit: Fraction | None) -> str:
     if limit is None:
         return "no necessary limit of |h'| is known for this law"
-    return f"necessary limit: from |h'| = {UpperBound(limit)} on nothing can be proved of these gains"
+    return f"necessary limit: no certificate of these gains exists for a bound |h'| >= {UpperBound(limit)}"
 
 
 def _settling_values(settling: Settling | None) -> dict[str, Any] | None:
@@ -341,5 +341,5 @@ def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory
     premise = on_trajectory(limit if lipschitz is None else lipschitz, run)
     if premise is None or lipschitz is not None:
         return premise
-    text = f"{premise.note}; no certificate is at hand, and none of these gains exceeds {limit:.4g} {premise.unit}"
+    text = f"{premise.note}; no certificate was given, and none of these gains exceeds {limit:.4g} {premise.unit}"
     return replace(premise, certified=0.0, proved=False, note=text)

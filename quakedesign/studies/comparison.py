@@ -162,7 +162,7 @@ class Compared:
 def compared(
     fault: Fault,
     designs: Iterable[tuple[Design, bool]],
-    tell: Tell,
+    progress: Tell,
     *,
     with_published: bool = True,
     whole_task: bool = False,
@@ -178,23 +178,23 @@ def compared(
     fault.friction.require(plant=plant)
     for name in schemes.values():
         simulation_scheme(name)
-    tell("uncontrolled", 0.0)
+    progress("uncontrolled", 0.0)
     if fault.friction.equilibrium is STEADY_SLIDING:
-        return _slowly_compared(fault, [designed for designed, _ in designs], tell, whole=whole_task)
+        return _slowly_compared(fault, [designed for designed, _ in designs], progress, whole=whole_task)
     begun: list[tuple[Entry, Future[Trajectory] | None]] = []
     with in_background() as runs:
         uncontrolled = runs.submit(natural_earthquake, fault, plant=plant)
         for controller in published(fault.name).values() if with_published else ():
-            tell(f"{controller.title} (published): verdict", 0.0)
+            progress(f"{controller.title} (published): verdict", 0.0)
             begun.append(_begun("published", assess(fault, controller), schemes, runs, plant))
         for designed, given in designs:
             begun.append(_begun("designed", designed, schemes, runs, plant, given=given))
-            tell(f"{begun[-1][0].label}: worst cases", 0.0)
+            progress(f"{begun[-1][0].label}: worst cases", 0.0)
             result = _guarantee_of(fault, designed, given=given)
             begun[-1] = replace(begun[-1][0], guarantee=result), begun[-1][1]
-        natural = runs.result(uncontrolled, partial(tell, "uncontrolled"))
+        natural = runs.result(uncontrolled, partial(progress, "uncontrolled"))
         entries = [
-            entry if run is None else _ended(entry, runs.result(run, partial(tell, entry.label)), tell)
+            entry if run is None else _ended(entry, runs.result(run, partial(progress, entry.label)), progress)
             for entry, run in begun
         ]
     return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
@@ -223,15 +223,15 @@ def _guarantee_of(fault: Fault, design: Design, *, given: bool) -> Guarantee | N
     return result if proof.proved or design.runs else replace(result, given=True)  # only T_s of the fault was tried
 
 
-def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, whole: bool) -> Compared:
+def _slowly_compared(fault: Fault, designs: Sequence[Design], progress: Tell, *, whole: bool) -> Compared:
     """Comparison for friction with a state: seismic cycle, and designs with their runs."""
     natural = natural_run(fault)
     entries = []
     for designed in designs:
         entry = Entry(label=f"{designed.title} (designed)", origin="designed", design=designed, run=None)
         if designed.controller is not None:
-            progress = partial(tell, entry.label)
-            entry = replace(entry, run=designed_run(designed, natural.natural_peak, progress, whole=whole))
+            peak, told = natural.natural_peak, partial(progress, entry.label)
+            entry = replace(entry, run=designed_run(designed, peak, told, whole=whole))
         entries.append(replace(entry, guarantee=designed.sliding))
     return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
 
@@ -239,14 +239,14 @@ def _slowly_compared(fault: Fault, designs: Sequence[Design], tell: Tell, *, who
 def designs_of(
     fault: Fault,
     names: Iterable[str],
-    tell: Tell,
+    progress: Tell,
     options: Mapping[str, Any] | None = None,
 ) -> Iterator[Design]:
     """Designs of the named laws, one after the other, with options of `quakedesign.design`."""
     wanted = list(names)
     for i, name in enumerate(wanted):
-        tell(f"synthesis and proof of {name}", i / len(wanted))
-        yield synthesise(fault, name, progress=tell, **(options or {}))
+        progress(f"synthesis and proof of {name}", i / len(wanted))
+        yield synthesise(fault, name, progress=progress, **(options or {}))
 
 
 def _begun(
@@ -265,24 +265,24 @@ def _begun(
     return entry, runs.submit(simulate, design.fault, design.controller, **options)
 
 
-def _ended(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
+def _ended(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
     """Entry with its run, and the results that depend on the run."""
     law = entry.design.controller
     assert law is not None
     entry = replace(entry, run=run)
     if law.lipschitz_limit is not None:
-        return _sliding_mode(entry, law, float(law.lipschitz_limit), run, tell)
-    return entry if law.sampling else _linear(entry, run, tell)
+        return _sliding_mode(entry, law, float(law.lipschitz_limit), run, progress)
+    return entry if law.sampling else _linear(entry, run, progress)
 
 
-def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
+def _linear(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
     """Entry of a linear law in continuous time, with its stability under zero-order hold and its peaks."""
     design = entry.design
     growth, sampled = None, design.held_loop()
     if sampled is not None and run.provenance["scheme"] == AS_IN_THE_PAPER:
         poles = vertex_poles(sectors(design.fault), list(design.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
-    tell(f"{entry.label}: zero-order hold and peaks", 0.0)
+    progress(f"{entry.label}: zero-order hold and peaks", 0.0)
     wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
@@ -290,7 +290,7 @@ def _linear(entry: Entry, run: Trajectory, tell: Tell) -> Entry:
     return replace(entry, growth_per_step=growth, zero_order_hold=sampled, peaks=proved)
 
 
-def _sliding_mode(entry: Entry, law: Controller, limit: float, run: Trajectory, tell: Tell) -> Entry:
+def _sliding_mode(entry: Entry, law: Controller, limit: float, run: Trajectory, progress: Tell) -> Entry:
     """Entry of a sliding mode, with |h'| of its run; in continuous time also largest T_s and feed-forward variants."""
     design, certified = entry.design, certified_bound(entry.design)
     bound = limit if certified is None else float(certified * (law.scale or 1))
@@ -301,9 +301,9 @@ def _sliding_mode(entry: Entry, law: Controller, limit: float, run: Trajectory, 
     if entry.origin != "designed" or law.sampling is not None:
         return replace(entry, design=assessed)
     if run.provenance["scheme"] == AS_IN_THE_PAPER:
-        tell(f"{entry.label}: largest sampling time", 0.0)
+        progress(f"{entry.label}: largest sampling time", 0.0)
         step = largest_sampling_time(design.fault, law, bound)
-    tell(f"{entry.label}: feed-forward", 0.0)
+    progress(f"{entry.label}: feed-forward", 0.0)
     return replace(entry, design=assessed, largest_step=step, variants=design.feedforward_variants())
 
 

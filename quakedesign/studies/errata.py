@@ -59,7 +59,7 @@ def errata_folder() -> Path:
         if place.is_dir():
             return place
     raise UnknownNameError(
-        f"the checks of the errata must be in {places[0]}. Found nothing. Install the package again."
+        f"the checks of the errata must be in {places[0]}. Received no such folder. Install the package again."
     )
 
 

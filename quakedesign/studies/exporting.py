@@ -5,7 +5,7 @@ from typing import Any
 
 from quakedesign.fault import Fault
 from quakedesign.laws import Controller
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.sensing import OutputFeedback
 from quakedesign.loop.sensing.measurement import EXACT
 from quakedesign.simulation import export_controller
@@ -54,7 +54,7 @@ def export_result(
     dict
         ``step, measurement, memory, facts, remarks, files, premises``.
     """
-    way, step, own = own_way(law, scheme, step)
+    way, step, own = scheme_of_run(law, scheme, step)
     period = fault.sampling_time if step is None else step
     inner = {"order": differentiator_order, "averaging": averaging, "inner_steps": differentiator_steps}
     seen = sensor(period, EXACT, differentiator_bound, filter_order, **inner)

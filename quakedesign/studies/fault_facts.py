@@ -229,8 +229,8 @@ def _functions(fault: Fault, rate: float, inertia: bool) -> tuple[list[Function]
 # Whether the sampling of a fault is fast enough for its instability.
 
 LARGEST_PRODUCT = 0.2
-"""Of T_s and the unstable pole: five samples while an error grows e-fold, so that what one sample has not seen grows by
-at most 22 % until the next one."""
+"""Largest adequate product of T_s and the unstable pole: an error grows by at most 22 % between two samples, and
+e-fold over five."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -370,7 +370,7 @@ def beyond_rest(fault: Fault) -> str:
     """Remark on a target more than one percent beyond the next rest slip; empty for other targets."""
     if not 0 < 1.01 * fault.rest_slip < fault.reference.target_slip:
         return ""
-    return f", {fault.reference.target_slip / fault.rest_slip:.3g} times the rest slip: pressure has to hold it there"
+    return f", {fault.reference.target_slip / fault.rest_slip:.3g} times the rest slip: it needs a sustained pressure"
 
 
 def sampling_sentence(adequacy: SamplingAdequacy) -> str:
@@ -394,7 +394,7 @@ def _sliding_sentence(fault: Fault) -> list[str]:
     suits = sliding_step(fault.friction, fault.reference)
     if suits / 2 <= fault.sampling_time <= 2 * suits:
         return beyond
-    return [*beyond, f"a guarantee of slow sliding wants sampling_time near D_c/({AGEINGS:g} V), here {suits:g} s"]
+    return [*beyond, f"for a guarantee of slow sliding choose sampling_time near D_c/({AGEINGS:g} V) = {suits:g} s"]
 
 
 _of_sliding = by_equilibrium(rest=lambda fault: [], sliding=_sliding_sentence)
@@ -411,8 +411,8 @@ def beyond_control(fault: Fault) -> list[str]:
         return []
     return [
         f"NO CONTROLLER can hold this fault at T_s = {fault.sampling_time:.4g} s for all friction of its box and a "
-        f"disturbance as large as its own: beyond {longest.quantity('s')} none can, even if it withdraws all of the "
-        "effective normal stress"
+        f"disturbance as large as its own: beyond {longest.quantity('s')} no controller can, even by withdrawing "
+        "a pressure as large as the effective normal stress"
     ]
 
 

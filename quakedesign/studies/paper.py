@@ -105,7 +105,7 @@ def printed(comparison: Compared) -> list[dict[str, Any]]:
 # Trade-off between certified peak and tracking error of designs for the sampled loop.
 
 ROOMS = (1.2, 1.4, 1.6, 2.2)
-"""What tracking may spend of the smallest certified slip-rate error; 1.6 is that of the default."""
+"""Slip-rate errors admitted for tracking, over the smallest certified one; the default design uses 1.6."""
 _PERIODS = 32  # duration of a run in natural periods; errors are evaluated in its second half
 
 
@@ -184,15 +184,15 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     return _runs(comparison.fault, comparison, progress or (lambda _what, _done: None))
 
 
-def _short_runs(fault: Fault, comparison: Compared, tell: Callable[[str, float], None]) -> PaperRuns:
-    tell("induced earthquake", 0.0)
+def _short_runs(fault: Fault, comparison: Compared, progress: Callable[[str, float], None]) -> PaperRuns:
+    progress("induced earthquake", 0.0)
     plant = comparison.uncontrolled.provenance["plant"]
     induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress, plant=plant)
     length = min(PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
     close_ups = {}
     for entry in comparison.entries:
         if entry.run is not None:
-            tell(f"{entry.label}: close-up", 0.0)
+            progress(f"{entry.label}: close-up", 0.0)
             step = entry.run.provenance["step"]
             close_ups[entry.label] = simulate(
                 fault,
@@ -204,13 +204,13 @@ def _short_runs(fault: Fault, comparison: Compared, tell: Callable[[str, float],
                 plant=plant,
             )
     laws = [entry.design.controller for entry in comparison.of("designed")]
-    tell("peak against tracking", 0.0)
+    progress("peak against tracking", 0.0)
     steps = [law.sampling.step for law in laws if law and law.sampling and law.lipschitz_limit is None]
     front = objective_front(fault, steps[0]) if steps else ()
     return PaperRuns(comparison=comparison, induced=induced, close_ups=close_ups, front=front)
 
 
-_runs = by_equilibrium(rest=_short_runs, sliding=lambda fault, comparison, tell: PaperRuns(comparison=comparison))
+_runs = by_equilibrium(rest=_short_runs, sliding=lambda fault, comparison, progress: PaperRuns(comparison=comparison))
 
 
 def friction_curve(fault: Fault, largest: float, points: int = 400) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -46,7 +46,7 @@ _Size = float | None  # [Pa]
 _POINTS = 24  # intervals on the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
-TOLD = "all controllers, linear or not, that know the fault and measure, up to the sample, {} and nothing else"
+MEASURING = "all controllers, linear or not, that know the fault and measure, up to the sample, {} and nothing else"
 WAITING = "all controllers, linear or not, that know everything from the first sample after the disturbance begins"
 QUANTITIES = {
     "peak_slip_rate_error": ("slip-rate error", "m/s"),
@@ -108,10 +108,9 @@ class Sensing:
     def __post_init__(self) -> None:
         require_known(self.measured, MEASURED[:2], "measured")
         if self._alone and self.rate_noise:
-            noise = f"{float(self.slip_noise):.4g} m and {float(self.rate_noise):.4g} m/s"
             raise ParameterError(
-                f"noise of the slip rate needs one that is measured. Received {noise}, measured {self.measured}. Leave "
-                "it out."
+                f"rate noise must be 0 unless the slip rate is measured. Received {float(self.rate_noise):.4g} m/s, "
+                f"measured {self.measured}. Omit the rate noise, or measure {MEASURED[0]}."
             )
 
     @property
@@ -148,16 +147,16 @@ class Sensing:
         """Arguments of a search for a design."""
         return {"measured": self.measured, "setup": ExactSetup.of(self.setup)}
 
-    def words(self) -> str:
+    def summary(self) -> str:
         """Measured quantities with the bounds of their errors, rounded up: a limit holds for larger errors as well."""
         slip = f"the slip with errors of no more than {UpperBound(self.slip_noise).quantity('m')}"
         if self._alone:
             return slip
         return f"{slip}, the slip rate with errors of no more than {UpperBound(self.rate_noise).quantity('m/s')}"
 
-    def knowing(self) -> str:
+    def controllers(self) -> str:
         """Controllers for which a smallest slip-rate error holds."""
-        return TOLD.format(self.words()) if self.noisy else KNOWING
+        return MEASURING.format(self.summary()) if self.noisy else KNOWING
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -367,8 +366,8 @@ def _limits_at_rest(
 ) -> Limits:
     if stress is not None or off:
         raise ParameterError(
-            f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Leave it "
-            "out: the box and the disturbance of the fault are meant."
+            f"{'a spread' if off else 'stress'} needs friction with a state. Received {fault.friction.name}. Omit it: "
+            "the limits are for the box and the disturbance of the fault."
         )
     task, step = uncertain_plant(fault), rational(fault.sampling_time)
     withdrawal, spread = _pressure_and_diffusivity(fault, pressure, diffusivity)
@@ -393,7 +392,7 @@ def _limits_at_rest(
         **_limits(
             _impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None),
             proved,
-            sensing.knowing(),
+            sensing.controllers(),
         ),
         proved=proofs,
         sensing=sensing,
@@ -416,7 +415,7 @@ def _impossible(
 
 
 def _limits(
-    impossible: Mapping[str, Bound | None], proved: Mapping[str, Bound | None], knowing: str, plant: str = ""
+    impossible: Mapping[str, Bound | None], proved: Mapping[str, Bound | None], controllers: str, plant: str = ""
 ) -> dict[str, Limit]:
     """Limits by name; `plant` names a plant other than the fault itself."""
     return {
@@ -425,7 +424,7 @@ def _limits(
             unit=unit,
             impossible_beyond=impossible[name],
             proved_up_to=proved.get(name),
-            holds_for=(knowing if name == "peak_slip_rate_error" else WAITING) + plant,
+            holds_for=(controllers if name == "peak_slip_rate_error" else WAITING) + plant,
         )
         for name, (title, unit) in QUANTITIES.items()
     }
@@ -435,7 +434,7 @@ def _require_plain(fault: Fault, sensing: Sensing) -> None:
     if sensing.setup.noise or sensing.measured != MEASURED[0]:
         raise ParameterError(
             f"no limit of slow sliding is known for noise. Received {fault.friction.name}, measured "
-            f"{sensing.words()}. Leave noise out: what cannot be done without it cannot be done with it."
+            f"{sensing.summary()}. Omit the noise: what is infeasible without noise is infeasible with it."
         )
     if more := sensing.setup.given().keys() - {"lag", "diffusion"}:
         raise ParameterError(

@@ -34,7 +34,7 @@ SCALED = {
     "damping": ("λ_η", "shear_N/(slip_m/s)"),
     "seismic_moment": ("λ_M0", "shear_N*fault_m"),
 }
-"""Symbol and unit of the quantities whose scale factors are reported."""
+"""Symbol and unit of each quantity whose scale factor is reported."""
 
 
 def scale_answer(

@@ -59,7 +59,7 @@ def chain_lines(chain: BlockChain) -> list[str]:
     springs = ", ".join(f"{float(K):.4g}" for i, j, K in chain.springs if i < j)
     lines += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
     pole, peak = _growth(chain), natural_peak(chain)
-    stable = "stable" if pole == 0 else "stability unknown, as floating point does not tell its modes apart"
+    stable = "stable" if pole == 0 else "stability unknown: its modes are not resolved in floating point"
     lines += [f"without control: {f'unstable, errors grow with up to {pole:.4g} 1/s' if pole else stable}"]
     lines += [] if peak is None else [f"natural earthquake: slip rate up to {quantity(peak, 'm/s')}"]
     if chain.diffusivity is not None:
@@ -110,7 +110,7 @@ def natural_peak(chain: BlockChain) -> float | None:
 
     None if no mode is unstable, for friction with a state, and for healing friction, which runs of blocks do not model.
     """
-    beyond = chain.ages or any(block.friction.rest_excess for block in chain.blocks)
+    beyond = chain.has_state or any(block.friction.rest_excess for block in chain.blocks)
     pole = None if beyond else _growth(chain)
     if not pole:
         return None
@@ -239,7 +239,7 @@ class ChainRun:
             parts += [f"run: {lasting(float(run.times[-1]))} on the stick-slip plant, where errors and pressures may"]
             parts += [f"exceed bounds, which are proved of the plant without stick{did}"]
             if len(chain.wells) < N:
-                parts.append("slip error: proved from the equilibrium of a block, in the run from the reference")
+                parts.append("slip error: proved about a block's equilibrium, in the run about the reference")
             for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
                 parts += [f"{event}: the run is outside the model"] if happened else []
         return parts
@@ -280,7 +280,7 @@ def chain_law(
         return guarantee(chain, controller, **sliding).proof
     claim: Any = load_guarantee(certificate)
     several = claim.kind == UNCERTAIN_PLANT
-    if chain.ages:
+    if chain.has_state:
         if not several:
             raise CertificateError(
                 f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of "
@@ -297,7 +297,7 @@ def chain_law(
         proof = named(claim, plant)
     if claim.law.delay or claim.check() is not Verdict.PROVED:
         raise CertificateError(
-            f"a certificate must hold, for a law without delay. Received {certificate}. Prove it anew with guarantee."
+            f"a certificate must be valid, of a law without delay. Received {certificate}. Prove one with guarantee."
         )
     return proof
 
@@ -418,7 +418,7 @@ class SlidingChainRun:
                     for i, (slip, rate, state) in enumerate(zip(*list(self.errors.values())[:3], strict=True), 1)
                 ),
                 *(
-                    f"well {i}: {quantity(float(v), 'Pa')} beside the plan"
+                    f"well {i}: {quantity(float(v), 'Pa')} from the planned pressure"
                     for i, v in enumerate(self.errors["pressure_beside_plan"], 1)
                 ),
             ]

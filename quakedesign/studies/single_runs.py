@@ -79,7 +79,7 @@ _RTOL = 1e-8
 _NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia and method of cycles, tried in this order
 _MOMENT = 1e-3  # duration, relative to the initial age of the state, over which every solver succeeds
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
-_SWINGS = 4  # smallest number of stress periods in a shown run
+_PERIODS = 4  # smallest number of stress periods in a shown run
 _SHOWN = 500  # duration of the run of a slow task in D_c/V: the loop settles within some tens
 
 
@@ -201,7 +201,7 @@ def designed_run(
         result.held.step,
         lag=result.held.lag,
         diffusion=result.held.diffusion,
-        tide=Tide(amplitude=float(result.task.stress), period=min(TIDE, duration / _SWINGS)),
+        tide=Tide(amplitude=float(result.task.stress), period=min(TIDE, duration / _PERIODS)),
         duration=duration,
         inertia=True,
         progress=progress,
@@ -379,7 +379,7 @@ def sensor(
             "number of steps": inner_steps != 1,
         }
         for name in (name for name, there in entered.items() if there):
-            raise ParameterError(f"the {name} belongs to a differentiator. Received no bound. Give both or neither.")
+            raise ParameterError(f"the {name} needs a differentiator. Received no bound. Give it, or omit the {name}.")
         return noise
     if noise.rate_noise:
         raise ParameterError(
@@ -489,10 +489,10 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
             f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
         )
-    if apart := _apart(fault, claim):
+    if differences := _differences(fault, claim):
         raise CertificateError(
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
-            f"{'; '.join(apart)}. Give the fault that it is about, or prove a new one with guarantee."
+            f"{'; '.join(differences)}. Give the fault that it is about, or prove a new one with guarantee."
         )
     if claim.root is not None:
         controller: Controller = recovered(claim).limited
@@ -501,18 +501,18 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         if type(controller) is SampledController:  # the file does not tell a designed e-LQR from a user-defined law
             object.__setattr__(controller, "title", "law of the certificate")
     if claim.check() is not Verdict.PROVED:
-        raise CertificateError(f"a certificate must hold. Received {path}, whose claims do not follow. Prove it anew.")
+        raise CertificateError(f"certificate must be valid. Received {path}: its claims do not follow. Prove it again.")
     return Choice(controller=controller, claim=claim)
 
 
-def _apart(fault: Fault, claim: Any) -> list[str]:
+def _differences(fault: Fault, claim: Any) -> list[str]:
     """Differences of a fault that a certificate does not cover, except the planned pressure of slow sliding."""
     task: Any = plant_like(claim.task, fault)
     if claim.covers_healing:
         task, uncovered = claim.beside_healing(task, rational(fault.friction.rest_excess))
         if uncovered is not None:
             return [
-                f"healing beside this disturbance up to {uncovered:.3g} there, {fault.friction.rest_excess:.3g} here"
+                f"healing of the fault {fault.friction.rest_excess:.3g}, covered with its disturbance {uncovered:.3g}"
             ]
     differences: list[str] = claim.task.differences(task)
     return differences
@@ -595,7 +595,7 @@ def _with_gains(
     if gains == DESIGNED and step is not None:
         fault = replace(fault, sampling_time=step)
     if gains == DESIGNED and path:
-        return _designed_behind(fault, name, path), None
+        return _designed_for_path(fault, name, path), None
     if gains in (DESIGNED, CONTINUOUS):
         designed = design(fault, name, continuous=gains == CONTINUOUS)
         if designed.controller is None:
@@ -604,7 +604,7 @@ def _with_gains(
     return law.for_authority(gains, least_authority(fault)), None
 
 
-def _designed_behind(fault: Fault, name: str, path: Mapping[str, float]) -> Controller:
+def _designed_for_path(fault: Fault, name: str, path: Mapping[str, float]) -> Controller:
     """Law designed for a delay, a lag and a diffusion path, sampled with the fault's T_s.
 
     Raises

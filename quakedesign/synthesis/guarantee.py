@@ -21,7 +21,7 @@ from quakedesign.guarantees import (
     TrackingGuarantee,
     TrackingProof,
 )
-from quakedesign.guarantees.exact.limit_theorems import hopeless, too_slow
+from quakedesign.guarantees.exact.limit_theorems import infeasibility, too_slow
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.sliding_blocks import SlidingBlocks
 from quakedesign.guarantees.search.linear_design import nearest_setup
@@ -39,7 +39,7 @@ from quakedesign.synthesis.state_feedback import may_stick
 Result = TypeVar("Result")
 
 
-def answers(
+def guarantees_of(
     questions: Sequence[Callable[[], Result]],
     *,
     workers: int = 1,
@@ -69,7 +69,7 @@ def answers(
     """
     results: dict[int, Result | QuakedesignError] = {}
     with crew_or_here(workers, scheduler, executor) as crew:
-        for place, one in crew.answers(_called, [(call,) for call in questions]):
+        for place, one in crew.results(_called, [(call,) for call in questions]):
             results[place] = one
             if tell is not None:
                 tell(f"{len(results)} of {len(questions)} computed", len(results) / len(questions))
@@ -174,7 +174,7 @@ def guarantee(
     if isinstance(fault, BlockChain):
         fault = replace(fault, fault=with_accepted_fit(fault.fault, accept_poor_fit))
         setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
-        if fault.ages:
+        if fault.has_state:
             usual = (law, tuple(gains), plant or PRINTED) == (None, (), PRINTED) and controller in ("elqr", *BLOCK_LAWS)
             usual = usual and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
             usual = usual and not exact_value(spread, "", "spread")
@@ -288,7 +288,7 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
     step = rational(fault.sampling_time) if setup.step is None else setup.step
     exact = ExactSetup.of(setup)
     delay = exact.delay
-    infeasible = hopeless(task, most, delay, setup.diffusion)
+    infeasible = infeasibility(task, most, delay, setup.diffusion)
     if infeasible and not wanted.gains:
         near = nearest_setup(task, step, measured=setup.measured, setup=exact) if law.name == "elqr" else None
         return TrackingGuarantee(fault=fault, proof=NoProof(reason=infeasible), nearest=near)

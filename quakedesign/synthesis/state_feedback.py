@@ -21,7 +21,7 @@ from quakedesign.guarantees import (
     sampled_design,
     with_worst_case,
 )
-from quakedesign.guarantees.exact.limit_theorems import hopeless
+from quakedesign.guarantees.exact.limit_theorems import infeasibility
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup, SampledLoop
 from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
@@ -162,7 +162,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
         without = {"not_at_rest": sticking.reason}
     exact = ExactSetup.of(setup)
     most = rational(fault.effective_normal_stress)
-    if beyond := hopeless(task, most, exact.delay, setup.diffusion):
+    if beyond := infeasibility(task, most, exact.delay, setup.diffusion):
         return problem.undecided(law.name, beyond, NoProof(reason=beyond))
     designed = sampled_design(task, step, problem.objective, measured=setup.measured, setup=exact)
     if designed.runs is None:

@@ -66,7 +66,7 @@ def prove(monkeypatch, call):
             asked.append((calls, more))
             return answers
 
-        monkeypatch.setattr("quakedesign.synthesis.answers", found)
+        monkeypatch.setattr("quakedesign.synthesis.guarantees_of", found)
         return call("guarantee", *arguments)
 
     run.asked = asked
@@ -185,7 +185,7 @@ def test_certificates_of_several_faults_lie_in_a_folder_that_no_other_command_wr
     both = ("real-fault", "lab-fault", "--out", "made")
     held = []
     monkeypatch.setattr(guarantee_commands, "progress", lambda own=guarantee_commands.progress: (held.append(
-        not files.hold(tmp_path / "made")), own())[1])  # fmt: skip
+        not files.lock_folder(tmp_path / "made")), own())[1])  # fmt: skip
     code, out, _ = prove([proof(True), REFUSED], *both, "--json")
     assert (code, held) == (1, [True])
     assert [one["certificate"] for one in json.loads(out)["guarantees"]] == ["made/real-fault-guarantee.json", None]
@@ -235,7 +235,7 @@ def test_limits_are_written_where_a_folder_is_given(call, monkeypatch, tmp_path)
     monkeypatch.setattr("quakedesign.report.limits_table.limits_lines", lambda _: ["a limit"])
     monkeypatch.setattr(
         "quakedesign.report.limits_table.write_limits",
-        lambda _, out, kinds: held.append((out.name, kinds, not files.hold(tmp_path / "made"))),
+        lambda _, out, kinds: held.append((out.name, kinds, not files.lock_folder(tmp_path / "made"))),
     )
     monkeypatch.setattr("quakedesign.studies.limits", lambda *_, **__: answer)
     code, out, _ = call("limits", "lab-fault", "--out", "made", "--format", "svg", "pdf")

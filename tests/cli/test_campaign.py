@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from quakedesign.cli import main, simulate_commands
-from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.parallel import SerialExecutor, UserExecutor
 from quakedesign.report import terminal
 from quakedesign.simulation.campaign import Campaign, running
 
@@ -18,7 +18,7 @@ CALL = ["campaign", "lab-fault", "--controller", "elqr", "--duration", "0.2", "-
 def call(tmp_path, monkeypatch, capsys):
     """Exit code, standard output and standard error of the command, computed in this process without a figure."""
     monkeypatch.setattr(Campaign, "plot", lambda _: Figure())
-    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(SerialExecutor()))
 
     def run(*arguments, box="ten-percent"):
         with pytest.raises(SystemExit) as ended:
@@ -69,11 +69,11 @@ def test_ctrl_c_says_that_it_can_go_on(call, monkeypatch):
         def submit(self, task, /, *arguments, **named):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(running, "crew_of", lambda *_: Given(Interrupted()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(Interrupted()))
     code, _, err = call("--samples", "2")
     assert code == 130
     assert "the same command goes on from" in err
-    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(SerialExecutor()))
     assert call("--samples", "2")[0] == 0
 
 
@@ -85,7 +85,7 @@ def test_a_batch_that_fails_is_told(call, monkeypatch):
 
             return super().submit(fail)
 
-    monkeypatch.setattr(running, "crew_of", lambda *_: Given(Failing()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(Failing()))
     code, out, _ = call("--samples", "3")
     assert code == 1
     assert "MemoryError: full" in out

@@ -189,5 +189,5 @@ def test_a_file_that_does_not_hold_is_not_run(file, capsys):
     save_guarantee(better, file)
     code, _, err = told(capsys, "export", "real-fault", "--certificate", file, "--out", file.parent / "c")
     assert code == 2
-    assert "whose claims do not follow" in err
+    assert "its claims do not follow" in err
     assert not (file.parent / "c").exists()

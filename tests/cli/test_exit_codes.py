@@ -51,7 +51,11 @@ def test_a_command_ends_with_the_number_that_it_returns(ends, value, code):
     ("error", "code", "said"),
     [
         (ParameterError("step must be positive"), 2, "quakedesign: step must be positive\n"),
-        (ValueError("a\nb"), 3, "quakedesign: defect: ValueError: a b. Set QUAKEDESIGN_TRACEBACK=1 for the place.\n"),
+        (
+            ValueError("a\nb"),
+            3,
+            "quakedesign: defect: ValueError: a b. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.\n",
+        ),
         (MemoryError(), 4, "quakedesign: out of memory. Raise the limit, or make the problem smaller.\n"),
         (
             OSError(errno.EIO, "it fails", "stdout"),
@@ -87,8 +91,8 @@ def test_the_place_of_a_defect_is_shown_on_request(monkeypatch):
 
 @pytest.mark.parametrize("deed", [lambda: 0, raising(ParameterError("no")), raising(ValueError("no"))])
 def test_folders_are_let_go_however_a_command_ends(ends, deed, tmp_path):
-    ends(lambda: (files.hold(tmp_path / "results"), deed())[1])
-    assert files.hold(tmp_path / "results"), "nobody holds it"
+    ends(lambda: (files.lock_folder(tmp_path / "results"), deed())[1])
+    assert files.lock_folder(tmp_path / "results"), "nobody holds it"
     files.release()
 
 
@@ -103,7 +107,7 @@ def test_the_command_is_known_as_it_was_typed(ends, monkeypatch):
 
 def test_a_command_allows_no_code_and_is_not_quiet_because_the_one_before_was(ends, capsys):
     discovery.allow_code(True)
-    shared.hush(quiet=True, level="debug")
+    shared.set_output(quiet=True, level="debug")
     seen = []
 
     def deed():
@@ -156,9 +160,9 @@ def test_where_to_look_is_told():
 
 def test_options_that_were_given_are_those_that_are_not_none():
     assert shared.specified({"a": None, "b": 0, "c": "", "d": False}) == {"b": 0, "c": "", "d": False}
-    assert shared.refuse({"a": None}, "a certificate") is None
+    assert shared.reject({"a": None}, "a certificate") is None
     with pytest.raises(ParameterError, match=r"^step, lag cannot be used with a certificate\. Omit step, lag\.$"):
-        shared.refuse({"step": 0.0, "delay": None, "lag": 1.0}, "a certificate")
+        shared.reject({"step": 0.0, "delay": None, "lag": 1.0}, "a certificate")
 
 
 def test_json_is_strict_and_ends_with_its_line(capsys):
@@ -212,12 +216,12 @@ def test_progress_is_shown_on_a_terminal_unless_it_is_quiet(monkeypatch, termina
         return Console(file=shown, force_terminal=terminal, width=120)
 
     monkeypatch.setattr(shared, "Console", console)
-    shared.hush(quiet=quiet, level="warning")
+    shared.set_output(quiet=quiet, level="warning")
     try:
         with shared.progress() as tell:
             tell("integrating", 0.25)
     finally:
-        shared.hush(quiet=False, level="warning")
+        shared.set_output(quiet=False, level="warning")
     assert asked == [{"stderr": True}]
     assert ("integrating" in shown.getvalue()) == (terminal and not quiet)
     assert (" 25%" in shown.getvalue()) == (terminal and not quiet)
@@ -228,14 +232,14 @@ def test_progress_is_shown_on_a_terminal_unless_it_is_quiet(monkeypatch, termina
     ("level", "heard"), [("warning", []), ("info", ["INFO a (0 %)", "INFO b (50 %)"]), ("debug", "all")]
 )
 def test_progress_is_logged_for_those_who_ask(capsys, level, heard):
-    shared.hush(quiet=True, level=level)
+    shared.set_output(quiet=True, level=level)
     try:
         with shared.progress() as tell:
             for what, done in (("a", 0.0), ("a", 0.25), ("b", 0.5), ("b", 1.0)):
                 tell(what, done)
     finally:
         lines = capsys.readouterr().err.splitlines()
-        shared.hush(quiet=False, level="warning")
+        shared.set_output(quiet=False, level="warning")
     every = ["INFO a (0 %)", "DEBUG a (25 %)", "INFO b (50 %)", "DEBUG b (100 %)"]
     assert [re.sub(r"^[\d-]{10} [\d:,]{12} ", "", line) for line in lines] == (every if heard == "all" else heard)
 

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from quakedesign.cli import main
-from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.parallel import SerialExecutor, UserExecutor
 from quakedesign.simulation.campaign import running
 
 
@@ -73,8 +73,8 @@ def test_jitter_steps_of_a_reading_and_of_a_differentiator_are_those_of_python(r
         assert part in told["measurement"]
     for alone, said in (
         (("--jitter", "1"), "jitter needs delay"),
-        (("--slip-quantum", "1 um"), "the quantum of the slip belongs to a differentiator"),
-        (("--differentiator-steps", "2"), "the number of steps belongs to a differentiator"),
+        (("--slip-quantum", "1 um"), "the quantum of the slip needs a differentiator"),
+        (("--differentiator-steps", "2"), "the number of steps needs a differentiator"),
     ):
         code, _, err = run(*SHORT, *alone)
         assert code == 2
@@ -150,7 +150,7 @@ def test_a_mean_goes_into_an_exported_controller(run, tmp_path):
 
 @pytest.mark.slow
 def test_a_campaign_takes_the_same_options(run, monkeypatch, tmp_path):
-    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(SerialExecutor()))
     options = (
         "--saturation",
         "20 kPa",

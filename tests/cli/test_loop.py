@@ -92,7 +92,7 @@ def test_the_printed_differentiator_is_told_and_has_no_bound_under_a_held_pressu
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--differentiator-order", "2"), "differentiator order belongs to a differentiator"),
+        (("--differentiator-order", "2"), "differentiator order needs a differentiator"),
         (("--differentiator-order", "2", "--differentiator-bound", "1 m/s^2"), "differentiator bound"),
         (("--differentiator-order", "0", "--differentiator-bound", "1"), "order must be a whole number of at least 1"),
         (("--differentiator-bound", "1 m/s^3"), "differentiator bound"),

@@ -143,7 +143,7 @@ def test_a_setup_is_made_of_what_is_given():
 )
 def test_output_is_set_where_it_is_asked_for(monkeypatch, given, heard):
     calls = []
-    monkeypatch.setattr(options, "hush", lambda **told: calls.append(told))
+    monkeypatch.setattr(options, "set_output", lambda **told: calls.append(told))
     Output(**given)
     assert calls == ([] if heard is None else [heard])
 
@@ -249,7 +249,9 @@ def test_an_option_of_a_stage_has_its_unit_and_may_be_left_out_where_it_has_no_d
                 parameter.converter(None, tokens("0.5"))
 
 
-@pytest.mark.parametrize(("added", "usual"), [(options.of_the_setup("delay"), None), (options._asks_every_stage, 0.0)])
+@pytest.mark.parametrize(
+    ("added", "usual"), [(options.of_the_setup("delay"), None), (options._with_stage_options, 0.0)]
+)
 def test_options_are_added_to_a_class_whose_values_are_frozen_and_named(added, usual):
     @dataclass(frozen=True, kw_only=True)
     class Plain:
@@ -345,22 +347,22 @@ def test_a_sensor_is_made_of_its_options():
 
 
 def test_what_a_law_is_designed_for_stands_where_nothing_is_given(monkeypatch):
-    free = options.surroundings(None, 0.1, RunOptions(substeps=3), ActuatorOptions(lag=1.0), SensorOptions(), 2)
+    free = options.loop_elements(None, 0.1, RunOptions(substeps=3), ActuatorOptions(lag=1.0), SensorOptions(), 2)
     assert free == (3, ActuatorOptions(lag=1.0).build(0.1), Measurement(seed=2))
     law = SimpleNamespace(controller=object(), noise=lambda seed: ("noise of the proof", seed))
     meant = ActuatorOptions(delay=0.1).build(0.1)
     path = "quakedesign.simulation.run_settings.designed_path"
     monkeypatch.setattr(path, lambda *given: (meant, 7) if given[0] else None)
-    assert options.surroundings(law, 0.1, RunOptions(), ActuatorOptions(), SensorOptions(), 2) == (
+    assert options.loop_elements(law, 0.1, RunOptions(), ActuatorOptions(), SensorOptions(), 2) == (
         7,
         ActuatorOptions().build(0.1).completed(meant),
         ("noise of the proof", 2),
     )
-    noisy = options.surroundings(law, 0.1, RunOptions(), ActuatorOptions(), SensorOptions(slip_noise=1e-6), 2)
+    noisy = options.loop_elements(law, 0.1, RunOptions(), ActuatorOptions(), SensorOptions(slip_noise=1e-6), 2)
     assert noisy[2] == Measurement(slip_noise=1e-6, seed=2)
     monkeypatch.setattr("quakedesign.simulation.run_settings.designed_path", lambda *_: (None, 1))
     pump = ActuatorOptions(saturation=1e6)
-    assert options.surroundings(law, 0.1, RunOptions(), pump, SensorOptions(), 0)[1] == pump.build(0.1)
+    assert options.loop_elements(law, 0.1, RunOptions(), pump, SensorOptions(), 0)[1] == pump.build(0.1)
 
 
 # Friction with a state

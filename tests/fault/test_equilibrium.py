@@ -53,7 +53,7 @@ def test_what_does_not_apply_is_rejected_with_the_law_and_nothing_else_is():
 
 def test_every_message_of_the_tables_can_be_written():
     for law in (friction_law("exponential-slip-weakening"), Ageing):
-        for message in law.equilibrium.refused.values():
+        for message in law.equilibrium.messages.values():
             assert "{" not in message.format(value=1, law=law.name, states="theta")
 
 

@@ -144,10 +144,10 @@ WRONG = {
     "nan friction": ("residual = 0.2353", "residual = nan", ParameterError, "residual must be positive and finite"),
     "logical friction": (DROP, "drop = true", UnitError, "friction.drop must be a plain number. Received True"),
     "the paper's sign": (DROP, "drop = -0.1", ParameterError, "the paper's Δμ has the opposite sign"),
-    "missing key": (LENGTH, "", ScenarioError, "length must be given. Received nothing"),
+    "missing key": (LENGTH, "", ScenarioError, "length must be given. Received no value"),
     "missing table": ("[task]", "[job]", ScenarioError, "job is not a known key"),
     "extra key": (LENGTH, LENGTH + '\nheight = "1 km"', ScenarioError, "height is not a known key"),
-    "missing parameter": (DROP, "", ScenarioError, "friction.drop must be given. Received nothing"),
+    "missing parameter": (DROP, "", ScenarioError, "friction.drop must be given. Received no value"),
     "misspelt source": (
         'name = "real-fault"',
         'name = "x"\nsorce = "y"',
@@ -155,8 +155,8 @@ WRONG = {
         "sorce .* mean source.* poor_fit",
     ),
     "misspelt option": (LAW, REGULAR, ScenarioError, "evoluton .* mean evolution"),
-    "extra parameter": (DROP, DROP + "\na = 1", ScenarioError, "friction.a is not a known key. Known .* drop"),
-    "no law": ('law = "exponential-slip-weakening"', "", ScenarioError, "friction.law must be given. Received nothing"),
+    "extra parameter": (DROP, DROP + "\na = 1", ScenarioError, "friction.a is not a known key. Use one of .* drop"),
+    "no law": ('law = "exponential-slip-weakening"', "", ScenarioError, "friction.law must be given. Received no"),
     "unknown law": ("exponential-slip-weakening", "magic", UnknownNameError, "one of exponential.*Received 'magic'"),
     "unknown box": (
         BOX,

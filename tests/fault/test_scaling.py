@@ -21,6 +21,7 @@ from quakedesign.fault.similarity import (
     Scales,
     dimension,
     dimensional_matrix,
+    is_homogeneous,
     ordered,
     pi_groups,
     quantities,
@@ -28,7 +29,6 @@ from quakedesign.fault.similarity import (
     scaled_fault,
     scaled_parameters,
     similarity,
-    stretches,
 )
 from quakedesign.fault.units import si_value
 from quakedesign.symbolic import plant
@@ -394,9 +394,9 @@ RIGID = replace(LAB, friction=Rigid(drop=0.17, extent=2.5e-3))
 
 
 def test_a_law_that_does_not_stretch_takes_away_one_freedom():
-    assert not stretches(RIGID.friction)
-    assert stretches(LAB.friction)
-    assert stretches(RATE_AND_STATE.friction)
+    assert not is_homogeneous(RIGID.friction)
+    assert is_homogeneous(LAB.friction)
+    assert is_homogeneous(RATE_AND_STATE.friction)
     assert len(pi_groups(ordered(RIGID))) == len(quantities(RIGID)) - 5
     relation = similarity(RIGID, replace(RIGID, effective_normal_stress=2e5))
     assert relation.scales.of("slip_m/normal_m") == radical(1)

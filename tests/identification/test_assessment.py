@@ -179,7 +179,7 @@ def test_an_effect_below_zero_is_told_and_no_fault_file_holds_it():
     found = identify(step(a=0.008, b=-0.006), "rate-and-state-slip")
     effect = found.estimates["evolution_effect"]
     assert effect.low < -0.006 < effect.high < 0
-    with pytest.raises(RecordError, match=r"It strengthens with rate: there is nothing to control"):
+    with pytest.raises(RecordError, match=r"friction strengthens with rate and needs no control"):
         identified_fault(found, load_fault("crustal-patch"))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of, restricted_likelihood
 from quakedesign.identification.experiment import Coordinate, Experiment
-from quakedesign.identification.fitting import Fit, outliers, weighed
+from quakedesign.identification.fitting import Fit, outliers, weighted
 from quakedesign.identification.identify import needed
 
 NUMBER = 400
@@ -140,7 +140,7 @@ def fitted(columns, measured, noise=None):
         starts=1,
         correlated=noise,
     )
-    solution = np.linalg.lstsq(weighed(best.weights, columns), weighed(best.weights, measured), rcond=None)[0]
+    solution = np.linalg.lstsq(weighted(best.weights, columns), weighted(best.weights, measured), rcond=None)[0]
     return replace(best, fitted=solution)
 
 
@@ -158,8 +158,8 @@ def trends(records, trend, fading, white):
         plain = fitted(columns, measured)
         likely = noise_of(plain.residuals, columns, plain.counts, time, None, plain.used)
         best = fitted(columns, measured, likely)
-        without = np.linalg.lstsq(weighed(best.weights, columns[:, :-1]), weighed(best.weights, measured), rcond=None)
-        left = weighed(best.weights, measured - columns[:, :-1] @ without[0])
+        without = np.linalg.lstsq(weighted(best.weights, columns[:, :-1]), weighted(best.weights, measured), rcond=None)
+        left = weighted(best.weights, measured - columns[:, :-1] @ without[0])
         count += needed(best, float(left @ left))
     return count
 

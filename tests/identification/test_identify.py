@@ -24,7 +24,7 @@ from quakedesign.identification.fault_file import (
     save_fault,
     task_remarks,
 )
-from quakedesign.identification.identification_result import ParameterEstimate, Rival
+from quakedesign.identification.identification_result import OtherLaw, ParameterEstimate
 from quakedesign.identification.identify import identify, set_up
 from quakedesign.identification.loading import prepared
 from quakedesign.identification.record import Record
@@ -99,7 +99,7 @@ def test_sparse_velocity_steps_tell_only_the_difference_of_effects():
     )
     found = identify(record, stiffness=1e4)
     assert not found.identified
-    assert any("only direct_effect - evolution_effect = " in told for told in found.untold())
+    assert any("only direct_effect - evolution_effect = " in told for told in found.undetermined())
     assert found.difference.low < -0.005 < found.difference.high
     assert found.difference.high - found.difference.low < 2e-4
     with pytest.raises(RecordError, match="needs every parameter"):
@@ -254,7 +254,7 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
     moved = {"reference_rate": 1e-6, "slowest_rate": 1e-8, "fastest_rate": 1e-3, "reference_coefficient": 0.6}
     effects = {"direct_effect": 0.01, "evolution_effect": 0.015}
     slip = friction_law("rate-and-state-slip")(**asdict(patch.friction) | moved | effects)
-    found = replace(weak, law=slip, rival=Rival(law=patch.friction.name, squares=2.0, excess=300.0))
+    found = replace(weak, law=slip, rival=OtherLaw(law=patch.friction.name, squares=2.0, excess=300.0))
     assert "mu0 = 0.6 at 1 µm/s was converted to 0.63454 at 1 nm/s for the file" in task_remarks(found, patch)
     assert "that of steady sliding at 1 µm/s" in " ".join(identification_lines(found, verbose=True))
     assert "aging fits worse: squares 2 times as large, AIC higher by 300" in " ".join(
@@ -268,7 +268,7 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
     assert "names regularised-rate-and-state, the record was fitted without it, by rate-and-state-slip" in said
     assert law_remarks(found, load_fault("lab-fault")) == []
     assert law_remarks(found, replace(patch, friction=slip)) == []
-    assert "hardly tells" in str(Rival(law="x", squares=1.001, excess=3.0))
+    assert "hardly tells" in str(OtherLaw(law="x", squares=1.001, excess=3.0))
 
 
 @pytest.mark.parametrize(("slip", "said"), [(4e-8, "40 nm is far shorter"), (0.02, "2 cm is far longer"), (1e-6, "")])

@@ -116,7 +116,7 @@ def test_given_rates_are_taken_exactly_and_their_times_found(noise):
     assert "as given" in prepared(made(x), [rate for _, rate in STEPS])[1].notes[0]
     with pytest.raises(RecordError, match="must be those of the load point"):
         given_pieces(TIME, x, np.array([1e-5, 1e-6]))
-    with pytest.raises(RecordError, match="go with a column of the load point"):
+    with pytest.raises(RecordError, match="needs a column of the load point"):
         prepared(replace(made(x), load_point=None), [1e-6])
 
 

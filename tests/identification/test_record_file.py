@@ -125,7 +125,12 @@ def test_arrays_of_matlab_are_read_and_nothing_else(tmp_path):
 
 NUMBERED = "time=1 [s], load_point_displacement=2 [um], shear_stress=3 [MPa], normal_stress=4 [MPa]"
 ADVICE = {
-    "decimal commas between commas: semicolons": (csv(",", comma), "Put semicolons between", csv(";", comma), ""),
+    "decimal commas between commas: semicolons": (
+        csv(",", comma),
+        "Separate the columns by semicolons",
+        csv(";", comma),
+        "",
+    ),
     "numbers alone": ("\n".join(lines(",")), "Write names and units above, or give them", None, NUMBERED),
     "a misspelt name": (csv().replace("shear_stress", "shear_stres"), "Did you mean shear_stress", csv(), ""),
     "a name of one's own": (csv().replace("time", "clock"), "--columns 'time=clock [s]'", None, "time=clock [s]"),

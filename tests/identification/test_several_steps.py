@@ -143,17 +143,17 @@ def stub(sign=0, passed=True, factor=1.0, law="", excess=0.0, record=None):
     ("signs", "ends", "reason"),
     [
         ([(-1, True), (1, False)], (-3, -1), ""),
-        ([(-1, False), (-1, False)], (-3, -1), "no step has one by itself"),
-        ([(-1, True), (1, True)], (-3, -1), "steps do not agree"),
+        ([(-1, False), (-1, False)], (-3, -1), "no step alone determines it"),
+        ([(-1, True), (1, True)], (-3, -1), "the steps disagree"),
         ([(-1, True), (-1, True)], (-3, 1), "from -3 to 1"),
-        ([(1, True), (1, True)], (-3, -1), "steps do not agree"),
+        ([(1, True), (1, True)], (-3, -1), "the steps disagree"),
     ],
 )
 def test_a_sign_needs_a_step_that_has_it_none_against_it_and_the_common_fit(signs, ends, reason):
     difference = ParameterEstimate(
         name="a - b", unit="", value=sum(ends) / 2, low=ends[0], high=ends[1], least=ends[0], most=ends[1]
     )
-    common = SimpleNamespace(difference=difference, untold=lambda: (), experiments=lambda sign: ())
+    common = SimpleNamespace(difference=difference, undetermined=lambda: (), experiments=lambda sign: ())
     told = _assessed(common, [stub(*each) for each in signs], 0.5)
     assert [check.passed for check in told.checks] == [True, not reason]
     assert told.open == ((f"the sign of a - b is open: {reason}",) if reason else ())
@@ -228,7 +228,7 @@ def test_windows_of_a_file_are_steps(tmp_path):
     assert (first.name, len(first.time), second.origin) == ("run 0 s to 9 s", 10, 10.0)
     assert [len(record.time) for record in read_steps(path, end="9 s")] == [10]
     assert [len(record.time) for record in read_steps(path, "0 s to 9 s, 9 s to 20 s")] == [10, 11]
-    with pytest.raises(RecordError, match=r"must not overlap: part them. Received 3 samples of 7 s to 30 s twice"):
+    with pytest.raises(RecordError, match=r"must not overlap. Received 3 samples of 7 s to 30 s twice"):
         read_steps(path, "0 s to 9 s, 7 s to 30 s")
     with pytest.raises(RecordError, match=r"one unit in all steps. Received 1/m, Pa/m. Give stresses alone"):
         identify_steps([replace(first, normal_unit="Pa"), second])

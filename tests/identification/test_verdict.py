@@ -271,7 +271,7 @@ def test_a_fit_with_another_trend_whose_valley_leads_elsewhere_leaves_the_sign_o
         fit=SimpleNamespace(experiment=experiment, fitted=None),
         used=None,
         difference=between(0.001, 0.003),
-        untold=lambda: [],
+        undetermined=lambda: [],
         experiments=lambda sign: [f"passed: {sign.passed}"],
     )
     choice = _Choice(record=None, raw=None, loading=None, stiffness=None, seed=0)
@@ -298,7 +298,7 @@ def written(share=0.1, low=-0.002, high=-0.001, verdict="explains the record"):
         assessment=SimpleNamespace(verdict=verdict, open=("the sign",)),
         determined=False,
         record=SimpleNamespace(name="made"),
-        untold=lambda: ["D_c is not identifiable"],
+        undetermined=lambda: ["D_c is not identifiable"],
     )
 
 

@@ -29,7 +29,7 @@ def of_modes(t):
 
 
 def test_what_the_modes_leave_out_of_a_step_is_below_its_bound_and_near_it():
-    high, rate, floor = LAYER.left_out(F(10**6))  # steps so far apart that there is one
+    high, rate, floor = LAYER.truncation_bound(F(10**6))  # steps so far apart that there is one
     found = []
     for t in np.geomspace(1e-5, 0.1, 60):
         left, bound = abs(step_response(t) - of_modes(t)), float(high) * np.exp(-float(rate) * t) + float(floor)
@@ -40,7 +40,7 @@ def test_what_the_modes_leave_out_of_a_step_is_below_its_bound_and_near_it():
 
 def test_steps_at_every_sample_that_all_add_up_are_below_the_bound():
     step, late = F(1, 500), np.linspace(0, 1 / 500, 20)
-    high, rate, floor = LAYER.left_out(step)
+    high, rate, floor = LAYER.truncation_bound(step)
     for theta in late[1:]:
         since = theta + np.arange(2000) / 500
         whole = np.abs(step_response(since) - of_modes(since)).sum()
@@ -50,7 +50,7 @@ def test_steps_at_every_sample_that_all_add_up_are_below_the_bound():
 def test_a_well_that_rises_evenly_leaves_out_less_than_the_bound_of_its_integral():
     points = np.linspace(1e-7, 0.2, 20000)
     area = np.trapezoid(np.abs(step_response(points) - of_modes(points)), points)
-    assert 0.4 * float(LAYER.left_out_in_all) < area <= float(LAYER.left_out_in_all)
+    assert 0.4 * float(LAYER.truncation_integral) < area <= float(LAYER.truncation_integral)
 
 
 def test_rationals_stand_for_pi_as_closely_as_their_bound_says():
@@ -86,7 +86,7 @@ def test_the_loop_hears_the_well_through_one_over_cosh(frequency, lag):
     found = push[valve] + push[behind] @ followed
     exact = 1 / (1 + s * float(lag)) / np.cosh(np.sqrt(s * float(TIME)))
     rises = frequency / abs(1 + s * float(lag))
-    assert abs(found - exact) <= rises * float(LAYER.left_out_in_all)
+    assert abs(found - exact) <= rises * float(LAYER.truncation_integral)
 
 
 def simulated(valves, step, cells):

@@ -141,7 +141,7 @@ def test_a_broken_premise_is_said_with_its_factor():
     said = headline(entry(Verdict.PROVED, chatter, largest_step=0.012))
     assert said == (
         "proved in continuous time; in this run |h'| is 5.75 times as large as the proof allows; "
-        "it would stay inside for T_s up to about 0.012 s"
+        "the run satisfies the proved bound on |h'| for T_s up to about 0.012 s"
     )
 
 

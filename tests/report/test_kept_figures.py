@@ -12,7 +12,7 @@ from thinned import few
 from quakedesign import cache
 from quakedesign.fault import load_fault
 from quakedesign.report import drawing as kept_figures
-from quakedesign.report.drawing import drawn_once
+from quakedesign.report.drawing import cached_figures
 from quakedesign.simulation import simulate
 
 
@@ -46,7 +46,7 @@ def figures(shown, names=("one",)):
 
 
 def once(shown=3.0, told="told", name="one"):
-    return drawn_once(figures(shown, (name,)), {name: told}, shown)
+    return cached_figures(figures(shown, (name,)), {name: told}, shown)
 
 
 def test_the_same_figure_is_drawn_once_and_has_the_bytes_of_its_drawing(drawn, monkeypatch):

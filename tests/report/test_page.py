@@ -17,7 +17,7 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.cli.app import command_line, typed
+from quakedesign.cli.app import command_line, store_command
 from quakedesign.fault import parse_fault
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.report import page
@@ -172,9 +172,9 @@ def test_a_report_says_how_it_is_made_again(monkeypatch):
     assert made.date == "1970-01-02 00:00 UTC"
     assert parse_fault("\n".join(made.scenario), "again") == FAULT
     assert {"quakedesign", "clarabel", "Python"} <= set(made.versions)
-    typed(["design", "my fault.toml"])
+    store_command(["design", "my fault.toml"])
     assert command_line() == "quakedesign design 'my fault.toml'"
-    typed([])
+    store_command([])
     assert command_line() == ""
 
 
@@ -192,8 +192,12 @@ def test_the_report_says_behind_what_its_runs_are():
         design = SimpleNamespace(setup=SimpleNamespace(path={name: time for name, time in path.items() if time}))
         return SimpleNamespace(of=lambda _: [SimpleNamespace(design=design)])
 
-    assert page._way(compared()) == page._way(compared(lag=F(0))) == "the pressure in the runs acts without delay"
-    found = page._way(compared(delay=F("0.15"), lag=F("0.03"), diffusion=F(2)))
+    assert (
+        page._loop_stages(compared())
+        == page._loop_stages(compared(lag=F(0)))
+        == "the pressure in the runs acts without delay"
+    )
+    found = page._loop_stages(compared(delay=F("0.15"), lag=F("0.03"), diffusion=F(2)))
     assert found.endswith("acts through a delay of 0.15 s, a lag of 0.03 s, a diffusion path of L^2/D = 2 s")
 
 
@@ -236,4 +240,4 @@ def test_controllers_of_which_everything_is_the_same_share_a_card():
         ]
     ]
     labels = ["A, B (designed)", "C (designed)", "D (published)", "E (published)"]
-    assert [card.label for card in page._cards(made)] == labels
+    assert [card.label for card in page._shared_accounts(made)] == labels

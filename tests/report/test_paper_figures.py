@@ -15,7 +15,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.fault import Reference
 from quakedesign.lyapunov import Verdict
 from quakedesign.report import Comparison
-from quakedesign.report.drawing import band, clock, colour, made, scaled
+from quakedesign.report.drawing import band, clock, colour, run_settings, scaled
 from quakedesign.report.folder import study_results, write_folder
 from quakedesign.report.paper_figures import PAPER, PaperStudy, paper_figures, paper_study
 from quakedesign.report.tables import csv_text
@@ -241,8 +241,8 @@ def test_units_suit_the_values():
 def test_every_way_in_which_runs_were_made_is_named_once(study):
     run = study.comparison.entries[0].run
     other = replace(run, provenance={**run.provenance, "scheme": "implicit"})
-    assert made([run, run]) == "scheme continuous, step 0.001 s, method dormand-prince, stick-slip plant"
-    assert made([run, run, other]).split("; ") == [
+    assert run_settings([run, run]) == "scheme continuous, step 0.001 s, method dormand-prince, stick-slip plant"
+    assert run_settings([run, run, other]).split("; ") == [
         "scheme continuous",
         "scheme implicit",
         "all runs: step 0.001 s, method dormand-prince, stick-slip plant",
@@ -252,7 +252,7 @@ def test_every_way_in_which_runs_were_made_is_named_once(study):
 def test_a_caption_says_which_controller_ran_in_which_scheme(study):
     first, second, third = study.comparison.entries
     other = replace(third.run, provenance={**third.run.provenance, "scheme": "implicit", "step": 0.002})
-    assert made([(first, first.run), (second, second.run), (third, other)]).split("; ") == [
+    assert run_settings([(first, first.run), (second, second.run), (third, other)]).split("; ") == [
         "2-CTA (published), e-LQR (published): scheme continuous, step 0.001 s",
         "2-CTA (designed): scheme implicit, step 0.002 s",
         "all runs: method dormand-prince, stick-slip plant",

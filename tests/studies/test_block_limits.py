@@ -53,7 +53,7 @@ def test_modes_of_equal_blocks_are_those_of_a_chain():
     assert [mode.reached for mode in found.modes] == [True] + [False] * (len(wanted) - 1)
     assert found.modes[0].pressure == pytest.approx(float(task.amplitude / (task.authority * task.beta[1])), rel=1e-9)
     assert not found.feasible
-    assert f"{len(wanted) - 1} unstable modes out of reach" in found.lines()[-1]
+    assert f"{len(wanted) - 1} unstable modes, reached by no well" in found.lines()[-1]
     every = chain_limits(replace(chain, wells=(10e3, 30e3, 50e3, 70e3)))
     assert every.feasible
     assert [mode.pole for mode in every.modes] == pytest.approx(wanted, rel=1e-9)
@@ -199,7 +199,7 @@ def test_one_well_in_the_middle_reaches_the_modes_that_are_even(capsys, tmp_path
     assert (escaping.pressure, escaping.longest_step, escaping.farthest_well) == (None, None, None)
     assert max(map(len, found.lines())) <= 80
     told = "\n".join(found.lines())
-    assert "4 unstable modes out of reach" in told
+    assert "4 unstable modes, reached by no well" in told
     assert "for stress of 10 kPa on every block, pressures within\n1 MPa of the plan, diffusivity 1 m^2/s" in told
     path = tmp_path / "blocks.toml"
     text = (DATA / "three_sliding_blocks.toml").read_text()

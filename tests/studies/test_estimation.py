@@ -38,7 +38,7 @@ def test_hardware_comes_before_averaging():
 
 @pytest.mark.parametrize("more", [{"bandwidth": 50.0}, {"averaging": 3}])
 def test_what_belongs_to_a_differentiator_is_refused_without(more):
-    with pytest.raises(ParameterError, match=f"the {next(iter(more))} belongs to a differentiator"):
+    with pytest.raises(ParameterError, match=f"the {next(iter(more))} needs a differentiator"):
         sensor(1e-3, EXACT, None, **more)
 
 

@@ -168,7 +168,7 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
 def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
     both = study(REAL, slip_noise="1e-6", rate_noise="1e-5", prove=False)
     errors = "the slip with errors of no more than 1 µm, the slip rate with errors of no more than 10 µm/s"
-    assert both.sensing.words() == errors
+    assert both.sensing.summary() == errors
     assert f"even for one that measures {errors} up to each sample" in " ".join(" ".join(limits_lines(both)).split())
     plain = study(REAL, prove=False).peak_slip_rate_error
     assert both.peak_slip_rate_error.impossible_beyond > plain.impossible_beyond
@@ -180,7 +180,7 @@ def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
     ("told", "said"),
     [
         ({"slip_noise": -1}, "slip noise must be 0 or more"),
-        ({"measured": "slip", "rate_noise": 1}, "noise of the slip rate needs one that is measured"),
+        ({"measured": "slip", "rate_noise": 1}, "rate noise must be 0 unless the slip rate is measured"),
         ({"measured": "rate"}, "measured must be one of"),
     ],
 )
@@ -228,7 +228,7 @@ def test_the_figure_shows_the_earthquake_and_what_is_proved(designs):
 @pytest.mark.parametrize(("step", "said"), [(17.8, False), (17.9, True)])
 def test_a_fault_says_when_no_controller_can_hold_it_at_its_step(step, said):
     told = " ".join(beyond_control(dataclasses.replace(REAL, sampling_time=step)))
-    assert ("beyond 17.9 s none can" in told) is said  # 17.828 s
+    assert ("beyond 17.9 s no controller can" in told) is said  # 17.828 s
 
 
 @pytest.mark.parametrize("given", [{"pressure": 0.0}, {"pressure": -1.0}, {"diffusivity": 0.0}])

@@ -91,7 +91,7 @@ def test_a_state_asks_for_a_sampling_time_of_its_own_when_that_of_the_fault_is_f
     patch = load_fault("crustal-patch")
     step = patch.friction.critical_slip * patch.reference.operation_time / (20 * patch.reference.target_slip)
     lines = fault_sentences(replace(patch, sampling_time=factor * step))
-    assert (f"a guarantee of slow sliding wants sampling_time near D_c/(20 V), here {step:g} s" in lines) is said
+    assert (f"for a guarantee of slow sliding choose sampling_time near D_c/(20 V) = {step:g} s" in lines) is said
 
 
 @pytest.mark.slow

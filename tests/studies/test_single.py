@@ -105,7 +105,7 @@ def test_a_differentiator_comes_with_its_premise():
 def test_without_a_certificate_the_premise_on_the_run_says_so():
     _, (premise,) = told(choice(LAB, "cta", BASE).controller, duration=0.02)
     assert (premise.name, premise.certified, premise.ratio, premise.holds) == ("on_trajectory", 0, None, False)
-    assert "no certificate is at hand, and none of these gains exceeds 1.2 m/s^3" in premise.note
+    assert "no certificate was given, and none of these gains exceeds 1.2 m/s^3" in premise.note
 
 
 def test_a_certified_bound_goes_with_the_scale(monkeypatch):
@@ -177,7 +177,7 @@ def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
     assert len(asked) == 1
     limited = SimpleNamespace(proved=True, controller="limited")
     designs_in_place_of_searches(monkeypatch, limited)
-    assert single._designed_behind(LAB, "cta", {"lag": 0.02}) == "limited"
+    assert single._designed_for_path(LAB, "cta", {"lag": 0.02}) == "limited"
 
 
 def test_a_design_without_a_proof_behind_its_path_is_refused_with_the_reason(monkeypatch):

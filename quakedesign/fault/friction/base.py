@@ -94,11 +94,11 @@ class FrictionLaw(ABC):
 
     def require(self, **given: object) -> None:
         """Reject a value other than None that does not apply to the equilibrium of a fault with this friction."""
-        for name, message in self.equilibrium.refused.items():
+        for name, message in self.equilibrium.messages.items():
             if (value := given.get(name)) is not None:
                 raise ParameterError(message.format(value=value, law=self.name, states=", ".join(self.state_names)))
 
-    def _holding(self, values: "Mapping[str, sp.Expr]") -> Self:
+    def _with_values(self, values: "Mapping[str, sp.Expr]") -> Self:
         law = object.__new__(type(self))
         for name, value in values.items():
             object.__setattr__(law, name, value)
@@ -121,14 +121,14 @@ class FrictionLaw(ABC):
 
     def symbolic(self) -> Self:
         """Return the law with symbols for quantities; only for building expressions."""
-        return self._holding(self._options() | self.symbols())
+        return self._with_values(self._options() | self.symbols())
 
     def exact(self) -> Self:
         """Return the law with SymPy rationals for quantities; only for building expressions."""
         import sympy as sp
 
         exact = {name: sp.Rational(str(rational(getattr(self, name), name))) for name in self.quantities()}
-        return self._holding(self._options() | exact)
+        return self._with_values(self._options() | exact)
 
     def values(self) -> "dict[sp.Symbol, sp.Rational]":
         """Exact values of the quantities, by symbol."""

@@ -37,15 +37,15 @@ class RateAndState(FrictionLaw):
     Attributes
     ----------
     reference_coefficient : float
-        μ_0 [-], friction of steady sliding at the reference rate, positive.
+        Friction coefficient μ_0 [-] of steady sliding at the reference rate, positive.
     direct_effect, evolution_effect : float
         Direct effect a and evolution effect b [-], positive; friction with a < b weakens with rate.
     critical_slip : float
-        d_c [m], slip over which the state evolves, positive.
+        Slip d_c [m] over which the state evolves, positive.
     reference_rate : float
-        v_0 [m/s], positive, at which the fault is loaded in its natural cycle.
+        Rate v_0 [m/s], positive: loading rate of the natural cycle.
     slowest_rate, fastest_rate : float
-        v_s and v_f [m/s], ends of the working range, 0 < v_s ≤ v_0 ≤ v_f.
+        Ends v_s and v_f [m/s] of the working range, 0 < v_s ≤ v_0 ≤ v_f.
     stress_sensitivity : float
         α [-], not negative: the effective normal stress σ adds −(αθ/(bσ))·dσ/dt to dθ/dt (Linker and Dieterich 1992,
         J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds of friction are for a constant σ.

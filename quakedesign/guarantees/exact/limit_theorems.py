@@ -370,7 +370,7 @@ def too_slow(task: FaultPlant, withdrawal: Fraction, step: Fraction, delay: Frac
     return f"no controller that withdraws at most {most} can hold the fault {how}{_ASSUMED}"
 
 
-def hopeless(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
+def infeasibility(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffusion: Fraction) -> str:
     """Reason why the path is infeasible for every controller and every T_s; else empty.
 
     Parameters

@@ -31,7 +31,7 @@ _SEED = 5
 _DIGITS = 7
 
 
-def unclocked_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoProof:
+def aperiodic_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoProof:
     """Guarantee with an invariant set from a search, or the reason why there is none."""
     proof: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves")
     for raised in _RAISED:

@@ -31,7 +31,7 @@ from quakedesign.guarantees.exact.tracking_proof import (
     continuous_peaks,
     guarantee,
 )
-from quakedesign.guarantees.search.aperiodic_search import unclocked_estimate, unclocked_guarantee
+from quakedesign.guarantees.search.aperiodic_search import aperiodic_guarantee, unclocked_estimate
 from quakedesign.guarantees.search.float_bounds import (
     BoundsEstimate,
     closeness,
@@ -69,7 +69,7 @@ def best_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoPro
     With aperiodic sampling the guarantee uses an invariant set.
     """
     if held.longest_step:
-        return unclocked_guarantee(task, held)
+        return aperiodic_guarantee(task, held)
     slow = slow_gain(task, held)
     proof = guarantee(task, held) if slow is None else guarantee(task, held, slow)
     if slow is None or proof.proved:

@@ -28,4 +28,4 @@ __all__ = [
 def stages() -> dict[str, type[Stage]]:
     """Every stage of the package by name, in the order of the signal."""
     every = discovered(__name__, Stage, shared=("base", "chain"))
-    return dict(sorted(every.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].place)))
+    return dict(sorted(every.items(), key=lambda item: (issubclass(item[1], FlowStage), item[1].rank)))

@@ -43,17 +43,17 @@ class Stage(ABC):
         integral states of the law must not wind up.
     options : tuple of Option
         Command-line options; the first, if not at its default, adds the stage. Empty: a stage for Python only.
-    place : int
+    rank : int
         Rank in the signal order on the command line, among the sampled or among the dynamic stages.
     """
 
     name: ClassVar[str]
     limits: ClassVar[bool] = False
     options: ClassVar[tuple[Option, ...]] = ()
-    place: ClassVar[int] = 100
+    rank: ClassVar[int] = 100
 
     @classmethod
-    def asked(cls, step: float, **values: Any) -> Self:
+    def from_options(cls, step: float, **values: Any) -> Self:
         """Stage from the values of its `options`, for a sampling period [s]; by default these values are its fields."""
         return cls(**values)
 

@@ -45,29 +45,29 @@ class Actuator:
         for before, after in pairwise(self.stages):
             if isinstance(before, FlowStage) and isinstance(after, SampledStage):
                 raise ParameterError(
-                    f"stages that act once per sample come first. Received {before.name} before {after.name}. "
-                    "Exchange these two stages."
+                    f"stages that act once per sample must come first. Received {before.name} before {after.name}. "
+                    f"Put {after.name} before {before.name}."
                 )
         if len(between := [stage.name for stage in self.sampled if stage.part]) > 1:
             raise ParameterError(
-                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Omit all but one."
+                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Keep one of these."
             )
         if len(self._stores) > 1:
             names = ", ".join(stage.name for stage in self._stores)
-            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Omit all but one.")
+            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Keep one of these.")
 
     @classmethod
     def meant_for(cls, sampling: "Sampling") -> "Actuator":
         """Actuator with the delay, lag and diffusion path of a sampled law; no stages if it has none."""
         step, kinds = float(sampling.step), {kind.name: kind for kind in (Delay, Lag, Diffusion)}
         times: dict[str, Any] = {name: float(time) for name, time in sampling.path.items() if time}
-        return cls(stages=tuple(kinds[name].asked(step, **{name: time}) for name, time in times.items()))
+        return cls(stages=tuple(kinds[name].from_options(step, **{name: time}) for name, time in times.items()))
 
     def completed(self, other: "Actuator") -> "Actuator":
         """Actuator extended by those stages of another one whose kinds it does not have."""
         names = {stage.name for stage in self.stages}
         more = (stage for stage in other.stages if stage.name not in names)
-        along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.place))
+        along = sorted((*self.stages, *more), key=lambda stage: (isinstance(stage, FlowStage), stage.rank))
         return Actuator(stages=tuple(along))
 
     @property
@@ -110,7 +110,7 @@ class Actuator:
             if times > 1:
                 raise ParameterError(
                     f"a substep must be at most {LONGEST / stage.fastest:.3g} s for the {stage.name}. "
-                    f"Received {substep:.3g} s. Take {math.ceil(times)} times as many substeps, or leave the stage out."
+                    f"Received {substep:.3g} s. Take {math.ceil(times)} times as many substeps, or omit this stage."
                 )
 
     def hold(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Any, Entries]:

@@ -22,7 +22,7 @@ class Lag(FlowStage):
     """
 
     name: ClassVar[str] = "lag"
-    place: ClassVar[int] = 5
+    rank: ClassVar[int] = 5
     options: ClassVar[tuple[Option, ...]] = (
         Option(name="lag", unit="s", help="Time constant of pump and pipe, such as '1 s'."),
     )
@@ -33,8 +33,8 @@ class Lag(FlowStage):
         require_positive(time_constant=self.time_constant)
 
     @classmethod
-    def asked(cls, step: float, *, lag: float) -> Self:  # type: ignore[override]
-        """See `Stage.asked`."""
+    def from_options(cls, step: float, *, lag: float) -> Self:  # type: ignore[override]
+        """See `Stage.from_options`."""
         return cls(time_constant=lag)
 
     @property
@@ -96,7 +96,7 @@ class Diffusion(FlowStage):
     """
 
     name: ClassVar[str] = "diffusion"
-    place: ClassVar[int] = 6
+    rank: ClassVar[int] = 6
     options: ClassVar[tuple[Option, ...]] = (
         Option(
             name="diffusion",
@@ -131,8 +131,8 @@ class Diffusion(FlowStage):
         return cls(length=1.0, diffusivity=1.0 / time, storage=storage, cells=cells)
 
     @classmethod
-    def asked(cls, step: float, *, diffusion: float, **values: Any) -> Self:  # type: ignore[override]
-        """See `Stage.asked`."""
+    def from_options(cls, step: float, *, diffusion: float, **values: Any) -> Self:  # type: ignore[override]
+        """See `Stage.from_options`."""
         return cls.of_time(diffusion, **values)
 
     @property

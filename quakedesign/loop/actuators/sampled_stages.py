@@ -34,7 +34,7 @@ class Delay(SampledStage):
     """
 
     name: ClassVar[str] = "delay"
-    place: ClassVar[int] = 1
+    rank: ClassVar[int] = 1
     options: ClassVar[tuple[Option, ...]] = (
         Option(name="delay", unit="s", help="Delay of the computation, such as '2 ms'.", default=0.0),
         Option(
@@ -59,8 +59,8 @@ class Delay(SampledStage):
         Measurement(seed=self.seed)
 
     @classmethod
-    def asked(cls, step: float, *, delay: float, jitter: int | None = None) -> Self:  # type: ignore[override]
-        """See `Stage.asked`."""
+    def from_options(cls, step: float, *, delay: float, jitter: int | None = None) -> Self:  # type: ignore[override]
+        """See `Stage.from_options`."""
         if not 0 <= delay <= MOST_SAMPLES * step:
             raise ParameterError(
                 f"delay must be 0 to {MOST_SAMPLES} sampling periods of {step:g} s. Received {delay:g} s. "
@@ -103,7 +103,7 @@ class Quantisation(SampledStage):
     """
 
     name: ClassVar[str] = "quantisation"
-    place: ClassVar[int] = 2
+    rank: ClassVar[int] = 2
     options: ClassVar[tuple[Option, ...]] = (
         Option(name="quantum", unit="Pa", help="Resolution of the pressure, such as '1 kPa'."),
     )
@@ -138,7 +138,7 @@ class RateLimit(SampledStage):
 
     name: ClassVar[str] = "rate-limit"
     limits: ClassVar[bool] = True
-    place: ClassVar[int] = 4
+    rank: ClassVar[int] = 4
     options: ClassVar[tuple[Option, ...]] = (
         Option(name="rate_limit", unit="Pa/s", help="Fastest change of the pressure, such as '1 MPa/s'."),
     )
@@ -149,8 +149,8 @@ class RateLimit(SampledStage):
         require_positive(rate=self.rate)
 
     @classmethod
-    def asked(cls, step: float, *, rate_limit: float) -> Self:  # type: ignore[override]
-        """See `Stage.asked`."""
+    def from_options(cls, step: float, *, rate_limit: float) -> Self:  # type: ignore[override]
+        """See `Stage.from_options`."""
         return cls(rate=rate_limit)
 
     @property
@@ -184,7 +184,7 @@ class Saturation(SampledStage):
 
     name: ClassVar[str] = "saturation"
     limits: ClassVar[bool] = True
-    place: ClassVar[int] = 3
+    rank: ClassVar[int] = 3
     options: ClassVar[tuple[Option, ...]] = (
         Option(
             name="saturation",
@@ -206,8 +206,8 @@ class Saturation(SampledStage):
             )
 
     @classmethod
-    def asked(cls, step: float, *, saturation: float, withdrawal: float | None) -> Self:  # type: ignore[override]
-        """See `Stage.asked`."""
+    def from_options(cls, step: float, *, saturation: float, withdrawal: float | None) -> Self:  # type: ignore[override]
+        """See `Stage.from_options`."""
         return cls(lowest=0.0 - (saturation if withdrawal is None else withdrawal), highest=saturation)
 
     @property

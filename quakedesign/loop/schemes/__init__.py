@@ -13,7 +13,7 @@ from quakedesign.loop.schemes.base import Scheme, Stepped
 # ----------------------------------------------------------------------
 # Discretisation schemes of a control law, one a file, discovered in this folder.
 
-__all__ = ["Scheme", "Stepped", "own_way", "schemes", "simulation_scheme"]
+__all__ = ["Scheme", "Stepped", "scheme_of_run", "schemes", "simulation_scheme"]
 
 
 @cache
@@ -45,7 +45,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
 
 
 @checked
-def own_way(
+def scheme_of_run(
     controller: Controller | None, scheme: str | Scheme | None, step: float | None, usual: str = "explicit"
 ) -> tuple[str | Scheme, float | None, dict[str, Any]]:
     """Scheme and step of a run; a sampled law has its own scheme, step and settings.

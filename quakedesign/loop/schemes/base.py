@@ -185,7 +185,7 @@ class ControlStep:
     ----------
     function : casadi.Function
         (signals in the order of `SIGNALS`, integrals ξ, numbers of the law, memory of the scheme) → pressure [Pa],
-        integrals and memory at the next sample, and push, the change of the pressure [Pa] due to the change of ξ.
+        integrals and memory at the next sample, and effect, the change of the pressure [Pa] due to the change of ξ.
     numbers : tuple of float
         Numbers of this law; another law of the same kind has the same function.
     """
@@ -207,8 +207,8 @@ def control_step(kind: type[Decided], law: DiscreteLaw) -> ControlStep:
     decision = kind.decide(lifted.expressions[:split], law, values, ca.vertsplit(own) if kind.own_size else [])
     changes = (after - values[s] for s, after in zip(law.integrals, decision.integrals, strict=True))
     slope = discrete_law.values(lifted.expressions[split:], values)
-    push = sum((k * change for k, change in zip(slope, changes, strict=True)), start=ca.SX(0))
-    results = [decision.pressure, _column(decision.integrals), _column(decision.own), push]
+    effect = sum((k * change for k, change in zip(slope, changes, strict=True)), start=ca.SX(0))
+    results = [decision.pressure, _column(decision.integrals), _column(decision.own), effect]
     names = ["pressure", "integrals", "own", "push"]
     function = ca.Function("control", [*inputs.values(), own], results, [*inputs, "own"], [f"{n}_next" for n in names])
     return ControlStep(function, lifted.values)
@@ -252,7 +252,7 @@ class AperiodicClock:
             raise ParameterError(
                 f"shortest and longest interval of aperiodic sampling must be whole numbers of steps, 1 to "
                 f"{MOST_STEPS}, with shortest <= longest. Received {self.shortest!r} and {self.longest!r}. "
-                "Round both, or exchange them."
+                "Round both to whole numbers, and give the shorter one first."
             )
         Measurement(seed=self.seed)
 
@@ -297,7 +297,7 @@ class ControlSample:
     noise: list[ca.SX]
     clock: list[ca.SX]
     flow: list[ca.SX]
-    push: ca.SX
+    integral_effect: ca.SX
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -337,7 +337,7 @@ class Sampled(Scheme, Decided):
             )
 
     @property
-    def starts(self) -> tuple[float, ...]:
+    def initial_memory(self) -> tuple[float, ...]:
         """Initial values of the scheme's own memory, `own_size` entries."""
         return ()
 
@@ -358,9 +358,9 @@ class Sampled(Scheme, Decided):
         pressure: ca.SX = self.actuator.flow(sample.numbers, sample.flow, self._sections(sample)[0][0])[1]
         return pressure
 
-    def push(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
+    def integral_effect(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
         """Pressure change [Pa] (SX) due to the change of ξ at a sample; ξ stays constant where a limit prevents it."""
-        return self._sample(loop, counter, state, step).push
+        return self._sample(loop, counter, state, step).integral_effect
 
     def outputs(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> dict[str, ca.SX]:
         """See `Scheme.outputs`."""
@@ -426,7 +426,7 @@ class Sampled(Scheme, Decided):
             "sampled": tuple(v for stage in sampled for v in stage.numbers),
             "flowing": tuple(v for stage in flowing for v in stage.numbers),
             "deviation": self.measurement.numbers,
-            "own": self.starts,
+            "own": self.initial_memory,
             "held": (0.0,),
             "kept": tuple(v for stage in sampled for v in stage.start),
             "noise": self.measurement.start,
@@ -450,13 +450,13 @@ class Sampled(Scheme, Decided):
         signals = ca.vertcat(*(inputs[symbol] for symbol in SIGNALS))
         before = state[2 : 2 + count]
         given = signals, before, ca.vertcat(*part["law"]), ca.vertcat(*part["own"])
-        pressure, after, own, push = self.control_step(loop).function(*given)
+        pressure, after, own, effect = self.control_step(loop).function(*given)
         applied, excess, memories = self.actuator.hold(part["sampled"], part["kept"], pressure, ahead * step)
-        winds = excess * push > 0
+        winds = excess * effect > 0
         integrals = [ca.if_else(winds, before[i], after[i]) for i in range(count)]
         memory = [own[i] for i in range(self.own_size)]
         sample = ControlSample(
-            part["held"][0], applied, integrals, part["flowing"], memory, memories, noise, [], part["flow"], push
+            part["held"][0], applied, integrals, part["flowing"], memory, memories, noise, [], part["flow"], effect
         )
         return self._if_now(sample, ca.vertsplit(before) if count else [], part) if self.clock else sample
 

@@ -78,8 +78,8 @@ class Compensated(Sampled):
         return pull.xreplace(none), feed_forward.xreplace(none), slope
 
     @property
-    def starts(self) -> tuple[float, ...]:
-        """See `Sampled.starts`: whether a sample has been taken, e2⁻, the last feed-forward, d, weight and limit."""
+    def initial_memory(self) -> tuple[float, ...]:
+        """See `Sampled.initial_memory`: whether a sample has been taken, e2⁻, last feed-forward, d, weight, limit."""
         width = _WIDEST if self.rest_width is None else float(self.rest_width)
         least = -_WIDEST if self.rest_least is None else float(self.rest_least)
         largest = _WIDEST if self.rest_largest is None else float(self.rest_largest)

@@ -132,7 +132,7 @@ class Inclusion:
         jumps = [self._jump(argument, inputs) for argument in self.arguments]
         sides, there = [], []
         for number, point in enumerate(jumps):
-            low, high = (self._beside(excess, inputs, jumps, number, s) for s in (-1.0, 1.0))
+            low, high = (self._one_sided(excess, inputs, jumps, number, s) for s in (-1.0, 1.0))
             at = ca.logic_and(low <= 0, high >= 0)
             share = -(high + low) / ca.if_else(high > low, high - low, 1)
             there.append((at, point | self._signs(jumps, number, share)))
@@ -170,7 +170,7 @@ class Inclusion:
         signs = [own if i == number else ca.if_else(way == 0, own, way) for i, way in enumerate(ways)]
         return dict(zip(self.signs, signs, strict=True))
 
-    def _beside(
+    def _one_sided(
         self, excess: sp.Expr, inputs: InclusionValues, jumps: list[InclusionValues], number: int, side: float
     ) -> ca.SX:
         """F on one side of a jump."""
@@ -182,7 +182,7 @@ class Inclusion:
         moved = (end_slip, self.slip_error + self.step * end_rate)
         straight = sp.Poly(sp.expand(target.subs(*moved)), end_rate) if _is_straight(target) else None
         if straight is None:
-            end = _where(needed, self._used(target, inputs), partial(self._free_end, target))
+            end = _where(needed, self._dependencies(target, inputs), partial(self._free_end, target))
         else:
             end = to_casadi([straight.coeff_monomial(1) / (1 - straight.coeff_monomial(end_rate))], inputs)[0]
         return {sign: inputs[sign] for sign in self.signs} | self._ends(inputs, end)
@@ -193,7 +193,7 @@ class Inclusion:
 
     def _quarter(self, falling: sp.Expr, inputs: InclusionValues, width: ca.SX) -> ca.SX:
         """Zero of a decreasing function of the end of the step, between 0 and `width`."""
-        test, inputs = _sign_only(falling), self._used(falling, inputs)
+        test, inputs = _sign_only(falling), self._dependencies(falling, inputs)
         before = ca.SX.sym("before", 2 + len(inputs))
         low, length, *values = ca.vertsplit(before)
         by_symbol = dict(zip(inputs, values, strict=True))
@@ -205,7 +205,7 @@ class Inclusion:
         start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *inputs.values())
         return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
 
-    def _used(self, expression: sp.Expr, inputs: InclusionValues) -> InclusionValues:
+    def _dependencies(self, expression: sp.Expr, inputs: InclusionValues) -> InclusionValues:
         """Inputs on which an expression depends, only these: a call counts every argument as a dependency."""
         names = expression.free_symbols | {self.slip_error, self.step}
         return {symbol: value for symbol, value in inputs.items() if symbol in names}

@@ -65,8 +65,8 @@ class StickSlip(Sampled):
         return Compensated.derive(law)
 
     @property
-    def starts(self) -> tuple[float, ...]:
-        """See `Sampled.starts`: both weights and the slip at rest, then the states of the estimate, all 0."""
+    def initial_memory(self) -> tuple[float, ...]:
+        """See `Sampled.initial_memory`: both weights and the slip at rest, then the states of the estimate, all 0."""
         return float(self.weight), float(self.slip_weight), float(self.rest_slip), *(0.0,) * len(_STATES)
 
     def nominal(self, loop: Stepped) -> float:

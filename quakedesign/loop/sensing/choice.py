@@ -200,7 +200,7 @@ def joint_condition(
     slip_error, rate_error, *_ = worst_errors(differentiator, noise)
     required = math.inf
     if differentiator.order == 1:
-        required = acceleration + fault.authority_range[1] * pressure_swing(controller, slip_error, rate_error)
+        required = acceleration + fault.authority_range[1] * pressure_difference(controller, slip_error, rate_error)
     ratio = required / differentiator.bound
     return JointCondition(
         required=required,
@@ -244,7 +244,7 @@ def smallest_bound(
     return float(10.0**high)
 
 
-def pressure_swing(controller: Controller, slip_error: float, rate_error: float) -> float:
+def pressure_difference(controller: Controller, slip_error: float, rate_error: float) -> float:
     """Largest pressure difference [Pa] of a law across the origin, between ±(ε1, ε2)/2 and between ±(ε1, −ε2)/2."""
     return max(
         abs(_pressure(controller, a / 2, b / 2) - _pressure(controller, -a / 2, -b / 2))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 Entries = list["ca.SX"]
-"""Numbers or memory of an element of the loop, in the vector that the compiled loop carries along."""
+"""Numbers or memory of an element of the loop: entries of the state vector of the compiled loop."""
 
 # ----------------------------------------------------------------------
 # Interface of sensors and of their elements.

@@ -49,7 +49,7 @@ from quakedesign.lyapunov.search.lyapunov_search import (
     with_largest_decay,
 )
 from quakedesign.lyapunov.search.settling_time import fastest_settling
-from quakedesign.parallel import Crew, Here, crew_or_here
+from quakedesign.parallel import Crew, InProcess, crew_or_here
 from quakedesign.sos.solve.conic import collecting
 
 # ----------------------------------------------------------------------
@@ -418,7 +418,7 @@ def synthesise(
     require_count(_MOST_STARTS, starts=starts)
     require_count(MOST_WORKERS, workers=workers)
     first = list(islice(begin_with(problem, seed), starts * _DRAWS))
-    with Here() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
+    with InProcess() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         best = _best(problem, _climbed(problem.setting, first, starts, crew))
     mine = _synthesis(problem, *best) if best else None
     return _compared(problem, mine) if compare else mine
@@ -466,7 +466,7 @@ def _climbed(setting: PathSetting, first: Sequence[Loop], wanted: int, crew: Cre
     """Climbs from the requested number of feasible starts, in the order of the starts."""
     done: list[list[State]] = []
     for at in range(0, len(first), crew.width):
-        climbs = dict(crew.answers(attempt, [(setting, loop) for loop in first[at : at + crew.width]]))
+        climbs = dict(crew.results(attempt, [(setting, loop) for loop in first[at : at + crew.width]]))
         done += [climbs[place] for place in sorted(climbs) if climbs[place]]
         if len(done) >= wanted:
             break

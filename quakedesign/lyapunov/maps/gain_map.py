@@ -25,7 +25,7 @@ from quakedesign.lyapunov.exact.claim import Loop, root_enclosure
 from quakedesign.lyapunov.maps.sweep import CLEAR, Frame, Path, Sweep, prove
 from quakedesign.lyapunov.search.certify import Number, closed_loop, necessary_limit
 from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees
-from quakedesign.parallel import Crew, Here, crew_or_here
+from quakedesign.parallel import Crew, InProcess, crew_or_here
 from quakedesign.sos.solve.conic import collecting
 
 # ----------------------------------------------------------------------
@@ -167,7 +167,7 @@ class Screeners:
             When processes die repeatedly; a single killed process is replaced.
         """
         tasks = [(self._sheet, method, one) for one in arguments]
-        return (answer for _, answer in self._crew.answers(_answer, tasks))
+        return (answer for _, answer in self._crew.results(_answer, tasks))
 
 
 class _Cached(threading.local):
@@ -285,7 +285,7 @@ def gain_map(
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
-    with Here() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
+    with InProcess() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         began, screeners = perf_counter(), Screeners(sheet, crew)
         limits, screened, solves = _screen(sheet, screeners, tell)
         middle = perf_counter()

@@ -18,7 +18,7 @@ from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.files import sole_writer, temporary_folder
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.parallel import Crew, crew_of
 from quakedesign.simulation.campaign.campaign_result import Campaign, Failure, badness, metric_names, require_metric
 from quakedesign.simulation.campaign.ledger import Ledger
@@ -197,7 +197,7 @@ def campaign_problem(
         If a value is out of range, or a scheme or integrator is unknown.
     """
     require_whole(0, seed=seed)
-    way, step, own = own_way(controller, scheme, step)
+    way, step, own = scheme_of_run(controller, scheme, step)
     entries: dict[str, Any] = {"fault": fault, "controller": controller, "seed": seed}
     entries["setting"] = RunSetting.of(fault, step, duration, 1, settled_from)
 

@@ -411,7 +411,7 @@ def test_a_file_is_for_faults_whose_healing_it_covers(monkeypatch):
     real = qd.load_fault("real-fault")
     half = real.with_disturbance(replace(real.disturbance, amplitude=real.disturbance.amplitude / 2))
     certified_choice(replace(half, friction=replace(half.friction, healing=3.1e-5)), FILE)
-    with pytest.raises(CertificateError, match=r"up to 3\.11e-05 there, 3\.2e-05 here"):
+    with pytest.raises(CertificateError, match=r"healing of the fault 3\.2e-05, .* 3\.11e-05"):
         certified_choice(replace(half, friction=replace(half.friction, healing=3.2e-5)), FILE)
 
 
@@ -428,8 +428,8 @@ def test_check_says_of_a_fault_that_heals_whether_that_is_covered(monkeypatch, t
     verdict, lines = said(half, 3.1e-5)
     assert verdict == "proved"
     assert lines[-1] == "covered: friction at rest up to 3.1e-05 above friction in slip (healing of the fault file)"
-    assert "must be covered beside its disturbance, up to 3.11e-05. Received 3.2e-05" in said(half, 3.2e-5)[0]
-    assert "up to 0. Received 1e-06" in said(real, 1e-6)[0]
+    assert "must be at most 3.11e-05, covered with its disturbance. Received 3.2e-05" in said(half, 3.2e-5)[0]
+    assert "at most 0, covered with its disturbance. Received 1e-06" in said(real, 1e-6)[0]
     assert "not those of" in said(half, 0.0)[0]  # without healing its data are others
     twice = real.with_disturbance(replace(real.disturbance, amplitude=real.disturbance.amplitude * 2))
     assert "not those of" in said(twice, 1e-6)[0]  # its disturbance alone exceeds that of the claims

@@ -14,7 +14,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_g
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import aperiodic_search as unclocked
 from quakedesign.guarantees.search import linear_design as design
-from quakedesign.guarantees.search.aperiodic_search import unclocked_estimate, unclocked_guarantee
+from quakedesign.guarantees.search.aperiodic_search import aperiodic_guarantee, unclocked_estimate
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
 
@@ -28,7 +28,7 @@ def stored():
 
 def found(rate_limited=False, **changes):
     task = replace(uncertain_plant(load_fault("lab-fault"), rate_limited=rate_limited))
-    return unclocked_guarantee(task, replace(stored().held, **changes))
+    return aperiodic_guarantee(task, replace(stored().held, **changes))
 
 
 @pytest.fixture(autouse=True)
@@ -96,7 +96,7 @@ def test_a_law_of_the_slip_alone_has_too_many_states():
     task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
     assert "slip and slip rate" in design_held(task, F(1, 1000), measured="slip", setup=ExactSetup(**around)).reason
     held = replace(stored().held, law=longer(stored().held.law))
-    assert "too many states" in unclocked_guarantee(task, held).reason
+    assert "too many states" in aperiodic_guarantee(task, held).reason
     assert unclocked_estimate(task, held) is None
 
 

@@ -84,7 +84,7 @@ def test_a_part_is_less_than_a_whole_sample(part):
     ],
 )
 def test_a_time_is_so_many_periods_to_a_billionth_of_one_and_a_part(step, delay, samples, part):
-    found = Delay.asked(step, delay=delay)
+    found = Delay.from_options(step, delay=delay)
     assert (found.samples, found.jitter, found.seed) == (samples, 0, 0)
     assert found.part == pytest.approx(part, rel=0, abs=4e-15)
     assert (found.part == 0) is (part == 0)
@@ -93,13 +93,13 @@ def test_a_time_is_so_many_periods_to_a_billionth_of_one_and_a_part(step, delay,
 @pytest.mark.parametrize("delay", [-1e-9, 0.2500001 * 100, 26.0, float("nan"), float("inf")])
 def test_a_time_is_at_most_a_hundred_periods(delay):
     with pytest.raises(ParameterError, match=r"delay must be 0 to 100 sampling periods of 0\.25 s"):
-        Delay.asked(0.25, delay=delay)
+        Delay.from_options(0.25, delay=delay)
 
 
 def test_jitter_is_asked_for_with_a_delay_or_without():
-    assert Delay.asked(0.25, delay=0.5, jitter=3) == Delay(samples=2, jitter=3)
+    assert Delay.from_options(0.25, delay=0.5, jitter=3) == Delay(samples=2, jitter=3)
     (without,) = (option.default for option in Delay.options if option.name == "delay")
-    assert Delay.asked(0.25, delay=without, jitter=100) == Delay(samples=0, jitter=100)
+    assert Delay.from_options(0.25, delay=without, jitter=100) == Delay(samples=0, jitter=100)
 
 
 def test_a_delay_comes_before_what_the_pump_does():

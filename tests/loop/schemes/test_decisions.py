@@ -12,7 +12,7 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import Sampling, control_law
 from quakedesign.loop import discrete_law, schemes, simulation_scheme
 from quakedesign.loop.discrete_law import DiscreteLaw, acceleration, authority, held, rate_error, slip, slip_error, step
-from quakedesign.loop.schemes import own_way
+from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.schemes.implicit import end_rate, end_slip
@@ -109,13 +109,13 @@ def test_a_constant_pressure_is_no_law_to_compensate():
 
 def test_the_compensated_scheme_starts_without_a_sample_and_in_the_middle_of_the_box():
     scheme, fault = simulation_scheme("compensated", weight=0.25), load_fault("real-fault")
-    assert scheme.starts[:5] == (0, 0, 0, 0, 0.25)
-    assert scheme.starts[6:] == (0, 0, -1e30, 1e30, 0, 0, 0)
-    assert scheme.own_size == len(scheme.starts) == 13
+    assert scheme.initial_memory[:5] == (0, 0, 0, 0, 0.25)
+    assert scheme.initial_memory[6:] == (0, 0, -1e30, 1e30, 0, 0, 0)
+    assert scheme.own_size == len(scheme.initial_memory) == 13
     limited = simulation_scheme("compensated", rest_width=7.0, rest_per_slip=3.0, rest_resolution=2.0)
-    assert limited.starts[5:] == (7, 3, 2, -1e30, 1e30, 0, 0, 0)
+    assert limited.initial_memory[5:] == (7, 3, 2, -1e30, 1e30, 0, 0, 0)
     within = simulation_scheme("compensated", rest_width=7.0, rest_least=-4.0, rest_largest=5.0, rest_fastest=6.0)
-    assert within.starts[5:] == (7, 0, 0, -4, 5, 6, 0, 0)
+    assert within.initial_memory[5:] == (7, 0, 0, -4, 5, 6, 0, 0)
     assert within.settings.items() >= {"rest_least": -4, "rest_largest": 5, "rest_fastest": 6}.items()
     assert "rest_least" not in limited.settings
     assert [limited.settings[f"rest_{name}"] for name in ("width", "per_slip", "resolution")] == [7, 3, 2]
@@ -148,14 +148,14 @@ TOLD = {"weight": 0.25, "authority": 3e-8}
 
 def test_a_law_runs_as_asked_for_unless_it_is_one_of_samples():
     for controller in (None, FREE):
-        assert own_way(controller, None, None) == ("explicit", None, {})
-        assert own_way(controller, None, 0.5, "implicit") == ("implicit", 0.5, {})
-        assert own_way(controller, "continuous", 0.5) == ("continuous", 0.5, {})
+        assert scheme_of_run(controller, None, None) == ("explicit", None, {})
+        assert scheme_of_run(controller, None, 0.5, "implicit") == ("implicit", 0.5, {})
+        assert scheme_of_run(controller, "continuous", 0.5) == ("continuous", 0.5, {})
     told = simulation_scheme("compensated", **TOLD)
-    assert own_way(OWNED, None, None) == own_way(OWNED, "compensated", 0.1) == ("compensated", 0.1, TOLD)
-    assert own_way(OWNED, told, 0.1) == own_way(OWNED, told, None) == (told, 0.1, {})
+    assert scheme_of_run(OWNED, None, None) == scheme_of_run(OWNED, "compensated", 0.1) == ("compensated", 0.1, TOLD)
+    assert scheme_of_run(OWNED, told, 0.1) == scheme_of_run(OWNED, told, None) == (told, 0.1, {})
     plain = replace(FREE, sampling=Sampling(step=F(1, 10)))
-    assert own_way(plain, None, None, "implicit") == ("explicit", 0.1, {})
+    assert scheme_of_run(plain, None, None, "implicit") == ("explicit", 0.1, {})
 
 
 @pytest.mark.parametrize(
@@ -179,7 +179,7 @@ def test_a_law_of_samples_runs_as_it_was_designed(scheme, period, received):
     with pytest.raises(
         ParameterError, match=r"compensated, weight 0\.25, authority 3e-08 and the step 0\.1 s.*" + received
     ):
-        own_way(OWNED, scheme, period)
+        scheme_of_run(OWNED, scheme, period)
 
 
 def test_values_are_those_of_the_expressions():

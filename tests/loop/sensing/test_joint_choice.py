@@ -11,7 +11,7 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import control_law, published
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing import Differentiator, OutputFeedback, joint_condition, smallest_bound
-from quakedesign.loop.sensing.choice import pressure_swing
+from quakedesign.loop.sensing.choice import pressure_difference
 from quakedesign.simulation import simulate
 
 LAB = load_fault("lab-fault")
@@ -28,7 +28,7 @@ def tracks(differentiator):
 
 
 def test_the_swing_of_a_linear_law_is_its_gains_times_the_errors():
-    assert pressure_swing(PUBLISHED["elqr"], 1e-6, 1e-3) == pytest.approx(4.17e8 * 1e-6 + 6.94e5 * 1e-3)
+    assert pressure_difference(PUBLISHED["elqr"], 1e-6, 1e-3) == pytest.approx(4.17e8 * 1e-6 + 6.94e5 * 1e-3)
 
 
 @pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
@@ -36,7 +36,7 @@ def test_errors_of_either_sign_are_thought_of(signs):
     gains = dict.fromkeys(PUBLISHED["elqr"].gain_units, 0)
     slip, rate, *_ = gains
     law = control_law("elqr")(gains=gains | {slip: 3 * 10**8 * signs[0], rate: 7 * 10**5 * signs[1]})
-    assert pressure_swing(law, 1e-6, 1e-3) == pytest.approx(300 + 700, rel=1e-12)
+    assert pressure_difference(law, 1e-6, 1e-3) == pytest.approx(300 + 700, rel=1e-12)
 
 
 def test_without_a_pressure_the_bound_is_the_acceleration_which_it_must_exceed():
@@ -62,7 +62,7 @@ def test_unless_told_there_is_no_noise():
 def test_the_swing_of_the_sliding_mode_is_that_of_its_powers_astride_the_origin():
     a, b = 1e-9, 1e-6
     nu = 7.5 * 500 ** (2 / 3) * 2 * (a / 2) ** (1 / 3) + 5 * 500**0.5 * 2 * (b / 2) ** 0.5
-    assert pressure_swing(PUBLISHED["cta"], a, b) == pytest.approx(nu * 1385 / 4, rel=1e-12)
+    assert pressure_difference(PUBLISHED["cta"], a, b) == pytest.approx(nu * 1385 / 4, rel=1e-12)
 
 
 @pytest.mark.slow

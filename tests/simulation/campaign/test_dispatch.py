@@ -4,7 +4,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Future, wait
 
 import pytest
 
-from quakedesign.parallel import Crew, Given, SerialExecutor
+from quakedesign.parallel import Crew, SerialExecutor, UserExecutor
 from quakedesign.simulation.campaign import running
 from quakedesign.simulation.campaign.running import dispatch
 
@@ -56,7 +56,7 @@ def run(crew, task, count):
 
 
 def test_all_answers_are_kept():
-    found, failed = run(Given(SerialExecutor()), lambda i: i * i, 10)
+    found, failed = run(UserExecutor(SerialExecutor()), lambda i: i * i, 10)
     assert found == {i: i * i for i in range(10)}
     assert not failed
 

@@ -20,7 +20,7 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.sensing.measurement import Measurement
-from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.parallel import SerialExecutor, UserExecutor
 from quakedesign.simulation.campaign import campaign_problem, run_campaign, running
 from quakedesign.simulation.campaign.ledger import Ledger
 
@@ -157,7 +157,7 @@ import json, os, random, signal, sys, time
 from dataclasses import replace
 from quakedesign.laws import published
 from quakedesign.fault import load_fault
-from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.parallel import UserExecutor, SerialExecutor
 from quakedesign.simulation.campaign import campaign_problem, run_campaign, running
 from quakedesign.simulation.campaign.ledger import Ledger
 from quakedesign.loop.sensing.measurement import Measurement
@@ -333,7 +333,7 @@ def test_a_search_needs_a_metric_that_some_sample_has(tmp_path):
 def test_a_batch_fills_lanes_and_workers_and_is_lost_in_half_a_minute(tmp_path, count, width, steps, size):
     program = SimpleNamespace(lanes=8, batch_steps=80_000_000)
     problem = SimpleNamespace(setting=SimpleNamespace(steps=steps))
-    with Given(SerialExecutor(), width=width) as crew:
+    with UserExecutor(SerialExecutor(), width=width) as crew:
         runner = running._Runner(problem, Ledger(tmp_path, ""), program, crew, None, lambda *_: None)
         assert runner._batch_size(count) == size
 

@@ -19,7 +19,7 @@ from quakedesign.guarantees.search.lqg import sliding_law, sliding_model
 from quakedesign.laws import LinearLaw, SampledController, published, summed_integrals
 from quakedesign.loop import Actuator, Lag, simulation_scheme
 from quakedesign.loop.sensing import Measurement
-from quakedesign.parallel import Given, SerialExecutor
+from quakedesign.parallel import SerialExecutor, UserExecutor
 from quakedesign.simulation import Load, Tide
 from quakedesign.simulation.campaign import Campaign, campaign_problem, run_campaign, running
 from quakedesign.simulation.campaign.ledger import Ledger
@@ -79,7 +79,7 @@ def test_a_batch_over_a_whole_task_is_a_few_samples(tmp_path):
     """At most 10 000 steps of T_s = 300 s, all of which a worker that dies loses; of the shortest runs an eighth."""
     for duration, most in ((1e6, 3), (30000.0, 100), (3000.0, 250)):
         problem = campaign_problem(PATCH, CONTROLLER, duration=duration)
-        with Given(SerialExecutor(), width=1) as crew:
+        with UserExecutor(SerialExecutor(), width=1) as crew:
             runner = running._Runner(problem, Ledger(tmp_path, ""), problem.program, crew, None, lambda *_: None)
             assert runner._batch_size(2000) == most
 
@@ -170,7 +170,7 @@ def test_the_command_samples_what_design_found(tmp_path, monkeypatch, capsys):
         return SimpleNamespace(controller=CONTROLLER, sliding=SimpleNamespace(task=task))
 
     monkeypatch.setattr(synthesis, "design", designed)
-    monkeypatch.setattr(running, "crew_of", lambda *_: Given(SerialExecutor()))
+    monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(SerialExecutor()))
     monkeypatch.setattr(Campaign, "plot", lambda _: Figure())
     call = [
         "campaign",
