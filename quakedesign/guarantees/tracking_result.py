@@ -293,7 +293,9 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
         if not value:
             return f"without any {title}"
         if name not in ("delay", "lag", "diffusion"):
-            return f"with a {title} of at most {LowerBound(value).quantity(unit)}"
+            return (
+                f"with {'an' if title.startswith('a') else 'a'} {title} of at most {LowerBound(value).quantity(unit)}"
+            )
         text = shortly(value)  # not "at most": nothing is proved for smaller values
         return f"with a {title} of {text if Fraction(text) == value else exact_text(value)} {unit}"
     if name == BOX:

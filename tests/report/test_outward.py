@@ -76,7 +76,7 @@ def test_every_premise_of_a_sliding_mode(sliding):
         assert isinstance(premise.required, UpperBound)
         assert isinstance(premise.certified, LowerBound)
         if premise.required == premise.certified:
-            required, ratio = numbers("required at most #.*, certified the same number, ratio #", _line(premise))
+            required, ratio = numbers("required at most #.*, certified equal, ratio #", _line(premise))
         else:
             required, certified, ratio = numbers("required #.*, certified #.*, ratio #", _line(premise))
             assert F(certified) <= premise.certified
@@ -92,12 +92,12 @@ def test_every_premise_of_a_sliding_mode(sliding):
 def test_equal_sides_of_a_premise_are_not_said_to_differ():
     third, more = F(1, 3), F(1, 3) + F(1, 10**9)
     alike = Premise(name="x", required=third, certified=third, unit="m")
-    assert _line(alike) == "premise x holds: required at most 0.3334 m, certified the same number, ratio 1"
+    assert _line(alike) == "premise x holds: required at most 0.3334 m, certified equal, ratio 1"
     fails = Premise(name="x", required=more, certified=third, unit="-")
     assert _line(fails) == "premise x FAILS: required 0.3334, certified 0.3333, ratio 1.01"
     nothing = {"verdict": Verdict.UNDECIDED, "controller": None, "certificate": None}
     held = qd.Design(fault=LAB, name="cta", premises=(alike,), **nothing)
-    assert "<td>at most 0.3334 m</td><td>the same number</td>" in held._repr_html_()
+    assert "<td>at most 0.3334 m</td><td>equal</td>" in held._repr_html_()
 
 
 def test_sentences_and_domain_of_a_sliding_mode(sliding):

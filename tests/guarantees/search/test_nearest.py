@@ -100,7 +100,7 @@ def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_muc
         ("lag", F(1, 8), "with a lag of 0.125 s: "),
         ("diffusion", F(0), "without any diffusion time L^2/D: "),
         ("jitter", F(1, 3000), "with a jitter of at most 333 µs: "),
-        ("averaging", F(1, 80), "with a time of averaging of at most 12.5 ms: "),
+        ("averaging", F(1, 80), "with an averaging time of at most 12.5 ms: "),
         ("delay_jitter", F(1, 80), "with a jitter of the delay of at most 12.5 ms: "),
     ],
 )
