@@ -39,6 +39,7 @@ def designed(name):
 @pytest.fixture
 def unreached(monkeypatch):
     """Without how far other designs would go, which is another test's."""
+    designed("real")  # cached with it
     for name in ("longest_step", "longest_delay"):
         monkeypatch.setattr(f"quakedesign.guarantees.search.default_designs.{name}", lambda *_, **__: None)
 

@@ -53,6 +53,7 @@ def unproved(monkeypatch):
 @pytest.fixture
 def unreached(monkeypatch):
     """Without how far other designs would go, which is another test's."""
+    designed()  # cached with it
     for name in ("longest_step", "longest_delay"):
         monkeypatch.setattr(f"quakedesign.guarantees.search.default_designs.{name}", lambda *_, **__: None)
 
