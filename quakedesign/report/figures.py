@@ -420,9 +420,9 @@ def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
     bounds: dict[tuple[float, float], tuple[str, str]] = {}
     for entry in entries:
         proof = entry.proof
-        if proof is not None and "slip_rate_error" in proof.bounds:
+        if proof is not None and proof.slip_rate_error is not None:
             label = f"proved {proof.scope}".rstrip()
-            ends = float(proof.bounds["slip_error"]), float(proof.bounds["slip_rate_error"])
+            ends = float(proof.bounds["slip_error"]), float(proof.slip_rate_error)
             bounds.setdefault(ends, (colour(entry.design.name), label))
     named = set[str]()
     for (of_slip, of_rate), (shade, label) in bounds.items():

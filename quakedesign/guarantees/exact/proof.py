@@ -42,6 +42,8 @@ class Proof(ABC, Generic[B]):
         Whether its law is sampled.
     root : ImplicitRoot or None
         Implicit step of its law.
+    slip_rate_error : Bound or None
+        [m/s]; None where it is not claimed.
     """
 
     __slots__ = ()
@@ -90,6 +92,11 @@ class Proof(ABC, Generic[B]):
     def motion(self) -> str:
         """Condition of the slip-rate bound, as text."""
         return ""
+
+    @property
+    def slip_rate_error(self) -> Bound | None:
+        """Bound of the slip-rate error [m/s]; None where it is not claimed."""
+        return self.bounds.get("slip_rate_error")
 
     @property
     def cells(self) -> tuple[Any, ...]:
