@@ -455,7 +455,7 @@ BUDGETS = {
     "laws": 3105,
     "loop": 4169,
     "plant": 1445,
-    "guarantees": 13250,
+    "guarantees": 13252,
     "lyapunov": 6953,
     "linear": 2393,
     "synthesis": 1947,

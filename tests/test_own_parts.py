@@ -13,7 +13,7 @@ from quakedesign.cli import main
 from quakedesign.cli.app import app
 from quakedesign.errors import CertificateError, UnknownNameError, UnsupportedError, UserCodeError
 from quakedesign.fault import friction_law, parse_fault
-from quakedesign.fault.fault_template import template
+from quakedesign.fault.fault_schema import template
 from quakedesign.fault.fault_toml import fault_toml
 from quakedesign.laws import control_law, family
 from quakedesign.loop import simulation_scheme

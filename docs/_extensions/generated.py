@@ -13,7 +13,7 @@ DOCS = Path(__file__).parents[1]
 
 def _fault_file():
     """Rows of the keys of a fault file: table, key, type, meaning."""
-    from quakedesign.fault.fault_template import fault_schema
+    from quakedesign.fault.fault_schema import fault_schema
 
     schema = fault_schema()
     yield from _keys("", schema)

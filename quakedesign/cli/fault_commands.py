@@ -165,7 +165,7 @@ def init(
     import json
 
     from quakedesign.errors import OutputError
-    from quakedesign.fault.fault_template import SCHEMA_NAME, fault_schema, template
+    from quakedesign.fault.fault_schema import SCHEMA_NAME, fault_schema, template
     from quakedesign.files import write_whole
 
     if file.suffix != ".toml":

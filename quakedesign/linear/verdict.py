@@ -18,9 +18,9 @@ from quakedesign.guarantees.search.linear_design import certified_peaks
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.linear.linear_problem import LinearProblem, Matrix
 from quakedesign.linear.riccati import smallest_gain
+from quakedesign.linear.riccati_bounds import uncertainty_bounds
 from quakedesign.linear.robust_stability import Analysis, analysis
 from quakedesign.linear.sampled_stability import HeldLoop, VaryingVerdict, sampled_loop
-from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
 from quakedesign.lyapunov import Certificate
 from quakedesign.sos import Answer
 from quakedesign.sos.exact.polynomial import constant

@@ -10,7 +10,7 @@ import pytest
 from quakedesign.fault import Fault, fault_toml, friction_laws, load_fault, parse_fault, presets
 from quakedesign.fault.block_chain import BLOCK, DIFFUSION, WELL
 from quakedesign.fault.entries import entries_of
-from quakedesign.fault.fault_template import fault_schema, template
+from quakedesign.fault.fault_schema import fault_schema, template
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, TEXTS, WIDTHS
 from quakedesign.fault.units import si_value
 

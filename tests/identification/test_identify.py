@@ -13,7 +13,7 @@ import pytest
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, friction_law, load_fault
-from quakedesign.fault.fault_template import template
+from quakedesign.fault.fault_schema import template
 from quakedesign.fault.fault_toml import step_assumed
 from quakedesign.identification.fault_file import (
     cover,

@@ -9,7 +9,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
-from quakedesign.linear.uncertainty_bounds import uncertainty_bounds
+from quakedesign.linear.riccati_bounds import uncertainty_bounds
 from quakedesign.lyapunov.exact.perturbation_bounds import rest_pressure, sectors
 
 REAL = qd.load_fault("real-fault")

@@ -1,7 +1,8 @@
 """Robust small-gain theorem for sampled loops: bounds for all t ≥ 0 in exact arithmetic.
 
-Chapters: the theorem with the bounds of all inputs; slowly varying input gain, where friction depends on
-slip alone; sector bounds of the implicit step.
+Chapters: the theorem with the bounds of all inputs; slowly varying input gain, where friction depends on slip alone;
+sector bounds of the implicit step. Symbols are those of `plant.fault_plant`. A loop without noise, jitter, diffusion
+path or implicit step needs the paragraphs *Theorem* and *Inputs* alone.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

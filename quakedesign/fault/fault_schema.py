@@ -1,4 +1,4 @@
-"""Commented template of a fault file, and the JSON Schema of fault files, from the same entries."""
+"""JSON Schema of fault files and a commented template, from the same entries."""
 
 import inspect
 from collections.abc import Iterator, Mapping
