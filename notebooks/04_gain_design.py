@@ -39,7 +39,7 @@ print("checked again:", small.certificate.check())
 display(pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.norm, "times larger": c.ratio} for c in small.compared]))
 
 # %% [markdown]
-# Up to which $\bar L > 1$ are these gains proved, compared with the limit $k_3-k_4$ that no Lyapunov function can exceed?
+# Up to which $\bar L > 1$ are these gains proved? No Lyapunov function can prove more than $k_3-k_4$.
 
 # %%
 reach = {

@@ -36,7 +36,7 @@ period = fault.sampling_time  # T_s [s]
 
 # %% [markdown]
 # ## The sampled plant
-# `to_statespace` linearises the fault at rest at a slip, with the pressure [Pa] as input and slip [m] and slip rate [m/s] as outputs. One pole lies in the right
+# `to_statespace` linearises the fault at rest at a given slip, with the pressure [Pa] as input and slip [m] and slip rate [m/s] as outputs. One pole lies in the right
 # half-plane. Zero-order hold of the pressure gives the exact discrete-time plant.
 
 # %%
@@ -60,8 +60,8 @@ print(gains, "closed-loop poles:", np.round(np.abs(poles), 3))
 
 # %% [markdown]
 # ## Margins
-# The loop is opened at the pressure, and includes sampling, sums and zero-order hold. `loop_transfer` opens the loop of a law of the package. This law is in continuous time
-# until a scheme samples it; sampling reduces its margins.
+# The loop is opened at the pressure, and includes sampling, sums and zero-order hold. `loop_transfer` opens the loop of the package's law with these gains, in
+# continuous time because no scheme samples it. Sampling reduces the margins.
 
 # %%
 law = control_law("elqr")(gains={name: Fraction(value) for name, value in gains.items()})
