@@ -65,7 +65,7 @@ def load(kind: str, *key: bytes) -> bytes | None:
             if not stat.S_ISREG(status.st_mode) or not _owned(status):
                 return None
             content = file.read()
-            with suppress(OSError):  # an entry that is read again is not the oldest
+            with suppress(OSError):  # an entry that was read counts as new, and is not among the oldest
                 os.utime(file.fileno())
     except OSError:
         return None
@@ -120,7 +120,7 @@ class CachedStatement(pickle.Pickler):
         return getattr(value, name)
 
     def reducer_override(self, value: Any) -> Any:
-        """Reduction of a value that its fields or its items define."""
+        """Reduction of a dataclass to its fields, and of a read-only mapping to its items."""
         if isinstance(value, MappingProxyType):
             return dict, (tuple(value.items()),)
         if not is_dataclass(value) or isinstance(value, type):
@@ -129,7 +129,7 @@ class CachedStatement(pickle.Pickler):
 
 
 def stated(value: Any, writer: type[CachedStatement] = CachedStatement) -> bytes | None:
-    """A value in bytes, as a key; None if it cannot be pickled."""
+    """Bytes of a value, for use as a key; None if it cannot be pickled."""
     content = io.BytesIO()
     try:
         writer(content).dump(value)

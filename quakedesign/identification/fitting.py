@@ -20,14 +20,14 @@ from quakedesign.identification.experiment import Experiment
 
 CONFIDENCE = 0.95
 _SHARE_OF_NOISE = 3e-3
-_NEIGHBOUR_SHARE = 0.4  # largest share of an outlier in its neighbours on the same side; more is an unexplained peak
-_ROUNDING_SLOPE = 1e-7  # share of the largest slope, below which a slope is rounding
+_NEIGHBOUR_SHARE = 0.4  # an outlier's neighbours are below this share of it; else it is an unexplained peak
+_ROUNDING_SLOPE = 1e-7  # below this share of the largest slope, a slope is a rounding error
 _SHARE_OF_EXCESS = 2e-3  # excess by which a search may still improve when it ends
 _CANDIDATES = 64  # random starting points, simulated once
 _COARSE = 40  # steps of a search before it is compared with the others
 _AGREEMENT = 1e-3  # largest relative difference of the sums of squares of agreeing searches
 _ROUNDS = 6  # repetitions that remove outliers and refine steps
-_LONGEST_OUTLIER = 2  # successive samples; longer runs are no accident, and are retained
+_LONGEST_OUTLIER = 2  # successive samples; a longer run is not due to chance, and is retained
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ class Fit:
 
     @property
     def scaled(self) -> ndarray:
-        """Residuals [-] in deviations of one measurement, minus their prediction from the neighbours.
+        """Residuals [-] scaled to one measurement; with correlated noise minus the prediction from neighbours.
 
         The noise of a mean of n falls with the square root of n.
         """
@@ -83,7 +83,7 @@ class Fit:
 
     @property
     def freedom_of_noise(self) -> float:
-        """Degrees of freedom of the size of the noise; for correlated noise, its pieces."""
+        """Degrees of freedom of the estimated noise, at most its number of independent pieces."""
         return min(self.freedom, self.pieces, self.correlated.pieces if self.correlated is not None else math.inf)
 
     @property
@@ -109,7 +109,7 @@ class Fit:
         return float(max(sums[window[0] if len(window) else -1], 1.0))
 
     def excess(self, squares: float) -> float:
-        """Difference of a sum of squares from the smallest, in variances of the noise of independent samples."""
+        """Excess of a sum of squares over the smallest, divided by the noise variance of independent samples."""
         return (squares - self.squares) / (self.noise**2 * self.correlation)
 
     def threshold(self, count: int, chance: float = 1 - CONFIDENCE) -> float:
@@ -133,7 +133,7 @@ class Fit:
 
     @cached_property
     def slopes(self) -> ndarray:
-        """Derivatives of friction by the fitted coordinates, whitened as `whitened`."""
+        """Derivatives of friction with respect to the fitted coordinates, whitened like `whitened`."""
         return weighted(self.weights, _finite(self.experiment.slopes(self.fitted)))
 
     @cached_property
@@ -172,9 +172,9 @@ def fit(
     """Best fit of all starts, without outliers, on an experiment simulated accurately enough for the noise.
 
     `measured` friction [-] is a mean of `counts` measurements, or of one; `seed` is for the random starts, the first
-    of which may be given (`near`). Searches start from at most `most` of the best candidates, until at `least` so many
-    have run, two end in the best fit and it determines every coordinate. Raises `RecordError` when no candidate can be
-    simulated, or there are too few samples.
+    of which may be given (`near`). Searches start from at most `most` of the best candidates. They end when at least
+    `least` have run, two agree on the best fit, and this fit determines every coordinate. Raises `RecordError` when no
+    candidate can be simulated, or there are too few samples.
     """
     if len(measured) < 3 * len(experiment.coordinates):
         raise RecordError(
@@ -270,7 +270,7 @@ def _finite(slopes: ndarray) -> ndarray:
 def settled(fit: Fit) -> Fit:
     """A fit on a finer simulation and without outliers, repeated until neither changes.
 
-    Steps that are adequate for coordinates one deviation away are adequate here.
+    Simulation steps are retained while every coordinate moves by at most one standard deviation.
     """
     made_for = np.full_like(fit.fitted, np.inf)
     for _ in range(_ROUNDS):
@@ -289,7 +289,7 @@ def settled(fit: Fit) -> Fit:
 def outliers(residuals: ndarray) -> ndarray:
     """Samples so far off that noise alone gives one such sample with a probability of 5 %, in runs of at most two.
 
-    The size of the noise is that of the median residual. A peak that rises from its neighbours is no outlier.
+    The size of the noise is that of the median residual. A peak whose neighbours deviate too is no outlier.
     """
     off = residuals - np.median(residuals)
     size = np.median(np.abs(off)) / stats.norm.ppf(0.75)
@@ -306,7 +306,7 @@ def outliers(residuals: ndarray) -> ndarray:
 def advantage(one: Fit, other: Fit) -> tuple[float, float]:
     """Ratio of the sum of squares of another fit to that of this one, and the increase of its AIC.
 
-    At the samples that both fits use, for equal numbers of parameters: n·ln of this ratio, n independent samples.
+    On the samples of both fits. For equal parameter counts, the AIC increases by n·ln(ratio), n independent samples.
     """
     both = one.used & other.used
     if one.correlated is not None or other.correlated is not None:
@@ -319,10 +319,10 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
 
 _MOST_TRIALS = 14
 _CLOSE = 0.01  # relative tolerance of the required distance at an end
-_LIMIT = 0.98  # share of the distance to the limit of a coordinate from which on an end counts as the limit
+_LIMIT = 0.98  # an end beyond this share of the distance to a coordinate's limit counts as the limit
 _PATIENCE = 3  # trials after which the limit of a coordinate is tried
 _FIRST = 0.05  # first step if the slopes do not give one
-_BETTER = 0.1  # excess by which a profile has to improve on the fit to replace it
+_BETTER = 0.1  # a profile replaces the fit if it reduces the excess by more than this
 _FAR = 0.5  # change of a logarithmic coordinate after which the experiment is resolved again
 
 
@@ -361,10 +361,10 @@ class Profile:
         return self._end(threshold, -1), self._end(threshold, 1)
 
     def _end(self, threshold: float, side: int) -> float:
-        """End on one side: the root of the distance from the fit, which grows about linearly (bracketed secant).
+        """End on one side, by bracketed secants: the square root of the excess grows about linearly.
 
-        If the distance grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little.
-        An end at this limit, or where the experiment cannot be simulated, does not count.
+        If this root grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little.
+        An end at this limit, or where the experiment cannot be simulated, counts as infinite.
         """
         fit, place, wanted = self.fit, self.place, math.sqrt(threshold)
         furthest = abs(fit.experiment.bounds[(side + 1) // 2][place] - fit.fitted[place])

@@ -169,7 +169,7 @@ def _stiffness(record: Record, path: float, given: float | None) -> list[Coordin
 
 
 def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
-    """Experiment of a measured slip, after its last sample within the noise about zero."""
+    """Experiment with measured slip; samples up to the last one indistinguishable from zero slip are omitted."""
     assert record.slip is not None
     noise = scatter(record.time, record.slip)
     resting = np.flatnonzero(record.slip <= FAR_OFF * noise)
@@ -209,7 +209,7 @@ def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> S
 
 
 AGEING, SLIP = "rate-and-state-aging", "rate-and-state-slip"
-_LEAST_NEAR = 2  # searches, where the first begins near the fit of a similar law
+_LEAST_NEAR = 2  # least number of searches if the first begins near the fit of a similar law
 _EFFECTS_OF = ("direct_effect", "evolution_effect", SECOND_EFFECT)
 _MOST_BETTER = 10
 _MOST_MOVES = 4  # corrections of the times of rate changes, each to first order in the delay
@@ -218,8 +218,8 @@ _ONE_TREND = {"displacement": {TREND}, "time": {TREND_IN_TIME}}
 TREND_CHOICES = "auto", *_ONE_TREND, "none"
 _STAYS = 0.5  # standard deviations: a smaller delay needs no correction
 _NEGLIGIBLE = 0.1  # negligible effect of a rate error, in standard deviations of the whole record
-_UNSEEN = 1e-5  # of the range of friction: resolution that no machine reaches
-_CHANCE = 0.01  # probability that a trend or an unsteady beginning is fitted to noise, which changes a - b
+_UNSEEN = 1e-5  # resolution that no machine reaches, as a share of the range of friction
+_CHANCE = 0.01  # probability of fitting a trend or an unsteady beginning to noise; such a fit changes a - b
 
 
 def identify(
@@ -236,11 +236,11 @@ def identify(
     """Friction parameters of a laboratory record, each with its 95 % profile-likelihood interval.
 
     A law with state is fitted by simulation of the experiment: a spring connects a block without inertia to the load
-    point, whose rate is piecewise constant. A law that weakens with slip is fitted at the measured slip, or without one
-    to a block that sticks at first and then slips against a stiff spring. A trend of friction with displacement and an
-    unsteady beginning are fitted as well where the likelihood favours them. Noise is white, with a part correlated over
-    time or displacement where the likelihood favours it. A long record is fitted by means of neighbouring samples, each
-    with the weight of its samples.
+    point, whose rate is piecewise constant. A law that weakens with slip is fitted at the measured slip; if no slip is
+    measured, a block is simulated that sticks at first and then slips against a stiff spring. A trend of friction with
+    displacement and an unsteady beginning are fitted as well where the likelihood favours them. Noise is white, with a
+    part correlated over time or displacement where the likelihood favours it. In a long record neighbouring samples are
+    averaged, and each mean has the weight of its samples.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def identify(
     rates : sequence of float
         Successive rates of the load point [m/s], if known; by default from its displacement.
     states : int
-        1, or 2 for a second evolution effect with its own slip, which a fault file cannot state.
+        1, or 2 for a second evolution effect with its own critical slip; a fault file cannot state two.
     trend : str
         ``"displacement"``, ``"time"`` or ``"none"``; chosen by likelihood by default.
     seed : int
@@ -330,7 +330,7 @@ class _Choice:
     by_load: ndarray | None = None  # starts of the pieces by the load point alone [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
-        """Profiles about the best fit of the best law, with the times of rate changes corrected by friction."""
+        """Profiles about the best fit of the best law; times of rate changes are corrected by fitted delays."""
         first = _ONE_TREND.get(self.trend, {TREND} if self.trend == "auto" else set())
         fits: list[_Fitted] = []
         for kind in kinds:
@@ -354,7 +354,7 @@ class _Choice:
         return replace(result, assessment=choice._assessed(result, others))
 
     def _moved(self, fitted: _Fitted) -> "_Choice | None":
-        """Choice with the times of rate changes corrected by friction; None if they need no correction."""
+        """Choice with the times of rate changes corrected by fitted delays; None if they need no correction."""
         coordinates = fitted.best.experiment.coordinates
         places = [place for place, c in enumerate(coordinates) if c.name.startswith(DELAY)]
         delays, errors = fitted.best.fitted[places], fitted.best.deviations[places]
@@ -428,7 +428,7 @@ class _Choice:
     def _late_trend(self, result: Identification) -> float | None:
         """Change of a - b if the trend begins at the first change of rate; None if that fits decisively worse.
 
-        A slow evolution of friction after a change of rate looks like a trend, which is absent before.
+        A slow evolution of friction after a change of rate looks like a trend that is absent before the change.
         """
         fit, loading, load = result.fit, self.loading, self.record.load_point
         values = fit.experiment.outward(fit.fitted)
@@ -448,7 +448,7 @@ class _Choice:
     def _fitted(
         self, kind: type[FrictionLaw], nuisance: Collection[str], near: Fit | None, start: bool = True
     ) -> _Fitted:
-        """Best fit of a law, searched near that of a similar law, and with `start` from random points too."""
+        """Best fit of a law: the search begins near the fit `near`, and with `start` also at random points."""
         setup = set_up(self.record, kind, self.stiffness, self.loading, nuisance)
         measured = self.record.friction[setup.used]
         counts = None if self.record.counts is None else self.record.counts[setup.used]
@@ -521,7 +521,7 @@ class _Choice:
 def profiled(
     best: Fit, record: Record, setup: Setup, seed: int, names: Collection[str] | None = None
 ) -> Identification:
-    """Profiles about the best fit, of parameters by name or all; restarted if a profile finds a better fit."""
+    """Profiles of named or all parameters about the best fit; restarted if a profile finds a better fit."""
     for _ in range(_MOST_BETTER):
         try:
             estimates = _estimates(best, names)
@@ -545,9 +545,9 @@ def profiled(
 
 
 def needed(best: Fit, squares: float, fewer: int = 1) -> bool:
-    """Whether `fewer` further parameters improve a fit significantly, at a level of 1 %.
+    """Whether a fit is significantly better (level 1 %) than one with `fewer` parameters less.
 
-    Fisher's F test with the pieces of the noise; an improvement below the resolution of machines does not count.
+    `squares` is the latter's sum of squares. Fisher's F test; an improvement below machine resolution does not count.
     """
     resolution = _UNSEEN * float(np.ptp(best.measured))
     measurable = squares - best.squares > resolution**2 * best.freedom
@@ -568,7 +568,7 @@ def _with_noise(fitted: _Fitted, noise: CorrelatedNoise | None) -> _Fitted:
 
 
 def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, ParameterEstimate]:
-    """Estimates of coordinates by name or all, those of the law first.
+    """Estimates of named or all coordinates, those of the law first.
 
     For a law with both effects, their difference is a coordinate of the profiles: if the record determines only the
     difference, the valley of equal fits is straight.

@@ -117,7 +117,7 @@ class Law(ABC):
     Raises
     ------
     ParameterError
-        For a missing, unknown, or not finite gain.
+        For a missing, unknown or non-finite gain.
     """
 
     name: ClassVar[str]
@@ -229,7 +229,7 @@ Designed = TypeVar("Designed", covariant=True)
 class DesignProblem(Protocol[Designed]):
     """Design problem of a law for a fault, with the services that its design may use.
 
-    It gives a law access to the searches for proofs without importing them. The options ``objective``, ``continuous``,
+    Through it a law uses the searches for proofs without importing them. The options ``objective``, ``continuous``,
     ``feedforward``, ``measured`` and ``noise`` are those of `quakedesign.synthesis.design`.
     """
 
@@ -317,7 +317,7 @@ class Controller(Law):
         raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Omit the divisor.")
 
     def with_feedforward(self, feedforward: FeedForward) -> Self:
-        """Return the same law with another feed-forward; raises for a law without."""
+        """Return the same law with another feed-forward; raises for a law without one."""
         if feedforward != NONE:
             raise ParameterError(
                 f"feedforward is for sliding modes. Received {feedforward.name} for {self.name}. Omit feedforward."
@@ -330,7 +330,7 @@ class Controller(Law):
         return problem.by_method(cls)
 
     def premises(self, fault: Fault, certificate: Any) -> tuple[Any, ...]:
-        """Premises of its proofs on a fault besides those of its family (`quakedesign.lyapunov.exact.premises`)."""
+        """Premises of proofs on a fault, besides those of the law's family (`quakedesign.lyapunov.exact.premises`)."""
         return ()
 
     @abstractmethod

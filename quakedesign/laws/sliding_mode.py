@@ -40,7 +40,7 @@ class SlidingMode(Controller):
     feedforward : FeedForward
         Terms of the nominal plant that are added to ν; none by default.
     sampling : Sampling, optional
-        Sampling of a sampled law; None for the law in continuous time, which any scheme runs.
+        Sampling of a sampled law; None for the law in continuous time, which may run under any scheme.
     """
 
     integral_units: ClassVar[tuple[str, ...]] = ("m/s^2",)
@@ -180,7 +180,7 @@ class IntegratorChain(Law):
     def counterexample(
         cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
-        """At e1 = 1, e2 = … = en = 0, e(n+1) = −ν0, an equilibrium for a constant d that the sliding ξ' can cancel."""
+        """The equilibrium e1 = 1, e2 = … = en = 0, e(n+1) = −ν0, if the sliding ξ' can cancel a constant d there."""
         exact = [sp.Rational(gains[name].numerator, gains[name].denominator) for name in cls.gain_units]
         rest = sp.Rational(cls.virtual_control((sp.Integer(1), *[sp.Integer(0)] * (cls.order - 1)), exact))
         if rest == 0:

@@ -4,10 +4,10 @@ About p*(t), the pressure of equilibrium at rest at the reference r(t), the erro
 
     e1′ = e2,   e2′ = s·e1 − w·e2 + β·b·(p − p*) + φ − w·r′ − r″.
 
-p* balances N̂(μ*σ′ − μ(r, 0)(σ′ − p*)) = (k̂ − φ1)r; s and w are chords of friction between x and (r, 0), times N̂(σ′ −
-p*), with −k̂ + φ1 and η̂ − φ2; β·b = μ(x)N̂. So all three lie in ranges for every friction μ(x) with the given bounds
-and slopes. As k̂, N̂ and φ1 are constant, b·|dp*/dt| = |s_r|r′/β_r with s_r, β_r in the same ranges. r is constant
-outside [0, t_op].
+p* solves N̂(μ*σ′ − μ(r, 0)(σ′ − p*)) = (k̂ − φ1)r, and β·b = μ(x)N̂. s is −k̂ + φ1, and w is η̂ − φ2, each plus N̂(σ′ −
+p*) times a chord slope of friction between x and (r, 0): −Δμ/Δslip in s, Δμ/Δrate in w. So s, w and β lie in ranges for
+every friction μ(x) with the given bounds and slopes. As k̂, N̂ and φ1 are constant, b·|dp*/dt| = |s_r|r′/β_r with s_r,
+β_r in the same ranges. r is constant outside [0, t_op].
 """
 
 from collections.abc import Iterable
@@ -151,7 +151,7 @@ class FaultPlant:
 
     @cached_property
     def stress(self) -> Range:
-        """Range of σ′ − p* [Pa] along the reference, monotone in μ, κ, and in r between the evaluated points."""
+        """Range of σ′ − p* [Pa] along the reference; monotone in μ, in κ, and in r between `breaks`."""
         law, target = self.friction, self.target_slip
         breaks = {Fraction(0), target}
         breaks |= {(law.static - law.least) / law.weakening} if law.weakening else set()
@@ -206,7 +206,7 @@ class FaultPlant:
 
     @cached_property
     def reference_jerk(self) -> Fraction:
-        """Bound of |r‴| [m/s³] within the task; does not exist where r″ jumps at its ends."""
+        """Bound of |r‴| [m/s³] within the task; at its start and end r″ may jump."""
         bound = max(map(abs, _range_of(_derived(self.shape, 3))))
         return bound * self.target_slip / self.operation_time**3
 
@@ -274,7 +274,7 @@ def _derived(shape: tuple[Fraction, ...], order: int) -> tuple[Fraction, ...]:
 
 
 def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
-    """Coefficients on both halves (de Casteljau), those of the right half from its end."""
+    """Coefficients on both halves (de Casteljau); those of the right half are in reverse order."""
     left, right = [], []
     while row:
         left.append(row[0])

@@ -265,7 +265,7 @@ def brief(entry: "Entry") -> str:
     return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
 
 
-_WHOLE = 1e-3  # share of a task that a complete run may omit, as the last sample has no period
+_WHOLE = 1e-3  # a complete run may omit this share of a task, since no period follows its last sample
 HEADLINE = 200
 """Characters of a headline at most: two lines and a half of a terminal."""
 
@@ -451,7 +451,7 @@ _SAID = {
 # Sentences about a run of a fault whose friction has a state, without control or in slow sliding.
 
 _MOST_EVENTS = 8
-_LOCKED = 0.5  # share of the loading: a fault that slips less stores the rest
+_LOCKED = 0.5  # a fault that slips less than this share of the loading stores the rest
 FASTEST_PLATE = 1e-8
 """Loading rate [m/s] that no tectonic plate exceeds: 0.3 m per year."""
 _LABORATORY = 10.0  # length of a fault [m] below which a machine loads it

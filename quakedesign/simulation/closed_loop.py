@@ -106,7 +106,7 @@ class Variation:
         Factors of k̂, η̂ and N̂ [-], each within the fault's box.
     weakening : float
         Share of the friction drop that takes place [-], 0 … 1: μ = μ_res + weakening·(μ_law − μ_res). Together with
-        the authority it determines β. For every value μ and its slope are within the bounds of every box.
+        the authority it determines β. For every such share, μ and its slope are within the bounds of every box.
     amplitude : float
         Share of the amplitude of the fault's sinusoidal disturbance that acts [-], 0 … 1.
     phase : float
@@ -332,7 +332,7 @@ class Metered(Stepped):
         )
 
     def budget(self, integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
-        """Budget of a run from rest of a given time [s], from the integrals of `powers` and the last state."""
+        """Budget of a run that starts at rest and lasts `time` [s], by the integrals of `powers` and the last state."""
         mass, drift = self.fault.mass, self.load.drift
         stiffness, normal, damping, stress = map(float, self.hats())
         static = normal * stress * float(self.static_friction)
@@ -375,7 +375,7 @@ def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 def acceleration_expression(fault: Fault, varied: bool = False) -> sp.Expr:
     """x2' [m/s²] of eq. shift in x1, x2, p and the disturbance φ, with friction continued to slip < 0 (ERRATA 12).
 
-    With `varied`, here and below, also in the factors of `symbols`.
+    With `varied`, here and below, the expression also contains the factors of `symbols`.
     """
     return _with_numbers(plant.shifted_acceleration(), fault, varied)
 
@@ -398,7 +398,7 @@ def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = Fals
 
 
 def acceleration_with_parameters(fault: Fault, names: Sequence[str]) -> tuple[sp.Expr, list[sp.Symbol]]:
-    """x2' [m/s²] of `acceleration_expression` with named parameters of plant and friction free, and their symbols."""
+    """x2' [m/s²] of `acceleration_expression` with the named parameters left as symbols, and these symbols."""
     law = fault.friction
     free = law.symbols() | {name: sp.Symbol(name, positive=True) for name in plant.PARAMETERS}
     known = {name: sp.Rational(str(rational(getattr(fault, name)))) for name in plant.PARAMETERS}
@@ -446,12 +446,12 @@ class ClosedLoop(Metered):
         Parameters
         ----------
         motion : callable
-            Time derivative of the state, from the plant as a function of t [s], x and p [Pa], the passed share of the
-            step [-], and the state.
+            Time derivative of the state. Its arguments are the plant, a function of t [s], x and p [Pa]; the elapsed
+            share of the step [-]; and the state.
         step : float
             [s].
         works : int
-            Number of works of forces at the end of the state, on which no rate depends.
+            Number of last entries of the state that are works of forces; no rate depends on them.
         """
         return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
@@ -480,7 +480,7 @@ class ClosedLoop(Metered):
         step: float,
         times: int,
     ) -> tuple[ca.SX, ca.SX]:
-        """State and works (SX) after a number of steps, see `advance_often`; without works at the start, none."""
+        """State and works (SX) after a number of steps, see `advance_often`; no works if the start has none."""
 
         def once(loop: Self, moving: Motion, state: ca.SX, works: ca.SX) -> tuple[ca.SX, ca.SX]:
             if not works.shape[0]:
@@ -573,7 +573,7 @@ class ClosedLoop(Metered):
         return self.function("shaken", {"t": [plant.t], "x": [plant.x1, plant.x2]}, {"phi": [self.disturbance]})
 
     def reversing(self, time: ca.SX, state: ca.SX, pressure: ca.SX) -> ca.SX:
-        """Whether the load on a fault at rest exceeds friction backward (SX): never on a plant without stick."""
+        """Whether the load moves a fault at rest backward against friction (SX): never on a plant without stick."""
         return ca.SX(0)
 
     def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
@@ -613,7 +613,7 @@ def casadi_function(
     outputs: dict[str, list[sp.Expr]],
     named: dict[sp.Symbol, sp.Expr] | None = None,
 ) -> ca.Function:
-    """CasADi Function with named inputs and outputs; `named` are expressions in the inputs that outputs contain.
+    """CasADi Function with named inputs and outputs; outputs may contain symbols that `named` expresses in the inputs.
 
     Derivatives at a kink are one-sided, for growing x1 and x2.
     """

@@ -62,8 +62,8 @@ def simulate(
     """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
 
     A fault with a friction state starts in steady sliding at the mean rate of its task. It needs a sampled law that
-    measures the slip alone, as from `design`, with its own scheme and step. Of the parameters below, those up to
-    `progress` apply, and plant, variation, actuator, measurement (a `Transducer`) and tide.
+    measures the slip alone, as from `design`, with its own scheme and step. Of the parameters below, only those up to
+    `progress` apply to it, and `plant`, `variation`, `actuator`, `measurement` (a `Transducer`) and `tide`.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def simulate(
     plant : str, optional
         ``"stick-slip"``: friction holds the fault at rest, and it never slips backward (ERRATA 14). ``"printed"``: the
         paper's plant without stick, eq. shift continued to negative slip rates. With a friction state, which never
-        rests: ``"smooth"`` or ``"quasi-dynamic"`` (without inertia). By default the first of each.
+        rests: ``"smooth"`` or ``"quasi-dynamic"`` (without inertia). The first of each pair is the default.
     load : Load, optional
         Drift of the far end and a perturbation, in addition to the fault's own disturbance.
     variation : Variation or SlidingVariation, optional

@@ -173,7 +173,7 @@ class Limits:
     slip_error : UpperBound or None
         Bound of the slip error for the smallest slip-rate error [m]; None for any bounded slip error.
     peak_slip_rate_error, largest_step, largest_delay, largest_diffusion_time, farthest_well, smallest_pressure : Limit
-        The latter three and the delay are for the fault's T_s.
+        Limits; the last three and the delay are for the fault's T_s.
     proved : tuple of TrackingProof
         Guarantees of the designs without delay, ordered by T_s.
     sensing : Sensing
@@ -321,7 +321,7 @@ def limits(
 
     For friction with a state: in slow sliding along its task, for the nominal plant linearised there.
 
-    There are none for the class ``rate``: every proof uses a disturbance that jumps.
+    There are no limits for the class ``rate``: every proof of a limit uses a disturbance that jumps.
 
     Parameters
     ----------
@@ -458,8 +458,8 @@ def _sliding_limits(
 ) -> Limits:
     """Limits and proved bounds of a design with the given path, or by default with that of a near well.
 
-    By default the stress is the largest that the design withstands, or the design with a near well if none is found for
-    the path. If the path is infeasible under the latter stress, no design is searched for it.
+    By default the stress is the largest that the design withstands. If no design is found for the path, the stress is
+    that of a design with a near well. If the path is infeasible under that stress, no design is searched for the path.
     """
     _require_plain(fault, plain)
     setup = plain.setup if prove else None

@@ -115,7 +115,7 @@ class Design:
 
     @property
     def other_step(self) -> str:
-        """Note that a sampled law has another T_s than the fault; empty if both are equal."""
+        """Note that T_s of a sampled law differs from that of the fault; empty if both are equal."""
         return self.controller.other_step(self.fault) if self.controller else ""
 
     @property
@@ -234,8 +234,8 @@ def design(
     estimate.
 
     With `continuous` the designs are those of the paper, without a guarantee of the sampled loop. 2-CTA, 2-DIA: λ grows
-    until L̄ is 1.1 times the requirement of reference and disturbance, as it does where no T_s has a guarantee. e-LQR:
-    Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
+    until L̄ is 1.1 times the requirement of reference and disturbance; also without `continuous` if no T_s is proved.
+    e-LQR: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
 
     Rate-and-state friction: an e-LQR of the slip alone controls slow sliding along the task, through the diffusion path
     (`Design.sliding`); sliding modes do not apply.
@@ -286,9 +286,9 @@ def design(
     UnknownNameError
         For a controller that cannot be designed, or an unknown feed-forward.
     ParameterError
-        For a feed-forward with a law that takes none or runs sampled, an unknown objective, or one of a design in
-        continuous time; for quantities of the setup that a design does not take; for stress or spread without a
-        friction state, a delay or a lag with one.
+        For a feed-forward with a law that takes none or is sampled; an unknown objective, or ``"peak"`` in continuous
+        time; quantities of the setup that a design does not take; stress or spread for friction without a state; a
+        delay or a lag for friction with a state.
     UnsupportedError
         For a law that does not apply to friction with a state.
     """

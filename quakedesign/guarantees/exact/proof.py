@@ -19,13 +19,13 @@ class Proof(ABC, Generic[B]):
 
     **Principle.** A theorem bounds the claimed quantities up to time t, on every cell of the box of constants. It may
     assume the claims up to t: slow sliding does so for all inputs, tracking only for an implicit step and a slowly
-    varying input gain. Then each bound lies below its claim, or within it if earlier samples alone determine the input.
-    The quantities are continuous and initially within the claims, so none leaves its claim first.
+    varying input gain. The claims follow if each bound is below its claim, or at most equal to it where earlier samples
+    alone determine the input: as the quantities are continuous and initially within the claims, they stay within them.
 
     Attributes
     ----------
     kind : str
-        Of its certificate file (proofs/FORMAT.md).
+        Kind of its certificate file (proofs/FORMAT.md).
     plant : str
         Plant of `simulate` that the proof is about; empty where only one applies.
     scope : str
@@ -118,9 +118,9 @@ class NoProof:
     reason : str
         Names the quantity that fails.
     small_gain : UpperBound or None
-        At least 1; None where something else fails, such as the stability of the nominal loop.
+        Small gain, at least 1; None where something else fails, such as the stability of the nominal loop.
     needs : Fraction, optional
-        Change of the pressure between samples required of the pump [Pa].
+        Pressure change between samples that the pump would have to make [Pa].
     pressed : bool
         Whether only the pressure fails: it exceeds a pump limit, or opens the fault.
     """

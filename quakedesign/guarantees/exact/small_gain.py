@@ -58,11 +58,11 @@ from quakedesign.plant.fault_plant import FaultPlant
 # **Initial state.** Let the loop start at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of at rest. By superposition |y(τ)| ≤
 # h_y,j + Σ_i g_yi,j·W_i(t), where h_y,j bounds |y| of the free response in part j from every such initial state
 # (`free_peaks`). So the initial state is one more input, ``start``, with F = 1, no c and the gains h. Its row of M is
-# zero, so the spectral radius does not change. The s_i are bounds of e1(0) and e2(0), of either sign, and of the law's
-# response to its first measurement. Nothing else changes before the first sample: p = 0, and p* = 0 at r = 0, as r(0) =
-# r′(0) = 0. In class rate φ(0) = 0, so the shift of p* is also 0. Below, the loop of every β_i has the same initial
-# state. As t = 0 is included, the bounds of e1 and e2 are at least those of the initial state, so that E and R exceed
-# these as well.
+# zero, so the spectral radius does not change. The s_i contain the bounds of e1(0) and e2(0), and the response of the
+# law's states to its first measurement. All other initial values remain 0: p = 0, and p* = 0 at r = 0, as r(0) = r′(0)
+# = 0. In class rate φ(0) = 0, so the shift of p* is also 0. With a slowly varying gain, the loops of all β_i have the
+# same initial state. As t = 0 is included, the bounds of e1 and e2 are at least those of the initial errors, so E and R
+# also exceed these.
 #
 # **Noise.** Let a law measure e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples. Then the loop has two
 # more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c. They are any sequences within
@@ -79,23 +79,23 @@ from quakedesign.plant.fault_plant import FaultPlant
 # **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve pressure leave p_{k−1} within A
 # of the due time of p_k and move to p_k monotonically, within at most Θ and at a rate of at least |p_k − p_{k−1}|/Θ.
 # The nominal loop has no timing error. The measured error is then e(kT_s) plus the change of e until the measurement:
-# |n1| ≤ J(|e2| + r′), r′ where the slip is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|), |e2′| ≤
+# |n1| ≤ J(|e2| + r′), as the slip is compared with the reference at kT_s, and |n2| ≤ J(|e2′| + |r″|), |e2′| ≤
 # max|s||e1| + max|w||e2| + max β|v| + |φ − w·r′ − r″|. These bounds give c and F of the noise inputs. Let j be the
 # valve pressure minus that of the nominal loop, and u_k = b(p_k − p_{k−1}), the output ``stepped``. Then b·|j| ≤ |u_k|,
 # and j is nonzero only from A before to A + Θ after the due time of p_k: the valve has p_k early, or p_{k−1} late. The
 # input ``late`` is b·j. It acts as the valve pressure does, with F = 0 and c = 1 for u_k. Let f be the share of the
-# step that is made at the due time of p_k. The areas of b|j| before and after that time are E and L times |u_k|: if the
-# step begins late, E = 0 and L ≤ A + Θ/2; if it begins early, E ≤ f·A and L ≤ (1 − f)²·Θ/2. So E/A + L/(A + Θ/2) ≤ 1
+# step that is made at the due time of p_k. The areas of b|j| before and after that time are B and L times |u_k|: if the
+# step begins late, B = 0 and L ≤ A + Θ/2; if it begins early, B ≤ f·A and L ≤ (1 − f)²·Θ/2. So B/A + L/(A + Θ/2) ≤ 1
 # always, and ``late`` is a `Pulse`. v = b(p − p*) is that of the nominal loop, with p at the same time or at most A + Θ
-# before or after. In that time p* changes by at most d times it, so the output ``push`` (with a lag ``asked``) is
-# larger by this.
+# before or after. In a time τ, b·p* changes by at most |d|τ; the bound of the output ``push`` (with a lag ``asked``)
+# includes this change for τ = A + Θ.
 #
 # An input at t may thus be bounded by outputs up to t + T_s. The theorem still holds: fix t, and let the nominal loop
-# continue after t with no inputs except those that shift to its nominal instant what was measured, or had arrived,
+# continue after t without inputs, except those that stand for the timing error of a measurement or a pressure from
 # before t. They obey the same bounds, and there is none after t + T_s. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is
-# not larger. An implicit step uses a measured error, that is, e at a time up to which the bounds hold: E and R grow by
-# the noise, J·r′ and J·|r″| alone, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a weighted mean of e, with any
-# weights, over times within J of kT_s: it is as near to e(kT_s), and within the bounds if e is. ∎
+# not larger. An implicit step uses a measured error, that is, e at a time up to which the bounds hold: E grows only by
+# N1 + J·r′, R by N2 + J·|r″|, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a weighted mean of e, with any
+# weights, over times within J of kT_s: the mean is as near to e(kT_s) as each value, and within the bounds if e is. ∎
 #
 # **Slowly varying input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤
 # κ(2E + r′σ), σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Divide the range of β into parts with midpoints β_i and
@@ -108,12 +108,12 @@ from quakedesign.plant.fault_plant import FaultPlant
 #
 # **Diffusion path.** The pressure in the fault is that of the modes, v, plus their truncation error R, |R| ≤ sup|y|
 # with the output y = ``left_out`` (`loop.diffusion_layer`). Of β(v + R) the loop contains β0·v and, with x2 = e2 − β0Y
-# in place of e2 (`loop.diffusion_layer`), the known part of β0·R. So (β − β0)R enters x2′ as a does, with the c of v
-# for y. If the well pressure is continuous, this is part of a. If it has steps, R decays after every step and is an
-# input of its own. With a slowly varying gain, past values of R are treated as those of v, with the same c. There are
-# two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its effect on the
-# measurement at the samples, which acts as noise does, as e2 is measured, not x2. The bound of e2 is that of x2 plus
-# that of β0Y: the gain of ``awaited`` and its direct feedthrough. ∎
+# in place of e2 (`loop.diffusion_layer`), the known part of β0·R. So (β − β0)R enters x2′ as a does; its c for y is
+# that of a for v. If the well pressure is continuous, this is part of a. If it has steps, R decays after every step and
+# is an input of its own. With a slowly varying gain, past values of R are treated as those of v, with the same c. There
+# are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its effect on
+# the measurement at the samples, which acts as noise does, as e2 is measured, not x2. The bound of e2 is that of x2
+# plus that of β0Y: the gain of ``awaited`` and its direct feedthrough. ∎
 
 _ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
@@ -149,7 +149,7 @@ class Bounds:
     stepped : Fraction, optional
         b times the change of the commanded pressure between samples [m/s²]; None where it is not needed.
     small_gain : Fraction
-        Spectral radius of M [-] from above, below 1.
+        Upper bound of the spectral radius of M [-], below 1.
     """
 
     proved: ClassVar[Literal[True]] = True
@@ -311,7 +311,7 @@ def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoProof
 # Slowly varying input gain of friction that depends on the slip alone.
 
 MOST_PARTS = 16
-_ONE_OVER_E = Fraction(3679, 10000)  # from above
+_ONE_OVER_E = Fraction(3679, 10000)  # rounded up
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)

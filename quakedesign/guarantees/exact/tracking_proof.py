@@ -158,7 +158,7 @@ class Claims:
 
 
 def _covers(step: UpperBound | None, other: UpperBound | None) -> bool:
-    """Whether a largest step follows from another."""
+    """Whether a claimed bound of pressure changes between samples follows from another."""
     return step is None or (other is not None and step >= other)
 
 
@@ -182,11 +182,11 @@ _NOISE_WORDS = {
     "slip_noise": "with any noise of at most {:.6g} m in the measured slip",
     "rate_noise": "with any noise of at most {:.6g} m/s in the measured slip rate",
 }
-_RESTS = Fraction(1, 100)  # slip rate over the largest reference rate below which a fault counts as at rest
+_RESTS = Fraction(1, 100)  # a fault counts as at rest below this share of the largest reference rate
 _TURNS, _LEAPS = 32, 16  # fixed-point iterations of claims: with small steps first, then with large ones
 _LEAP = Fraction(6, 5)
-_RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # number of ramp times tried, and factor above the last required one
-_FIRST = Fraction(1, 64)  # first ramp time over T_s
+_RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # most ramp times tried; ratio of the next to the time required
+_FIRST = Fraction(1, 64)  # first ramp time divided by T_s
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,9 +250,9 @@ class TrackingProof(Proof[Bounds]):
 
         None without a claim at the valve, or without `applied` in the law.
 
-        The commanded pressure acts after the delay, during which the reference moves. A fault counts as at rest if it
-        moves by less than the measurement error, or slower than 1/100 of the largest reference rate. The limit also
-        includes the claimed range of pressure, unless the fault slips faster than is claimed.
+        The width allows for the motion of the reference during the delay. A fault counts as at rest if its measured
+        motion may be noise, or is slower than 1/100 of the largest reference rate. The claimed range of pressure is a
+        limit too, unless the fault slips faster than is claimed.
         """
         held, (low, high), (*fault, (least, largest)) = self.held, self.task.rest_pressure, self.claims.pressures
         if not held.law.applied or (not fault and (held.lag or held.diffusion)):
@@ -296,7 +296,7 @@ class TrackingProof(Proof[Bounds]):
         return _slow_bounds(self.task, self.held, self.slow_gain, gains, self.claims.slip_error)
 
     def supported(self, bounds: Bounds) -> bool:
-        """Whether the claims follow, keep an implicit step in its sector, and the pressure within the pump's limits."""
+        """Whether the claims follow, and respect the sector of an implicit step and the limits of the pump."""
         return (
             _root_within(self.task, self.held, self.claims)
             and not _beyond_the_pump(self.held, self.claims)
@@ -354,14 +354,14 @@ def guarantee(
 ) -> TrackingProof | NoProof:
     """Tightest rounded claims about a loop, or the reason why there are none.
 
-    For a pump with a rate limit the ramp time is increased until it suffices.
+    For a pump with a rate limit the ramp time is increased until the pump can make every pressure change within it.
 
     Aperiodic sampling needs `reach`, and excludes `slow_gain`.
 
     Raises
     ------
     ParameterError
-        For a loop without a steady state, or a slowly varying gain with friction of the slip rate.
+        For a loop without a steady state, or a slowly varying gain if friction depends on the slip rate.
     """
     if reach is not None:
         bounds = _bounds(task, held, held.loop(task), reach)
@@ -559,7 +559,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | 
     Raises
     ------
     ParameterError
-        For a law that leaves an error under a constant pressure at rest.
+        For a law with a steady-state error at rest under a constant pressure.
     """
     bounds = _continuous_bounds(task, law)
     if not bounds.proved:

@@ -75,7 +75,7 @@ def best_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoPro
     if slow is None or proof.proved:
         return proof
     anyhow = guarantee(task, held)
-    return anyhow if anyhow.proved or anyhow.pressed else proof  # a pressure is easier to reduce than a small gain
+    return anyhow if anyhow.proved or anyhow.pressed else proof  # a pressure is reduced more easily than a small gain
 
 
 @overload
@@ -116,14 +116,14 @@ _FEW = 45  # evaluations near a law that has a guarantee at another T_s or delay
 _SURE = 0.9  # closeness that is sufficient
 _NARROW = 1.25  # `room` with aperiodic sampling: a larger one increases the bound of the slip error too
 _FEWER = 80  # evaluations with aperiodic sampling
-_CREEPING = 0.1  # weight of slip error per period relative to slip-rate error, against slow convergence
-MOST_DELAY = 7  # periods: law and loop then have 20 states, the most of a file
-_MOST_GROWTH = 50.0  # logarithm of a growth that no sampled law stabilises; predictions far beyond it overflow
+_CREEPING = 0.1  # weight of slip error per period over that of slip-rate error, to avoid slow convergence
+MOST_DELAY = 7  # periods: law and loop then have 20 states, the most that a file may have
+_MOST_GROWTH = 50.0  # logarithm of growth per period that no sampled law stabilises; far above it predictions overflow
 _FAILED = 1e6
-_HOPELESS = 1.2  # small gain at the end of a search beyond which no other start is tried
-_SETTLES = 0.9  # largest decay factor per period of the law alone while the fault is at rest, without its integral
+_HOPELESS = 1.2  # no other start is tried if a search ends with a small gain above this
+_SETTLES = 0.9  # largest decay factor per period of the law's poles, fault at rest, except the integral's
 _WIDE = 0.05  # initial range around a small number
-_FAR, _ENOUGH = 3.0, 40  # a search stops at a small gain above the first after this number of evaluations
+_FAR, _ENOUGH = 3.0, 40  # a search stops if the small gain is still above _FAR after _ENOUGH evaluations
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +133,7 @@ class Closest:
     Attributes
     ----------
     closeness : float
-        As from `closeness` in floats: below 1 if a proof is expected, else 1 more than the small gain.
+        Closeness computed in floats: below 1 if a proof is expected, else the small gain plus 1.
     numbers : numpy.ndarray
         Parameters of the law in its family.
     held : SampledLoop
@@ -157,7 +157,7 @@ def closest(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> Closest | NoProof:
-    """Law nearest to a guarantee, or well within one; `NoProof` if there is no law at all.
+    """Law nearest to a guarantee, or one that clearly has one; `NoProof` if there is no law at all.
 
     The search begins near the parameters of another law if given, else near those of good laws of the family.
     """
@@ -178,7 +178,7 @@ def closest(
 def nearby(
     task: FaultPlant, step: Fraction, near: np.ndarray, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | NoProof:
-    """Design for the least certified slip-rate error near the numbers of another law.
+    """Design for the least certified slip-rate error near the parameters of another law.
 
     Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it last.
     """
@@ -224,7 +224,7 @@ def design_held(
     Raises
     ------
     ParameterError
-        For another objective or other measurements, or times and noise that are negative or too long.
+        For an unknown objective or measurement, negative noise, or a time that is negative or too long.
     """
     delay, lag = setup.delay, setup.lag
     require_known(objective, OBJECTIVES, "objective")
@@ -434,9 +434,9 @@ def _search(
     far: float = inf,
     wide: bool = False,
 ) -> tuple[float, np.ndarray]:
-    """Smallest cost and its numbers; ends below `enough`, or early while above `far`.
+    """Smallest cost and its parameters; stops at a cost below `enough`, or early if it stays above `far`.
 
-    The initial simplex has sides of 1/20 of each number, with `wide` of at least `_WIDE`.
+    Each side of the initial simplex is 1/20 of its parameter; with `wide` it is at least `_WIDE`.
     """
     least, count = inf, 0
 
@@ -486,9 +486,9 @@ _ATTEMPTS = 12
 _NEAR = Fraction(1, 16)  # relative width of the final bracket of the longest time
 _CLOSE = Fraction(1, 16)  # the same where designs are continued
 _LOOSE = Fraction(1, 10)  # the same for delays and other quantities that may be 0, whose designs take longer
-_BACK = Fraction(39, 40)  # factor of a time whose law fails to be proved
+_BACK = Fraction(39, 40)  # factor applied to a time whose law could not be proved
 _EDGE, _AIM = 0.92, 0.985  # small gain accepted as the end of the range, and target of the search for a time
-_POWER = 1.3  # observed exponent of the small gain in the time
+_POWER = 1.3  # observed exponent of the small gain as a function of the time
 _LEAST = 0.01  # least small gain in an extrapolation
 _LONGEST_TIMES_FAR = 2.0  # small gain above which a time is halved
 
@@ -556,7 +556,7 @@ def longest_step(
 ) -> Longest | None:
     """Guarantee at nearly the longest T_s that has one; None if the search fails.
 
-    The law at each T_s is that nearest to a guarantee, searched near the law of the T_s before.
+    The law at each T_s is that nearest to a guarantee; its search starts from the law at the previous T_s.
 
     Parameters
     ----------
@@ -586,7 +586,7 @@ def continued(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
-    """Design near a law for a longer T_s, after a search at T_s alone failed; None without one."""
+    """Design at T_s, searched near a law for a longer T_s, after a search without it failed; None if unproved."""
     if longest is None or longest.guarantee.held.step < step:
         return None
     proof = nearby(task, step, longest.numbers, measured=measured, setup=setup)
@@ -642,8 +642,8 @@ def nearest_setup(
 
     With `pressed` the pressure fails: it exceeds a pump limit or opens the fault. Then the quantity is the smallest
     sufficient pump of a design without pump limits, or else the largest disturbance. Otherwise it is the first quantity
-    of `LIMITING` without which a design has a guarantee at T_s; None if there is none. A pump rate is nearly the lowest
-    sufficient one, a box is a fraction of all half-widths.
+    of `LIMITING` without which a design has a guarantee at T_s; None if there is none. For a pump rate the value is
+    nearly the lowest sufficient one, for the box a factor of all half-widths.
     """
     laws = kind or Linear(measured)
     if pressed and (less := _less_pressed(laws, task, step, setup)) is not None:
@@ -756,7 +756,7 @@ def _farthest(
     unit : Fraction
         Time to try after 0 [s].
     attempts : int
-        Number of times at most.
+        Largest number of attempts.
     """
 
     def search(time: Fraction, near: np.ndarray | None) -> Closest | NoProof:
@@ -801,7 +801,7 @@ def _within(candidate: Closest | NoProof) -> bool:
 def _time_between(
     good: Closest | None, at: Fraction, bad: tuple[Fraction, float | None] | None, most: Fraction | None, unit: Fraction
 ) -> Fraction:
-    """Next value to try, in three digits, by linear interpolation of the small gain.
+    """Next value to try, rounded to three digits, by linear interpolation of the small gain.
 
     Bisection applies far from the target, or if a nominal loop is unstable.
     """
@@ -827,7 +827,7 @@ def _time_between(
 def reached(
     attempt: Attempt, first: Fraction, *, most: Fraction | None = None, attempts: int = _ATTEMPTS
 ) -> tuple[TrackingProof, ...]:
-    """Guarantees at growing times: doubled or halved from the first, then by bisection.
+    """Guarantees at increasing times: the first time is halved or doubled, then the limit is bisected.
 
     The search ends without a guarantee if halving the time reduces the small gain too little.
 
@@ -839,7 +839,7 @@ def reached(
     most : Fraction, optional
         Longest time to try [s].
     attempts : int
-        Number of times at most.
+        Largest number of attempts.
     """
     proofs: list[TrackingProof] = []
     time, good, bad, small_gain = first, None, None, None
@@ -864,7 +864,7 @@ def _nearer(now: Fraction | float | None, before: Fraction | float | None) -> bo
 
 
 def _next(good: Fraction | None, bad: Fraction | None, most: Fraction | None) -> Fraction:
-    """Time to try, in three digits between two others."""
+    """Next time to try; between a proved and a failed one, it is their mean, rounded to three digits."""
     if good is not None and bad is not None:
         return Fraction(f"{float(good + bad) / 2:.3g}")
     if good is None:

@@ -36,7 +36,7 @@ from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_ra
 THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # parameters of good laws
 BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
 _MOST_STATES = 20  # of a loop
-_WITHOUT_PATH = 6  # e1, e2, π2, d, valve, its last step or the well, of a law without a model of the lag
+_WITHOUT_PATH = 6  # states without a model of the path: e1, e2, π2, d, valve, its last step or the well
 
 
 def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> int:
@@ -101,7 +101,7 @@ def _regulator(update: np.ndarray, command: np.ndarray, weights: np.ndarray, of_
 
 
 def _filter(update: np.ndarray, process: np.ndarray) -> np.ndarray:
-    """Corrections per innovation of the first state; its measurement noise has variance 1."""
+    """Corrections of all states per innovation of the first, which is measured with noise of variance 1."""
     covariance = solve_discrete_are(update.T, np.eye(len(update))[:, :1], process, np.eye(1))
     return np.array(covariance[:, 0] / (covariance[0, 0] + 1))
 
@@ -146,18 +146,18 @@ def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int)
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a of good laws
 _NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
 _GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same for a delayed slip rate
-_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains, and decades above the noise level
-_DECADES = 4.0  # largest initial process noise over measurement noise
+_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains; decades to add to `_Kalman.decades`
+_DECADES = 4.0  # most decades of initial process noise over measurement noise
 _FEWEST_MODES = 2  # least number of diffusion modes in a law with a model of its path
-_WIDEST = 12.0  # decades, or exponents of weights, with accurate Riccati solutions
+_WIDEST = 12.0  # largest decades or exponents of weights for which Riccati solutions are accurate
 _FAINT = 1e-12  # process noise of all states, so that the filter forgets its initial state
 
 
 @dataclass(frozen=True, slots=True)
 class LawFamily:
-    """Laws with parameters x: initial values, admissible x, allowance of ``tracking``.
+    """Laws with parameters x, their initial values and admissible range, and the `room` of ``tracking``.
 
-    The cost is the slip-rate error plus the slip error over `period` [s], against slow convergence.
+    To avoid slow convergence, the peak cost also includes a weighted slip error divided by `period` [s].
     """
 
     law: Callable[[np.ndarray], LinearLaw]
@@ -213,7 +213,7 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
     measured : str
         One of `MEASURED`.
     setup : ExactSetup
-        Loop setup, for which `why_no_law` has no reason. The search of an observer begins near its slip noise.
+        Loop setup that passes `why_no_law`. Its slip noise sets the initial values of an observer.
     """
     if measured == MEASURED[2]:
         plain = family_of(task, step, MEASURED[0], setup)
@@ -261,7 +261,7 @@ class _Kalman:
         return cls(np.linalg.inv(units) @ expm(_flow(model) * period) @ units, units, period)
 
     def decades(self, amplitude: float, noise: Fraction) -> float:
-        """Initial noise ratio: displacement by the disturbance [m/s²] over the noise [m]."""
+        """Initial noise ratio in decades: squared displacement by the disturbance [m/s²] over squared noise [m]."""
         moved = amplitude * self.step**2
         return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
 
@@ -325,8 +325,8 @@ class DelayFeedback:
 # An e-LQR for slow sliding: LQ feedback of the sampled plant with its path, from a Kalman observer of the slip.
 #
 # The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law contains the slow modes
-# of the diffusion path and a level of all disturbances. For all parameters a constant pressure without errors is a
-# steady state of the law: this condition gives the gain of the level and its effect on the slip.
+# of the diffusion path and one level that represents all disturbances. The gain of the level and its effect on the slip
+# are such that, for all parameters, zero errors under a constant pressure are a steady state of the law.
 
 SLIDING_MODES = 4
 _DIGITS = 9

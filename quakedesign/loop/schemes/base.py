@@ -28,7 +28,7 @@ from quakedesign.loop.sensing.measurement import EXACT, Measurement, Sensor, gen
 # ----------------------------------------------------------------------
 # Interface of all schemes.
 
-Motion = Callable[..., ca.SX]  # a function of numbers or symbols, to the rates of a state or another column
+Motion = Callable[..., ca.SX]  # maps numbers or symbols to the rates of a state, or to another column
 
 
 class Stepped(ABC):
@@ -215,7 +215,7 @@ def control_step(kind: type[Decided], law: DiscreteLaw) -> ControlStep:
 
 
 def slope_of(pressure: sp.Expr, integral: sp.Symbol) -> sp.Expr:
-    """Derivative of the pressure by an integral state; 0 if the law has its own anti-windup."""
+    """Derivative of the pressure with respect to an integral state; 0 if the law has its own anti-windup."""
     limited = pressure.has(sp.Min, sp.Max, sp.Piecewise)
     return sp.Integer(0) if limited else sp.diff(pressure, integral)
 
@@ -233,7 +233,7 @@ MOST_STEPS = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class AperiodicClock:
-    """Aperiodic sampling: intervals of shortest to longest steps, uniformly distributed.
+    """Aperiodic sampling: intervals of `shortest` to `longest` steps, uniformly distributed.
 
     Attributes
     ----------
@@ -258,7 +258,7 @@ class AperiodicClock:
 
     @classmethod
     def of(cls, shortest: Fraction, longest: Fraction) -> Self:
-        """Aperiodic sampling with 8 to 100 steps in the shortest interval [s]; never above the longest."""
+        """Aperiodic sampling with 8 to 100 steps in the shortest interval [s]; the longest is rounded down."""
         ratio = longest / shortest
         grain = max(GRAINS, key=lambda count: (Fraction(int(count * ratio), count), -count))
         return cls(shortest=grain, longest=min(int(grain * ratio), MOST_STEPS))
@@ -312,7 +312,7 @@ class Sampled(Scheme, Decided):
     substeps : int
         Steps of the integrator per sample, 1 … 100.
     measurement : Measurement or Sensor
-        A sensor reads only the true slip, once per sample of its own period.
+        A sensor that is no `Measurement` reads only the true slip, and only at its own sampling period.
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
     clock : AperiodicClock or None
@@ -390,7 +390,7 @@ class Sampled(Scheme, Decided):
         sample = self._sample(loop, counter, state, step)
         moving = ca.vertcat(state[:2], *sample.flow)
         for applied, begin, share in self._sections(sample):
-            # One entry more than in the section before: repetitions are distinguished by their numbers of arguments.
+            # The second section has one entry more: repetitions are distinguished by their numbers of arguments.
             given = ca.vertcat(counter, applied, *sample.numbers, *([begin] if begin else []))
             times = math.ceil(share * self.substeps)
             motion = self._motion(step, begin, share, times)
@@ -439,7 +439,7 @@ class Sampled(Scheme, Decided):
         return control_step(type(self), DiscreteLaw.of(loop.controller, loop.constant_pressure))
 
     def _sample(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ControlSample:
-        """Measure, evaluate the law, pass its pressure to the actuator; ξ does not wind up where a stage limits."""
+        """Measure, evaluate the law, actuate its pressure; ξ does not wind up where a stage limits the pressure."""
         count = len(loop.integrals)
         entries = iter(ca.vertsplit(state[2 + count :]))
         part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}

@@ -36,7 +36,7 @@ class Sensor(ABC):
 
     @property
     def noisy(self) -> bool:
-        """Whether measured slip or slip rate differ from the true ones."""
+        """Whether the measured slip or slip rate differs from the true one."""
         return True
 
     @property
@@ -285,7 +285,7 @@ MOST_SAMPLES = 1000
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Averaging(SlipStage):
-    """Mean of the last N readings: noise falls by √N, and the slip lags by (N − 1)T_s/2.
+    """Mean of the last N readings: noise falls by a factor of √N, and the slip lags by (N − 1)T_s/2.
 
     Attributes
     ----------

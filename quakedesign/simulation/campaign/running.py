@@ -41,7 +41,7 @@ from quakedesign.simulation.state_plant import TIDE
 # Dispatch of batches to workers until each has a result or has failed a bounded number of times.
 
 ATTEMPTS = 3
-_MOST_DEATHS = 2 * ATTEMPTS  # in a row: then the workers cannot run at all
+_MOST_DEATHS = 2 * ATTEMPTS  # consecutive deaths from which it follows that the workers cannot run at all
 _DEATH = (
     "a worker died each time that this batch was computed: out of memory, killed, or started by a script without "
     "if __name__ == '__main__':"
@@ -185,9 +185,9 @@ def campaign_problem(
         Largest initial slip rate of a sample [m/s].
     spread : float or Fraction
         For friction with a state: largest relative error of a, b and D_c [-]. σ', k and η vary within the fault's box;
-        its authority is the relative error of σ'.
+        the authority of this box is the relative error of σ'.
     stress, stress_period : float
-        For friction with a state: bound [Pa] and period [s] of a sine of shear stress of varied amplitude and phase.
+        For friction with a state: bound [Pa] and period [s] of a sinusoidal shear stress of varied amplitude and phase.
     seed : int
         Seed of the Sobol' sequence and of all other random numbers.
 
@@ -253,7 +253,7 @@ def run_campaign(
     problem : CampaignProblem
         See `campaign_problem`.
     samples : int
-        Number of samples; number i depends on the seed and on i alone.
+        Number of samples; sample i depends only on i and on the seed.
     folder : str or Path
         New, empty, or that of this campaign. It contains one file for each finished batch.
     metric : str, optional
