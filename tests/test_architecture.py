@@ -453,7 +453,7 @@ BUDGETS = {
     "symbolic": 3133,
     "sos": 6326,
     "laws": 3105,
-    "loop": 4169,
+    "loop": 4168,
     "plant": 1445,
     "guarantees": 13252,
     "lyapunov": 6953,

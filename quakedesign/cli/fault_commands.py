@@ -242,7 +242,7 @@ def identify(
         Rates of the load point one after the other, such as '1 um/s, 10 um/s', where they are known; from its
         displacement by default.
     states
-        Number of friction states; 2 may explain a record that 1 does not, but a fault file cannot state it.
+        Number of friction states; 2 may explain a record that 1 does not, but a fault file contains one only.
     trend
         Drift of friction, linear in displacement or time, or none; chosen by likelihood by default.
     seed
@@ -313,8 +313,8 @@ def identify(
 def schema(command: str, /, *, output: Output = PLAIN) -> int:
     """Print the JSON Schema (draft 2020-12) of what a command prints with --json.
 
-    The schema is for faults of one block. Required keys are in every output; options add others, which may be null.
-    Units are in the table of keys (docs/reference/json.md).
+    The schema is for faults of one block. Required keys are in every output; options add further keys, whose values
+    may be null. Units are in the table of keys (docs/reference/json.md).
 
     Parameters
     ----------

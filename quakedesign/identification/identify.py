@@ -531,7 +531,7 @@ def profiled(
             best = settled(replace(best, fitted=better.fitted, agreeing=1))
     else:
         raise RecordError(
-            "a record must have one best fit. Received one whose profiles keep finding better fits. Give the "
+            "a record must have one best fit. Received one whose profiles repeatedly find better fits. Give the "
             "stiffness, or a record with more steps."
         )
     pair = [name for name in _EFFECTS_OF if name in estimates]

@@ -161,8 +161,7 @@ class LoopSetup:
     delay: Fraction = quantity("s", "Delay from the measurement to the pressure at the valve.")
     lag: Fraction = quantity(
         "s",
-        "Time constant of the pressure between valve and fault, or well with a diffusion path; a designed e-LQR "
-        "models it.",
+        "Time constant of the lag from valve to fault, or to the well of a diffusion path; a designed e-LQR models it.",
     )
     diffusion: Fraction = quantity(
         "s",
@@ -180,7 +179,7 @@ class LoopSetup:
     )
     initial_slip_rate: Fraction = quantity(
         "m/s",
-        "Bound of the initial slip rate, such as '0.1 mm/s'; a negative one exists on the plant without stick only.",
+        "Bound of the initial slip rate, such as '0.1 mm/s'; a negative value requires the plant without stick.",
     )
     jitter: Fraction = quantity(
         "s",

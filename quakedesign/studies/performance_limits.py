@@ -448,7 +448,7 @@ def _pressure_and_diffusivity(fault: Fault, pressure: float | None, diffusivity:
     if withdrawal <= 0 or spread <= 0:
         raise ParameterError(
             f"pressure and diffusivity must be positive. Received {shortly(withdrawal)} Pa and {shortly(spread)} "
-            "m^2/s. Give the size of the largest withdrawal."
+            "m^2/s. Give the largest withdrawal as a positive number."
         )
     return withdrawal, spread
 

@@ -122,7 +122,7 @@ _WORDS = {
     ("acceleration", "slip_rate_error"): "range of the slope in slip rate",
     ("acceleration", "push"): "input gain's range",
     ("aged", "push"): "change of the input gain",
-    ("drift", "slip_rate_error"): "drift that the input gain makes of the disturbance",
+    ("drift", "slip_rate_error"): "drift of the disturbance due to the input gain",
     ("root", "slip_error"): "range of the implicit step's slope",
     ("late", "stepped"): "jitter or rise of the pressure",
     **{("rate_noise", output): "jitter of the measurement" for output in OUTPUTS},
