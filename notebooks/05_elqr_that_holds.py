@@ -146,7 +146,7 @@ print(sampled.sentence())
 # %% [markdown]
 # ## How fast can the fault slip?
 # The theorem is about a constant reference and a disturbance that vanishes. The task has neither: $r(t)$ moves and $|\varphi_e| \le 3.2\cdot10^{-4}$ m/s² does not
-# vanish. We therefore write the loop with the midpoint of every range, and collect all other terms in one bounded input, $a = \varphi_e - w r' - r'' + \delta_s e_1 - \delta_w e_2 + \delta_\beta b(p-p^*)$. The gains from $a$ to
+# vanish. We therefore write $e_2' = s e_1 - w x_2 + \beta b(p-p^*) + \varphi_e - r''$ with the midpoint of every range, and collect all other terms in one bounded input, $a = \varphi_e - w r' - r'' + \delta_s e_1 - \delta_w e_2 + \delta_\beta b(p-p^*)$. The gains from $a$ to
 # $e_1$, $e_2$ and $p$ are integrals of absolute impulse responses, $g_1$, $g_2$, $g_p$; if $m = \delta_s g_1 + \delta_w g_2 + \delta_\beta g_p < 1$, then $|a| \le H/(1-m)$ for all $t \ge 0$, and $e_1$, $e_2$ and $p$ are bounded as well. *amplitude*: any
 # measurable disturbance of that size; *rate*: one that is also no faster than the sine of the task. This is continuous time, for a pressure without delay; `design.guarantee` is the result for the sampled loop.
 
