@@ -235,6 +235,14 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
     assert [segment.duration for segment in claim.loop.segments] == [F(1, 3), F(2, 3)]
 
 
+def test_pressures_at_the_valve_are_those_in_the_fault_where_nothing_lies_between():
+    proof = TrackingProof(task=TASK, held=HELD, claims=CLAIMS)
+    assert proof.valve_pressures == (CLAIMS.least_asked, CLAIMS.largest_asked)
+    short = replace(CLAIMS, least_asked=None, largest_asked=None)
+    direct = TrackingProof(task=TASK, held=HELD, claims=short)
+    assert direct.valve_pressures == (CLAIMS.least_pressure, CLAIMS.largest_pressure)
+
+
 @pytest.mark.parametrize(("off", "proved"), [(F(1, 10**9), True), (F(0), False), (F(-1), False)])
 def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
     """With claims as wide as one likes: what counts is how far below σ′ the pressure follows to stay."""

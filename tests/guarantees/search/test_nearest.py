@@ -14,6 +14,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import NoProof, SampledLoop, TrackingGuarantee, TrackingProof, best_guarantee
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
+from quakedesign.guarantees.search import linear_design
 from quakedesign.guarantees.search.compensated_search import design_compensated
 from quakedesign.guarantees.search.default_designs import deadbeat, sampled_sliding_mode
 from quakedesign.guarantees.search.float_bounds import closeness
@@ -62,6 +63,19 @@ def test_the_smallest_pump_that_will_do_is_named(controller):
 REAL_REST = (
     uncertain_plant(REAL).rest_pressure[1] + F(3, 10) * 10**6
 )  # p* at most, and what no design needs more than that
+
+
+@pytest.mark.parametrize("pressed", [True, False])
+def test_the_pressure_is_the_reason_where_it_alone_fails(pressed, monkeypatch, task):
+    """Without a slowly varying gain the pressure fails or the gain does; with one the gain does."""
+    slow, plain = (
+        NoProof(reason="small gain 2"),
+        NoProof(reason="opens", pressed=True) if pressed else NoProof(reason="1"),
+    )
+    monkeypatch.setattr(linear_design, "slow_gain", lambda task, held: "slow")
+    monkeypatch.setattr(linear_design, "guarantee", lambda task, held, gain=None: slow if gain else plain)
+    found = best_guarantee(task, Linear().leanest(task, F(1, 2)))
+    assert found is (plain if pressed else slow)
 
 
 @pytest.mark.slow
