@@ -327,7 +327,7 @@ class _Choice:
     stiffness: float | None
     seed: int
     trend: str = "auto"
-    by_load: ndarray | None = None  # starts of the pieces by the load point alone [s]
+    by_load: ndarray | None = None  # times of rate changes by the load point alone, uncorrected [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
         """Profiles about the best fit of the best law; times of rate changes are corrected by fitted delays."""

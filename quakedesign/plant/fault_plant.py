@@ -151,7 +151,7 @@ class FaultPlant:
 
     @cached_property
     def stress(self) -> Range:
-        """Range of σ′ − p* [Pa] along the reference; monotone in μ, in κ, and in r between `breaks`."""
+        """Range of σ′ − p* [Pa] along the reference; monotone in μ, in κ = (k̂ − φ1)/N̂, and in r between `breaks`."""
         law, target = self.friction, self.target_slip
         breaks = {Fraction(0), target}
         breaks |= {(law.static - law.least) / law.weakening} if law.weakening else set()

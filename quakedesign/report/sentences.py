@@ -102,7 +102,7 @@ def _hold_gaps(entry: "Entry") -> list[str]:
 # First sentences about a run: outcome, pressure, and whether this pressure was sufficient.
 
 _NEGLIGIBLE = 1e-6
-"""Relative to the larger end of a range of pressures: a smaller end is printed as zero."""
+"""An end of a range of pressures that is below this share of the larger end is printed as zero."""
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:

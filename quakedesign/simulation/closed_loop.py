@@ -446,8 +446,8 @@ class ClosedLoop(Metered):
         Parameters
         ----------
         motion : callable
-            Time derivative of the state. Its arguments are the plant, a function of t [s], x and p [Pa]; the elapsed
-            share of the step [-]; and the state.
+            Time derivative of the state. Its arguments are the plant, a function of t [s], x and p [Pa]; `passed`, the
+            elapsed share of the step [-]; and the state.
         step : float
             [s].
         works : int
@@ -465,7 +465,7 @@ class ClosedLoop(Metered):
         method, state, step
             See `advance`.
         motion : callable
-            As in `advance`, with `passed` in steps since the start, and with `given` as last argument.
+            As in `advance`, but `passed` is the number of steps since the start, and `given` is the last argument.
         given : SX
             Further arguments of the motion, constant over the steps.
         """

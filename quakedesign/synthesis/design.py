@@ -58,7 +58,7 @@ class Design:
         Proof in continuous time for the base gains (λ = 1), or the counterexample; None for a sampled linear law.
         The verdict on a sampled law is that on its `guarantee`.
     premises : tuple of Premise
-        Premises of the guarantee of a sampled law (`reach`), and of the certificate.
+        Premises of the guarantee of a sampled law (those named in `REACH`), and of the certificate.
     domain : Domain or None
         Certified domain of the self-consistent premise on |h'|.
     details : mapping
@@ -233,9 +233,9 @@ def design(
     The scheme is ``stick-slip``, or ``compensated`` on the plant without stick. e-LQR: feedback with a disturbance
     estimate.
 
-    With `continuous` the designs are those of the paper, without a guarantee of the sampled loop. 2-CTA, 2-DIA: λ grows
-    until L̄ is 1.1 times the requirement of reference and disturbance; also without `continuous` if no T_s is proved.
-    e-LQR: Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
+    With `continuous`: the paper's designs, without a sampled guarantee. 2-CTA, 2-DIA: λ grows until the proved bound on
+    |h'| is 1.1 times what reference and disturbance require; also without `continuous` if no T_s is proved. e-LQR:
+    Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
 
     Rate-and-state friction: an e-LQR of the slip alone controls slow sliding along the task, through the diffusion path
     (`Design.sliding`); sliding modes do not apply.
@@ -340,7 +340,7 @@ def _tracking(
 def _sliding(
     fault: Fault, law: type[Controller], setup: LoopSetup, requested: SlowSlidingDesign, path: bool
 ) -> tuple[LoopSetup, SlowSlidingDesign | None]:
-    """Request with the diffusion path, and the setup without it; rejects other laws."""
+    """The setup without its diffusion path, which the request contains, and the request; rejects other laws."""
     if path and not setup.diffusion:
         raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit diffusion for a well near the fault.")
     if setup.delay or setup.lag:

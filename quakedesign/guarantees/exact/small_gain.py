@@ -73,8 +73,8 @@ from quakedesign.plant.fault_plant import FaultPlant
 # R (`holds`). E and R are the claims themselves. Suppose that the claims follow from these bounds of the inputs. If all
 # samples of e before kT_s are within the claims, the inputs up to kT_s obey their bounds, as these samples alone
 # determine them. So e is within the claims up to kT_s and, as e is continuous, so is the sample at kT_s. By induction
-# all samples are. With noise w is the solution for e1 + n1 and e2 + n2: E + N1 and R + N2 replace E and R, and δγN1/T_s
-# is added to ε. ∎
+# all samples are. If there is noise, the step is solved for e1 + n1 and e2 + n2: E + N1 and R + N2 replace E and R, and
+# δγN1/T_s is added to ε. ∎
 #
 # **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve pressure leave p_{k−1} within A
 # of the due time of p_k and move to p_k monotonically, within at most Θ and at a rate of at least |p_k − p_{k−1}|/Θ.

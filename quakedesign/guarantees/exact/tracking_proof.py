@@ -250,7 +250,7 @@ class TrackingProof(Proof[Bounds]):
 
         None without a claim at the valve, or without `applied` in the law.
 
-        The width allows for the motion of the reference during the delay. A fault counts as at rest if its measured
+        Its `width` allows for the motion of the reference during the delay. A fault counts as at rest if its measured
         motion may be noise, or is slower than 1/100 of the largest reference rate. The claimed range of pressure is a
         limit too, unless the fault slips faster than is claimed.
         """

@@ -484,7 +484,7 @@ def _drift_cost(estimate: BoundsEstimate | None, limit: float) -> float:
 Attempt = Callable[[Fraction], TrackingProof | NoProof]
 _ATTEMPTS = 12
 _NEAR = Fraction(1, 16)  # relative width of the final bracket of the longest time
-_CLOSE = Fraction(1, 16)  # the same where designs are continued
+_CLOSE = Fraction(1, 16)  # the same where each search starts from the last law found
 _LOOSE = Fraction(1, 10)  # the same for delays and other quantities that may be 0, whose designs take longer
 _BACK = Fraction(39, 40)  # factor applied to a time whose law could not be proved
 _EDGE, _AIM = 0.92, 0.985  # small gain accepted as the end of the range, and target of the search for a time
@@ -495,7 +495,7 @@ _LONGEST_TIMES_FAR = 2.0  # small gain above which a time is halved
 
 RATE, SATURATION, LONGEST, BOX, AMPLITUDE = "rate_limit", "saturation", "longest_step", "box", "amplitude"
 LIMITING = (RATE, LONGEST, "delay_jitter", "jitter", "averaging", "delay", "lag", "diffusion", BOX)
-"""What may be too much for any design, what is easiest to change first; pressures go before."""
+"""Quantities that may be too large for any design, those easiest to change first; pressures are checked before them."""
 _LONGEST_TIMES_FEWER = 8  # attempts, each with a second start where the first fails
 _ANY_RATE = Fraction(10**30)  # [Pa/s]
 

@@ -355,7 +355,7 @@ class Weights:
 
 
 FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, state_noise=1.4e-4, level_noise=162.0)
-"""Of a search for the smallest worst peak of y under bounded stresses: a = 0.01, b = 0.015, ρL²/D = 1, ρT_s = 0.05."""
+"""Found by minimising the worst-case peak of y under bounded stresses: a = 0.01, b = 0.015, ρL²/D = 1, ρT_s = 0.05."""
 
 
 def sliding_law(

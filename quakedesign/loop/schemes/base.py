@@ -76,7 +76,7 @@ class Stepped(ABC):
 
     @abstractmethod
     def advance_often(self, method: Any, motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int) -> ca.SX:
-        """State after several steps; the motion also takes `given`, and its `passed` counts steps."""
+        """State after several steps; the motion takes the number of elapsed steps, not the share, and `given` last."""
 
 
 class Scheme(ABC):
@@ -390,7 +390,7 @@ class Sampled(Scheme, Decided):
         sample = self._sample(loop, counter, state, step)
         moving = ca.vertcat(state[:2], *sample.flow)
         for applied, begin, share in self._sections(sample):
-            # The second section has one entry more: repetitions are distinguished by their numbers of arguments.
+            # The repeated functions of two sections must differ in their number of arguments: the second has one more.
             given = ca.vertcat(counter, applied, *sample.numbers, *([begin] if begin else []))
             times = math.ceil(share * self.substeps)
             motion = self._motion(step, begin, share, times)
