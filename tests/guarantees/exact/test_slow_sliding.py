@@ -583,6 +583,25 @@ def test_what_is_proved_of_one_swing_is_not_proved_of_a_larger_one():
         checker.check(json.dumps(raw))
 
 
+PATHS = {"with a delay of 20 s": {"delay": F(20)}, "through a lag of 10 s": {"lag": F(10)}}
+PATHS["through a diffusion path of L^2/D = 40 s"] = {"diffusion": F(40)}
+
+
+@pytest.mark.parametrize("given", PATHS)
+def test_a_sentence_names_what_lies_between_law_and_fault_and_nothing_else(given):
+    sentence = replace(CLAIM, held=SampledLoop(law=STIFF, step=F(50), **PATHS[given])).sentence()
+    assert [words for words in PATHS if words in sentence] == [given]
+
+
+def test_a_sentence_names_the_wide_constants_and_the_friction():
+    given = replace(CLAIM, task=task("0", regularised=False)).sentence()
+    assert "for the constants of fault and friction as they are given" in given
+    assert given.endswith("(with inertia)")
+    one = replace(CLAIM, task=task("0", ranges={**task("0").ranges, "critical_slip": (F("0.0008"), F("0.0011"))}))
+    assert "for all constant D_c from" in one.sentence()
+    assert "constant a " not in one.sentence()
+
+
 def test_a_rate_that_is_off_for_ever_is_followed():
     """The nominal loop settles at y = ω/c without a slip error, so that the gain of y is at least 1/c."""
     still = task("0", stress=0, swing=F(1, 10), distance=F(0))
