@@ -591,6 +591,7 @@ PATHS["through a diffusion path of L^2/D = 40 s"] = {"diffusion": F(40)}
 def test_a_sentence_names_what_lies_between_law_and_fault_and_nothing_else(given):
     sentence = replace(CLAIM, held=SampledLoop(law=STIFF, step=F(50), **PATHS[given])).sentence()
     assert [words for words in PATHS if words in sentence] == [given]
+    assert " 0 s" not in sentence
 
 
 def test_a_sentence_names_the_wide_constants_and_the_friction():
