@@ -253,6 +253,29 @@ def test_a_loop_that_is_too_large_is_refused_before_its_powers_are_formed(checke
         checker.check(text)
 
 
+@pytest.mark.parametrize(("size", "verdict"), [(Fraction(6, 5), "proved"), (Fraction(49, 50), "undecided")])
+def test_numbers_for_a_sector_must_exceed_half_its_width_times_the_peak(size, verdict, checker):
+    """x' = -x + w + d with |w| <= |x|/2 and |d| <= 1: the peak is 1 + W, so W must exceed (1 + W)/2, or 1."""
+    plant = qd.UncertainPlant(
+        A=[[-1]],
+        B=[[0]],
+        sectors={"s": qd.Sector(entry=[1], row=[1], slopes=(-0.5, 0.5))},
+        disturbances={"d": ([1], 1)},
+    )
+    proof = qd.guarantee(plant, gains=[[0]], step="0.1").proof
+    wide = replace(proof.claims, outputs=(UpperBound(Fraction(9)),), controls=(UpperBound(Fraction(9)),))
+    given = replace(proof, inputs=(size,), claims=wide)
+    assert str(given.check()) == verdict
+    assert (checker_verdict(checker, given) == "proved") is (verdict == "proved")
+
+
+def checker_verdict(checker, proof):
+    try:
+        return checker.check(json.dumps(guarantee_document(proof))).verdict
+    except checker.Refused:
+        return "undecided"
+
+
 def test_negative_numbers_close_no_small_gain(checker):
     """x′ = −x + φ + d is unstable at φ = 9x, but −10 is above 9·(1 − 10), and −9 is below every claim."""
     wide = qd.UncertainPlant(
