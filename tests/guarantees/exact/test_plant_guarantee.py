@@ -269,6 +269,16 @@ def test_numbers_for_a_sector_must_exceed_half_its_width_times_the_peak(size, ve
     assert (checker_verdict(checker, given) == "proved") is (verdict == "proved")
 
 
+@pytest.mark.parametrize("delay", ["0.05", "0.25", "0.3"])
+def test_a_delay_of_several_periods_is_that_of_the_other_checker(delay, checker):
+    """x' = -x - 3x(t - delay) + d: the peak grows with the delay, so that claims for a shorter one are refused."""
+    plant = qd.UncertainPlant(A=[[-1]], B=[[1]], disturbances={"d": ([1], 1)})
+    proof = qd.guarantee(plant, gains=[[3]], step="0.1", delay=delay).proof
+    assert checker_verdict(checker, proof) == "proved"
+    later = replace(proof, law=replace(proof.law, delay=proof.law.delay + Fraction(1, 10)))
+    assert str(later.check()) == checker_verdict(checker, later) == "undecided"
+
+
 def checker_verdict(checker, proof):
     try:
         return checker.check(json.dumps(guarantee_document(proof))).verdict
