@@ -25,6 +25,11 @@ def stored():
     return json.loads(PATH.read_text())
 
 
+def test_the_sentence_gives_the_disturbance_as_a_shear_stress():
+    """0.00032 m/s^2 times the mass per area of 2500 kg/m^3 and 5 km is 4 kPa."""
+    assert "0.00032 m/s^2 (4 kPa of shear)" in read_guarantee(stored()).sentence()
+
+
 @pytest.mark.slow
 def test_both_prove_the_file_with_noise_and_refuse_more_of_it():
     path = PATH.with_name("stick_slip_noise_real-fault.json")
