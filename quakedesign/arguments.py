@@ -13,6 +13,7 @@ from importlib import import_module
 from inspect import CO_VARARGS, CO_VARKEYWORDS, Parameter, Signature, getsource, isclass, isfunction, signature
 from itertools import islice
 from numbers import Integral, Rational, Real
+from threading import Lock
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, Unpack, get_args, get_origin, get_type_hints
 
 import lazy_loader
@@ -20,7 +21,7 @@ import lazy_loader
 from quakedesign.errors import ParameterError
 from quakedesign.text import shown
 
-__all__ = ["attach", "checked", "checked_dataclass", "matches"]
+__all__ = ["attach", "checked", "checked_dataclass", "matches", "parsed"]
 
 _ABBREVIATIONS = {"sp": "sympy", "np": "numpy", "pd": "pandas", "ca": "casadi"}
 _NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real, "SX": Real}
@@ -156,11 +157,20 @@ def _accepted(function: Callable[..., Any], name: str, hint: Any, value: Any) ->
     return float(value) if isinstance(value, Real) and _is_float_alone(hint) else _native(value)
 
 
+_PARSING = Lock()  # CPython counts the recursion of all threads together and raises SystemError if two build a tree
+
+
+def parsed(text: str, mode: str = "exec") -> Any:
+    """Syntax tree of a text, as from `ast.parse`, built by one thread at a time."""
+    with _PARSING:
+        return ast.parse(text, mode=mode)
+
+
 class _Late(dict[str, Any]):
     """Names that a module imports only for type checkers, and usual abbreviations of libraries, imported on demand."""
 
     def __init__(self, module: str) -> None:
-        tree = ast.parse(getsource(sys.modules[module]))
+        tree = parsed(getsource(sys.modules[module]))
         blocks = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
         imports = (node for block in blocks for node in block.body if isinstance(node, ast.ImportFrom))
         self._homes = {alias.name: str(node.module) for node in imports for alias in node.names}

@@ -5,6 +5,8 @@ import importlib
 import inspect
 import pickle
 import pkgutil
+import threading
+import time
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from fractions import Fraction
@@ -18,6 +20,7 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
+from quakedesign import arguments
 from quakedesign.arguments import checked, matches
 from quakedesign.errors import ParameterError, QuakedesignError
 from quakedesign.fault import Disturbance, Reference, UncertaintyBox
@@ -257,3 +260,22 @@ def test_an_expression_of_casadi_may_be_of_any_kind_or_a_number(value):
 def test_what_is_no_expression_of_casadi_is_refused(value):
     with pytest.raises(ParameterError, match=r"x of Measurement\.measure must be an expression of CasADi"):
         Measurement().measure([], [], value)
+
+
+def test_threads_parse_one_after_the_other(monkeypatch):
+    """CPython 3.11 counts the recursion of all threads together: two trees at once may raise SystemError."""
+    now, most = [], []
+
+    def parse(text, mode):
+        now.append(text)
+        time.sleep(0.01)
+        most.append(len(now))
+        now.remove(text)
+
+    monkeypatch.setattr(arguments.ast, "parse", parse)
+    threads = [threading.Thread(target=arguments.parsed, args=(str(i),)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert most == [1] * 4

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import sympy as sp
 
-from quakedesign.arguments import checked_dataclass
+from quakedesign.arguments import checked_dataclass, parsed
 from quakedesign.errors import ParameterError, UnitError
 from quakedesign.exact import rational
 from quakedesign.fault.model import is_finite
@@ -51,7 +51,7 @@ def perturbation(text: str) -> "sp.Expr":
         For other text, or a value that is not a real number.
     """
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        tree = parsed(text.strip(), "eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise _refusal(text, text) from None
     if (nodes := sum(1 for _ in ast.walk(tree))) > MOST_NODES:
