@@ -12,6 +12,7 @@ from enum import Enum
 from fractions import Fraction
 from inspect import isclass, isfunction, signature
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TypedDict, Unpack
 
 import casadi as ca
@@ -272,7 +273,7 @@ def test_threads_parse_one_after_the_other(monkeypatch):
         most.append(len(now))
         now.remove(text)
 
-    monkeypatch.setattr(arguments.ast, "parse", parse)
+    monkeypatch.setattr(arguments, "ast", SimpleNamespace(parse=parse))
     threads = [threading.Thread(target=arguments.parsed, args=(str(i),)) for i in range(4)]
     for thread in threads:
         thread.start()
