@@ -189,7 +189,7 @@ def _hint(function: Callable[..., Any], name: str) -> Any:
     hint = _signature(function).parameters[name].annotation
     if not isinstance(hint, str):
         return Any if hint is Parameter.empty else hint
-    home = function.__module__  # the `__init__` of a dataclass has further names of its own
+    home = function.__module__  # the `__init__` of a dataclass has further names
     known = getattr(function, "__globals__", {}) | vars(sys.modules[home])
     for late in (dict, partial(_late, home)):
         with suppress(NameError, TypeError, OSError):

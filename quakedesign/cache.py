@@ -6,8 +6,8 @@ on them each time.
 
 The folder is that of ``QUAKEDESIGN_CACHE`` (``off`` for none), else ``quakedesign`` in the user's cache folder
 (``XDG_CACHE_HOME``, ``~/.cache``; ``~/Library/Caches``). Folder and files are used only if they belong to this user and
-nobody else may write them; a corrupt file is ignored. Files are written whole, and the oldest are deleted if the total
-size is too large. After any failure, such as a folder without write permission, the result is computed anew.
+no other user may write them; a corrupt file is ignored. Files are written whole, and the oldest are deleted if
+their total size is too large. After a failure, such as a folder without write permission, the result is computed anew.
 """
 
 import io
@@ -173,7 +173,7 @@ def _own_folder(*, make: bool = False) -> Path:
 
 
 def _owned(status: os.stat_result) -> bool:
-    """Whether a file or folder belongs to this user, and nobody else may write it."""
+    """Whether a file or folder belongs to this user, and no other user may write it."""
     return status.st_uid == os.getuid() and not status.st_mode & _OTHERS
 
 

@@ -10,7 +10,7 @@ from quakedesign import guarantees, lyapunov
 from quakedesign import plant as plants
 from quakedesign.arguments import checked
 from quakedesign.errors import CertificateError, WorkError
-from quakedesign.exact import UpperBound, rational
+from quakedesign.exact import UpperBound, apart, rational
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.certificate_files import (
     ATTRACTION,
@@ -137,10 +137,11 @@ def _other_step(claim: Any, fault: "Fault") -> str:
     if claim.slides:
         return ""
     text = f", box {fault.box.name}"
-    step = float(claim.held.step) if claim.sampled else fault.sampling_time
-    if step == fault.sampling_time:
+    own = rational(fault.sampling_time)
+    if not claim.sampled or claim.held.step == own:
         return text
-    return f"{text}; proved at T_s = {step:.4g} s, NOT at its T_s = {fault.sampling_time:g} s"
+    proved, its = apart(claim.held.step, own)
+    return f"{text}; proved at T_s = {proved} s, NOT at its T_s = {its} s"
 
 
 def _polynomial(raw: Any) -> tuple[str, list[str]]:

@@ -458,11 +458,11 @@ BUDGETS = {
     "guarantees": 13252,
     "lyapunov": 6953,
     "linear": 2393,
-    "synthesis": 1947,
+    "synthesis": 1948,
     "rocq": 842,
     "simulation": 9744,
     "identification": 4048,
-    "studies": 4129,
+    "studies": 4128,
     "report": 4095,
     "cli": 3510,
 }

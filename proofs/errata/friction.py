@@ -112,7 +112,7 @@ ROWS = (
     ErrataRow(
         number=13,
         printed="rate-and-state friction satisfies the friction bounds",
-        correct="only on a working range V ≥ V_min > 0, with a state of its own: a third-order plant",
+        correct="only on a working range V ≥ V_min > 0, with a friction state: a third-order plant",
         kind="counterexample",
         check=row_13,
     ),

@@ -573,8 +573,8 @@ def sliding_run_lines(result: dict[str, Any]) -> list[str]:
         f"zero-order hold over {result['step']:.4g} s{path}{shaken}, for {lasting(result['duration'])}; without "
         f"control errors grow by {result['growth_rate']:.3g} 1/s",
         f"|ln(V/V_r)| at most {metrics['max_log_rate']:.3g}, slip error at most {metrics['max_slip_error']:.3g} m",
-        f"pressure from {least:.3g} MPa to {largest:.3g} MPa; the law commands at most "
-        f"{metrics['max_asked'] / 1e6:.3g} MPa more than the reference needs",
+        f"pressure from {least:.3g} MPa to {largest:.3g} MPa; feedback adds at most "
+        f"{metrics['max_asked'] / 1e6:.3g} MPa, of either sign, to what the reference needs",
         proved_line((result["guarantee"] or {}).get("sentence"), result["outside"])
         or "no guarantee: all values are of this run",
     ]

@@ -226,7 +226,7 @@ def simulate_blocks(
         now = np.array(many[size](now)).ravel()
         seen.append(now.copy())
         if not np.isfinite(now[place["x"]]).all():
-            raise ParameterError("a run must stay finite. Received one that overflows. Reduce the gains of the law.")
+            raise ParameterError("a run must stay finite. Received a run that overflows. Reduce the gains of the law.")
     kept = np.array(seen)
     times = kept[:, place["count"]].ravel() * step
     task = chain.fault.reference

@@ -230,8 +230,8 @@ def _slowly_compared(fault: Fault, designs: Sequence[Design], progress: Tell, *,
     for designed in designs:
         entry = Entry(label=f"{designed.title} (designed)", origin="designed", design=designed, run=None)
         if designed.controller is not None:
-            peak, told = natural.natural_peak, partial(progress, entry.label)
-            entry = replace(entry, run=designed_run(designed, peak, told, whole=whole))
+            reported = partial(progress, entry.label)
+            entry = replace(entry, run=designed_run(designed, natural.natural_peak, reported, whole=whole))
         entries.append(replace(entry, guarantee=designed.sliding))
     return Compared(fault=fault, uncontrolled=natural, entries=tuple(entries))
 

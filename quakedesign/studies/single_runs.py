@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from quakedesign.errors import CertificateError, ParameterError, SimulationError, UnknownNameError, require_known
-from quakedesign.exact import rational
+from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import Disturbance, Fault
 from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.fault.model import require_positive
@@ -511,9 +511,8 @@ def _differences(fault: Fault, claim: Any) -> list[str]:
     if claim.covers_healing:
         task, uncovered = claim.beside_healing(task, rational(fault.friction.rest_excess))
         if uncovered is not None:
-            return [
-                f"healing of the fault {fault.friction.rest_excess:.3g}, covered with its disturbance {uncovered:.3g}"
-            ]
+            healing = UpperBound(rational(fault.friction.rest_excess))
+            return [f"healing of the fault {healing:.3g}, covered with its disturbance {uncovered:.3g}"]
     differences: list[str] = claim.task.differences(task)
     return differences
 

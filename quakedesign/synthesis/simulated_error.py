@@ -21,6 +21,7 @@ from quakedesign.lyapunov.gains.synthesise import ComparedGains, Synthesis, Synt
 from quakedesign.lyapunov.search.certify import Number
 from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.simulation import Metrics, simulate
+from quakedesign.simulation.run_settings import PRINTED
 from quakedesign.synthesis.sliding_mode_design import required_lipschitz, smallest_root
 
 _HEADROOM = Fraction(11, 10)
@@ -71,7 +72,7 @@ class TrialSampling:
             duration=self.duration,
             samples=2,
             compiled=False,
-            plant="printed",
+            plant=PRINTED,
         )
         error: float | None = getattr(run.metrics, self.metric)
         return error

@@ -584,7 +584,7 @@ def test_sums_that_bound_themselves_are_solved_for():
 def test_sums_that_grow_beyond_themselves_are_refused(left, words):
     with pytest.raises(checker.Refused, match=words):
         checker.whole_sums(checker.Fixed([[v * UNIT for v in row] for row in left]), [1, 1], 0)
-    with pytest.raises(ParameterError, match="not shown stable in 4096 periods"):
+    with pytest.raises(ParameterError, match="not shown to be stable in 4096 periods"):
         package._whole(ball_matrices.matrix(left), arb_mat([[1], [1]]))
 
 
@@ -601,7 +601,7 @@ def test_a_loop_of_two_slow_modes_is_refused(monkeypatch):
         monkeypatch.setattr(module, "MOST_DOUBLINGS", 3)
     monkeypatch.setattr(checker, "DOUBLINGS", 3)
     jump = [[F(9, 10), F(0)], [F(0), F(8, 10)]]
-    with pytest.raises(ParameterError, match="not shown stable in 8 periods"):
+    with pytest.raises(ParameterError, match="not shown to be stable in 8 periods"):
         gains_of_both([[0] * 2] * 2, [jump], [1], [1, 1], [1, 1])
     loop = checker.Loop([[F(0)] * 2] * 2, [(jump, F(1))], [[F(1)] * 2] * 3, [], None, F(1))
     with pytest.raises(checker.Refused, match="shown within 8 periods"):

@@ -581,8 +581,8 @@ class _Periods:
 def unstable() -> ParameterError:
     """Error for a loop that is not proved to be stable."""
     return ParameterError(
-        f"the nominal loop must be stable. Received one that is not shown stable in {2**MOST_DOUBLINGS} periods. "
-        "Change the gains, or shorten T_s."
+        "the nominal loop must be stable. Received a loop that is not shown to be stable in "
+        f"{2**MOST_DOUBLINGS} periods. Change the gains, or shorten T_s."
     )
 
 

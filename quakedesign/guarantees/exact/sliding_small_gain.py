@@ -34,8 +34,8 @@ of the ranges of a cell the loop of `sliding_loop` has the inputs
 
 so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δμ|q|, |φ| ≤ δ|y| and, with r = sup|ρ/ρ₀ − 1|, |h| ≤
 r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. For the slip law (ρ/ρ₀)e^y lies between (1 − r)e^{−Y} and (1 + r)e^Y, with
-midpoint c_z and half-width δ_z. Then z′ = −ρ₀c_z(y + z) − ρ₀h does not contain φ, and |h| ≤ δ_z|y + z|. ω is an input
-of its own. Noise of the measured slip, drift of p* from the plan and the truncation error R of the diffusion modes are
+midpoint c_z and half-width δ_z. Then z′ = −ρ₀c_z(y + z) − ρ₀h does not contain φ, and |h| ≤ δ_z|y + z|. ω is another
+input. Noise of the measured slip, drift of p* from the plan and the truncation error R of the diffusion modes are
 inputs as in `small_gain`. q is that of the loop plus R. y and its combinations with z include the direct feedthrough of
 e and μ₀R, where R has at most its weight at the beginning of a part of the period.
 

@@ -110,7 +110,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 # with the output y = ``left_out`` (`loop.diffusion_layer`). Of β(v + R) the loop contains β0·v and, with x2 = e2 − β0Y
 # in place of e2 (`loop.diffusion_layer`), the known part of β0·R. So (β − β0)R enters x2′ as a does; its c for y is
 # that of a for v. If the well pressure is continuous, this is part of a. If it has steps, R decays after every step and
-# is an input of its own. With a slowly varying gain, past values of R are treated as those of v, with the same c. There
+# is a separate input. With a slowly varying gain, past values of R are treated as those of v, with the same c. There
 # are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its effect on
 # the measurement at the samples, which acts as noise does, as e2 is measured, not x2. The bound of e2 is that of x2
 # plus that of β0Y: the gain of ``awaited`` and its direct feedthrough. ∎

@@ -423,8 +423,8 @@ def _slow_claims(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Cl
         claims = _rounded(task, bounds)
         if claims.slip_error <= slip_error:
             return claims
-        slip_error = above(max(claims.slip_error * MARGIN, _LEAP * slip_error * (turn >= _TURNS)))
-    reason = f"no slip error up to {UpperBound(slip_error):.2g} m bounds the input gain that it implies"
+        tried, slip_error = slip_error, above(max(claims.slip_error * MARGIN, _LEAP * slip_error * (turn >= _TURNS)))
+    reason = f"none of the slip errors tried, up to {LowerBound(tried):.2g} m, bounds the change of the input gain"
     return NoProof(reason=reason)
 
 

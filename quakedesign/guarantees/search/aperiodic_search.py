@@ -166,7 +166,7 @@ class _Floats:
     def columns(self, sides: "_Sides", facets: int) -> np.ndarray:
         """Largest outputs per unit of each input; 0 for inputs without feedback.
 
-        The acceleration of a rate-limited disturbance has a set of its own.
+        The acceleration of a rate-limited disturbance has a separate set.
         """
         fed, own = self.shares.any(axis=1), sides.largest(self, self.own)
         columns = np.where(fed, 1 / np.where(self.own > 0, self.own, np.inf), 0)[:, None] * own

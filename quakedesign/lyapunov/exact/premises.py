@@ -295,7 +295,7 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             certificate.loop.law == controller.name
             and dict(certificate.loop.gains) == dict(controller.gains)
             and certificate.loop.constants.get("b") == needed.authority,
-            "gains or control authority of the certificate differ from those on this fault.",
+            "law, gains or control authority of the certificate differ from those on this fault.",
         )
     inside = ranges["s"][0] <= needed.slip[0] and ranges["w"][0] <= needed.rate[0] <= needed.rate[1] <= ranges["w"][1]
     peak_rate = Fraction(15, 8) * rational(fault.reference.target_slip) / rational(fault.reference.operation_time)
@@ -352,7 +352,7 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
 
 
 # ----------------------------------------------------------------------
-# The plant of a field, recognised by derivation, whatever the names of the states in a file.
+# The plant of a field, recognised by derivation, for any names of the states in a file.
 
 _CONTROL = "beta"
 

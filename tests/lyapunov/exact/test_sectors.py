@@ -82,7 +82,7 @@ def test_a_certificate_about_something_else_is_refused():
         {"constants": {"b": F(1)}},
         {"constants": {}},
     ):
-        with pytest.raises(CertificateError, match="gains or control authority of the certificate differ"):
+        with pytest.raises(CertificateError, match="law, gains or control authority of the certificate differ"):
             linear_premises(REAL, LAW, replace(one, loop=replace(one.loop, **changes)))
     assert not any(p.holds for p in linear_premises(REAL, LAW, None))
 
