@@ -1,5 +1,6 @@
 """The sampling report: rows, orders, sensitivities; and what issue and README promise for the real fault."""
 
+import importlib
 import io
 import json
 import math
@@ -71,6 +72,15 @@ def test_gains_without_a_certificate_are_run_with_other_scales_beside_the_limit_
     assert all(f"exceeds {limit} m/s^3" in row.premise.note for row, limit in zip(found.rows, (1.2, 0.6), strict=True))
     assert {row_cells(row)[-1] for row in found.rows} == {"–"}
     assert "orders" not in found.studies
+
+
+def test_all_runs_are_on_the_plant_without_stick(monkeypatch):
+    """As the orders of accuracy, which are known there alone."""
+    module, plants = importlib.import_module("quakedesign.studies.sampling"), []
+    for name in ("simulate", "noise_sensitivity", "gain_sensitivity"):
+        monkeypatch.setattr(module, name, lambda *_, plant=None, **__: plants.append(plant))
+    sampling_report(OWN, LINEAR, schemes=("implicit",), duration=0.1)
+    assert plants == ["printed"] * 4
 
 
 def test_a_linear_law_has_no_scale():

@@ -39,6 +39,17 @@ def test_smaller_gains_chatter_less_and_have_a_proof(fault):
     assert found.compared[0].ratio == pytest.approx(found.compared[0].value / found.value)
 
 
+def test_errors_are_those_of_the_plant_of_the_certificates(fault):
+    """On the stick-slip plant the fault rests in a trial, and all gains have the same error."""
+    trial, gains = sampling(fault, duration=200 * fault.sampling_time), (F(7), F(5), F("2.3"), F("1.1"))
+    law = trial.controller(gains)
+    without, sticking = (
+        qd.simulate(fault, law, scheme="explicit", duration=trial.duration, samples=2, plant=plant, compiled=False)
+        for plant in ("printed", "stick-slip")
+    )
+    assert trial.error(gains) == without.metrics.max_slip_rate_error > 10 * sticking.metrics.max_slip_rate_error
+
+
 def test_what_is_given_takes_the_place_of_what_the_fault_needs(fault):
     trial = sampling(fault, lipschitz="1e-3", gain_range=("0.9", "1.2"), step=0.05)
     assert 1e-3 <= trial.scale < 1.1e-3

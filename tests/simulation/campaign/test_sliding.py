@@ -45,7 +45,7 @@ def test_a_sample_is_the_run_of_its_numbers(serial):
     tide = Tide(amplitude=share * 40e3, period=9000.0, phase=phase)
     run = simulate(PATCH, CONTROLLER, duration=3000.0, tide=tide, variation=SlidingVariation(**numbers))
     assert found.results[4].figures == {k: v for k, v in run.metrics.to_dict().items() if k in found.metrics}
-    assert (found.results[4].events, found.outcomes[4]) == ({}, run.outcome)
+    assert (found.results[4].events, found.outcomes[4], found.metrics) == ({}, run.outcome, PROBLEM.metrics)
     again = found.trajectory(4, samples=5)
     assert (len(again.time), again.slip_rate[-1]) == (6, run.slip_rate[-1])
     assert again.metrics.max_slip_error == run.metrics.max_slip_error
