@@ -466,7 +466,7 @@ BUDGETS = {
     "laws": 3105,
     "loop": 4168,
     "plant": 1445,
-    "guarantees": 13252,
+    "guarantees": 13248,
     "lyapunov": 6953,
     "linear": 2393,
     "synthesis": 1948,
@@ -474,7 +474,7 @@ BUDGETS = {
     "simulation": 9744,
     "identification": 4048,
     "studies": 4128,
-    "report": 4095,
+    "report": 4096,
     "cli": 3510,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

@@ -70,9 +70,9 @@ class StickSlipGuarantee(Guarantee):
         ]
         if self.worst is not None:
             ends = [quantity(end or 0.0, "m") for end in (self.worst.slip_behind, self.worst.slip_ahead)]
+            rate = quantity(self.worst.peak_slip_rate or 0.0, "m/s")
             parts.append(
-                f"worst case found: slip rate {quantity(self.worst.slip_rate, 'm/s')}, slip {ends[0]} behind and "
-                f"{ends[1]} ahead of the reference"
+                f"worst case found: slip rate {rate}, slip {ends[0]} behind and {ends[1]} ahead of the reference"
             )
         parts += self.limit_lines()
         return parts if self.compensation is None else [*parts, self.compensation.sentence()]

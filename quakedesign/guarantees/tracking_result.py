@@ -119,7 +119,7 @@ class TrackingGuarantee(Guarantee):
                 ends = [quantity(end, "Pa", 4) for end in seen.pressures or ()]
                 lines.append(
                     f"worst case found{name}: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
-                    f"{quantity(seen.slip_rate, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
+                    f"{quantity(seen.slip_rate_error or 0.0, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
         lines += [*filter(None, [self.stick_slip_gap]), *self._differentiator_lines(), *self.task_lines()]
         if self.leaves_with_stick:
@@ -230,7 +230,7 @@ class TrackingGuarantee(Guarantee):
         (least, largest), ends = claims.pressures[-1], seen.pressures
         if ends is not None and not least <= ends[0] <= ends[1] <= largest:
             return True
-        return seen.slip_error > claims.slip_error or seen.slip_rate > claims.slip_rate_error
+        return seen.slip_error > claims.slip_error or (seen.slip_rate_error or 0.0) > claims.slip_rate_error
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
@@ -356,7 +356,8 @@ def _with_room(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarant
     if not arbitrary.proved or worst is None:
         return seen
     exceeded = ["slip_error"] if worst.slip_error > proof.claims.slip_error else []
-    exceeded += ["slip_rate_error", "peak_slip_rate"] if worst.slip_rate > proof.claims.slip_rate_error else []
+    faster = (worst.slip_rate_error or 0.0) > proof.claims.slip_rate_error
+    exceeded += ["slip_rate_error", "peak_slip_rate"] if faster else []
     claims = replace(proof.claims, **{name: getattr(arbitrary.claims, name) for name in exceeded})
     wider = replace(seen, proof=replace(proof, claims=claims))
     return seen if wider.leaves_with_stick or wider.proof.check() is not Verdict.PROVED else wider

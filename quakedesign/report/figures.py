@@ -351,17 +351,18 @@ def overview(comparison: "Compared") -> Any:
 
 
 def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
-    """Proved bound of the slip rate, worst case found, and performance limit, if they are known."""
+    """Proved bound of the slip rate; worst case found and limit, of the slip-rate error without stick; if known."""
     if entry.proof is None or entry.guarantee is None:
         return
     peak = entry.proof.peak_slip_rate
     yield float(peak), f"proved: at most {peak.quantity('m/s')}", (0, (10, 3)), PROVED
-    if entry.guarantee.worst is not None:
-        worst = entry.guarantee.worst.slip_rate
-        yield worst, f"worst case found: {quantity(worst, 'm/s')}", "dotted", INDUCED
+    of, seen = " of slip-rate error" * bool(entry.proof.scope), entry.guarantee.worst
+    if seen is not None:
+        worst = (seen.slip_rate_error if entry.proof.scope else seen.peak_slip_rate) or 0.0
+        yield worst, f"worst case{of} found: {quantity(worst, 'm/s')}", "dotted", INDUCED
     least = entry.guarantee.least_slip_rate
     if least is not None:
-        yield float(least), f"limit of every controller: {least.quantity('m/s')}", "dashdot", "#777777"
+        yield float(least), f"limit{of} of every controller: {least.quantity('m/s')}", "dashdot", "#777777"
 
 
 def _largest(time: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":

@@ -125,7 +125,7 @@ def _row(entry: "Entry") -> Row:
         outcome=run.outcome.kind if run else "not run",
         slip_rate=(
             proof.peak_slip_rate if proof else None,
-            worst.slip_rate if worst else None,
+            worst.peak_slip_rate if worst else None,  # none where only the error is searched
             run.outcome.peak_slip_rate if run else None,
         ),
         slip=(
@@ -176,7 +176,7 @@ def _with_stick(guarantee: "Guarantee") -> Iterator[str]:
     if seen is not None:
         yield (
             f"worst case found on the stick-slip plant: slip error {quantity(seen.slip_error, 'm')}, slip-rate error "
-            f"{quantity(seen.slip_rate, 'm/s')}{f'; no proof there: {why}' if why else ''}"
+            f"{quantity(seen.slip_rate_error or 0.0, 'm/s')}{f'; no proof there: {why}' if why else ''}"
         )
     if guarantee.stick_slip_gap:
         yield guarantee.stick_slip_gap

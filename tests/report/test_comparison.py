@@ -198,8 +198,10 @@ def test_the_overview_has_lines_at_the_proved_bound_the_worst_case_and_the_limit
     answer = designed.guarantee
     bounds = [value for label, value in levels.items() if "proved" in label]
     assert bounds == [float(answer.proof.peak_slip_rate)]
-    assert [v for label, v in levels.items() if "worst case" in label] == [answer.worst.slip_rate_error]
-    assert [v for label, v in levels.items() if "limit of every" in label] == [float(answer.limit.slip_rate_error)]
+    worst = [v for label, v in levels.items() if "worst case of slip-rate error" in label]
+    assert worst == [answer.worst.slip_rate_error]
+    limits = [v for label, v in levels.items() if "limit of slip-rate error of every" in label]
+    assert limits == [float(answer.limit.slip_rate_error)]
     assert rate.get_yscale() == slip.get_xscale() == "log"
     run = next(line for line in rate.lines if line.get_label() == designed.label)
     assert max(v for v in run.get_ydata() if v == v) == pytest.approx(abs(designed.run.slip_rate).max())

@@ -154,6 +154,7 @@ def test_the_answer_is_the_smallest_proved_slip_rate_against_the_natural_earthqu
     unknown.fault.magnitude = float("nan")
     assert "(1.5 % of the natural earthquake's 10 mm/s)," in summary(unknown).guarantee
     assert said.conditions == "B (designed), proved: the sentence of B (designed)"
+    assert [row.slip_rate[1] for row in said.rows] == [None] * 3  # the worst case is one of the error
     assumed, box, model, limit = said.notes
     assert model.startswith("model: one block under a uniform pressure")
     assert (assumed, limit) == ("assumed: a well", "no controller does better")

@@ -77,11 +77,6 @@ class WorstCase:
     largest_pressure: float | None = None
 
     @property
-    def slip_rate(self) -> float:
-        """Slip rate [m/s]; its error if only that is computed."""
-        return self.peak_slip_rate or self.slip_rate_error or 0.0
-
-    @property
     def pressures(self) -> tuple[float, float] | None:
         """Least and largest pressure [Pa], if computed."""
         least, largest = self.least_pressure, self.largest_pressure

@@ -391,6 +391,7 @@ STARTED = replace(STARTED, law=replace(STARTED.law, first=((Fraction(1), Fractio
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], loads={"l": ([1], [1], 1)}), "a shift that is not measured"),
         (lambda: qd.UncertainPlant.from_statespace(control.ss(1, 1, 1, 1)), "with D = 0"),
         (lambda: qd.UncertainPlant.from_statespace(None), "Received no such system"),
+        (lambda: qd.UncertainPlant.from_statespace(control.ss(1, 1, 1, 0, 0.1)), "or D not 0"),
         (lambda: qd.UncertainPlant.from_blocks(REAL, 1), "blocks must be 2 to 20"),
         (lambda: qd.UncertainPlant.from_blocks(REAL, 3, coupling=0), "coupling of blocks must be positive"),
         (lambda: qd.UncertainPlant.from_blocks(REAL.with_box("ten-percent"), 3, wells="one"), "box paper"),
