@@ -89,6 +89,8 @@ def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
     )
     told = 'the data are those of "real-fault", box paper; proved at T_s = 0.184 s, NOT at its T_s = 0.5 s'
     assert checked(path, "slower") == ("proved", [*said, told])
+    slower = replace(slower, sampling_time=0.1840001)
+    assert checked(path, "slower")[1][-1].endswith("T_s = 0.184 s, NOT at its T_s = 0.1840001 s")
     assert checked(path, "lab-fault") == ('invalid: the data are not those of "lab-fault"', [])
     raw = json.loads(path.read_text())
     raw["disturbance"]["change"] = "69/312500"

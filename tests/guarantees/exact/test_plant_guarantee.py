@@ -253,16 +253,16 @@ def test_a_loop_that_is_too_large_is_refused_before_its_powers_are_formed(checke
         checker.check(text)
 
 
+def decaying():
+    """x' = -x + u + w + d with |w| <= |x|/2 and |d| <= 1."""
+    sector = qd.Sector(entry=[1], row=[1], slopes=(-0.5, 0.5))
+    return qd.UncertainPlant(A=[[-1]], B=[[1]], sectors={"s": sector}, disturbances={"d": ([1], 1)})
+
+
 @pytest.mark.parametrize(("size", "verdict"), [(Fraction(6, 5), "proved"), (Fraction(49, 50), "undecided")])
 def test_numbers_for_a_sector_must_exceed_half_its_width_times_the_peak(size, verdict, checker):
     """x' = -x + w + d with |w| <= |x|/2 and |d| <= 1: the peak is 1 + W, so W must exceed (1 + W)/2, or 1."""
-    plant = qd.UncertainPlant(
-        A=[[-1]],
-        B=[[0]],
-        sectors={"s": qd.Sector(entry=[1], row=[1], slopes=(-0.5, 0.5))},
-        disturbances={"d": ([1], 1)},
-    )
-    proof = qd.guarantee(plant, gains=[[0]], step="0.1").proof
+    proof = qd.guarantee(decaying(), gains=[[0]], step="0.1").proof
     wide = replace(proof.claims, outputs=(UpperBound(Fraction(9)),), controls=(UpperBound(Fraction(9)),))
     given = replace(proof, inputs=(size,), claims=wide)
     assert str(given.check()) == verdict
@@ -288,13 +288,7 @@ def checker_verdict(checker, proof):
 
 def test_negative_numbers_close_no_small_gain(checker):
     """x′ = −x + φ + d is unstable at φ = 9x, but −10 is above 9·(1 − 10), and −9 is below every claim."""
-    wide = qd.UncertainPlant(
-        A=[[-1]],
-        B=[[1]],
-        sectors={"s": qd.Sector(entry=[1], row=[1], slopes=(-0.5, 0.5))},
-        disturbances={"d": ([1], 1)},
-    )
-    found = qd.guarantee(wide, gains=[[0]], step="0.1").proof
+    found = qd.guarantee(decaying(), gains=[[0]], step="0.1").proof
     document = guarantee_document(found)
     document["plant"]["sectors"][0]["slopes"], document["inputs"] = ["-9", "9"], ["-10"]
     with pytest.raises(checker.Refused, match="must be >= 0"):

@@ -413,6 +413,8 @@ def test_a_file_is_for_faults_whose_healing_it_covers(monkeypatch):
     certified_choice(replace(half, friction=replace(half.friction, healing=3.1e-5)), FILE)
     with pytest.raises(CertificateError, match=r"healing of the fault 3\.2e-05, .* 3\.11e-05"):
         certified_choice(replace(half, friction=replace(half.friction, healing=3.2e-5)), FILE)
+    with pytest.raises(CertificateError, match=r"healing of the fault 3\.12e-05, .* 3\.11e-05"):  # not 3.11e-5 twice
+        certified_choice(replace(half, friction=replace(half.friction, healing=3.1149e-5)), FILE)
 
 
 def test_check_says_of_a_fault_that_heals_whether_that_is_covered(monkeypatch, tmp_path):

@@ -154,7 +154,7 @@ def test_every_sample_has_its_outcome_and_five_are_named():
 
 @pytest.mark.parametrize("index", ["7", "search-0", "search-x"])
 def test_a_sample_of_the_search_that_there_is_not(index):
-    with pytest.raises(ParameterError, match="index must be"):
+    with pytest.raises(ParameterError, match="index must be a whole number, since there was no search"):
         campaign([1.0]).trajectory(index)
 
 
