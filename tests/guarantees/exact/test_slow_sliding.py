@@ -5,7 +5,7 @@ import importlib.util
 import itertools
 import json
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from fractions import Fraction as F
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from quakedesign.errors import CertificateError, ParameterError, UnsupportedErro
 from quakedesign.exact import UpperBound
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.guarantees import NoProof, SampledLoop, SlidingClaims, SlidingProof, cell_bounds
+from quakedesign.guarantees.exact import sliding_proof
 from quakedesign.guarantees.exact import sliding_small_gain as small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.search.lqg import Weights, sliding_law
@@ -581,6 +582,23 @@ def test_what_is_proved_of_one_swing_is_not_proved_of_a_larger_one():
     assert parse_guarantee(json.dumps(raw)).check() is Verdict.UNDECIDED
     with pytest.raises(checker.Refused, match="must follow from all claims"):
         checker.check(json.dumps(raw))
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_every_cell_must_give_the_claims(place, monkeypatch):
+    """Two cells, one of which gives a bound at its claim: neither the first nor the last may hide it."""
+    middle = sum(task().ranges["direct_effect"]) / 2
+    two = replace(CLAIM, cuts=(("direct_effect", middle), None, None))
+    below = {part.name: F(getattr(two.claims, part.name)) / 2 for part in fields(two.claims)}
+    of_cells = [below, below]
+    of_cells[place] = below | {"push": F(two.claims.push)}
+    monkeypatch.setattr(sliding_proof, "cell_bounds", lambda *_: next(given))
+    given = iter([below, below])
+    assert (len(two.cells), two.check()) == (2, Verdict.PROVED)
+    given = iter(of_cells)
+    assert two.recomputed() == of_cells[place]
+    given = iter(of_cells)
+    assert two.check() is Verdict.UNDECIDED
 
 
 PATHS = {"with a delay of 20 s": {"delay": F(20)}, "through a lag of 10 s": {"lag": F(10)}}
