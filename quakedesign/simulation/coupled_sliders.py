@@ -26,7 +26,7 @@ from quakedesign.fault.block_chain import add_springs
 from quakedesign.fault.model import magnitude, require_positive
 from quakedesign.plant.block_plant import measured_by
 from quakedesign.simulation.block_run import MPA
-from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
+from quakedesign.simulation.integrators import RTOL, TIGHT_RTOL, StoppedError, adaptive_integrators
 from quakedesign.simulation.smooth_integration import Ramp, SmoothProblem
 from quakedesign.simulation.state_plant import TIDE, slip
 from quakedesign.simulation.stick_slip import direct_strength
@@ -40,9 +40,7 @@ _FARTHEST = 1e6  # critical slips that the far end travels: some thousand cycles
 _MOST_PERIODS = 10**5  # of a controlled run
 _ONSET = 10.0  # times the loading rate
 _EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # of a run for a cycle: events, and loads in units of aσ'
-_RTOL = 1e-9
 _SMALL = 1e3  # Pa, below which the tolerance of a pressure is absolute
-_TIGHT = 1e-11  # of controlled runs
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a controlled run is recorded
 _WIDEST = 50.0  # largest change of the logarithm of a rate by the initial stress
 
@@ -316,7 +314,7 @@ def simulate_sliders(
     onset_rate: float = math.inf,
     times: Sequence[float] = (),
     method: str = "radau",
-    rtol: float = _RTOL,
+    rtol: float = RTOL,
 ) -> SlidersRun:
     """Simulate coupled blocks without control under remote loading.
 
@@ -378,7 +376,7 @@ def natural_cycles(
     loading_rate: float | None = None,
     inertia: bool = False,
     method: str = "radau",
-    rtol: float = _RTOL,
+    rtol: float = RTOL,
 ) -> SlidersRun:
     """Blocks under remote loading; block i of N starts at the loading rate with 1 + i/N times its steady state.
 
@@ -478,7 +476,7 @@ def simulate_held_blocks(
     rates = ca.Function("rates", [time, state, held], [ca.densify(sliders.field(state, load, *stresses))])
     slips = [float(one.critical_slip) for one in sliders.laws]  # type: ignore[attr-defined]
     scales = [*slips, *[1.0] * (2 * N), *[MPA] * m]
-    flow = adaptive_integrators()["cvodes"].flow(rates.expand(), scales, _SHARES, rtol=_TIGHT)
+    flow = adaptive_integrators()["cvodes"].flow(rates.expand(), scales, _SHARES, rtol=TIGHT_RTOL)
     F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
     weights = np.array(measured_by(chain.shares), dtype=float)
     z, rows, times = np.zeros(len(F)), [y], [0.0]

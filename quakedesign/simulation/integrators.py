@@ -104,9 +104,11 @@ class ClassicRungeKutta(Integrator):
 # ----------------------------------------------------------------------
 # Adaptive integrators: solvers of the SUNDIALS family through CasADi.
 
-TIGHTEST = 1e-13
-LOOSEST = 1e-3
-FLOOR = 1e-4
+TIGHTEST, LOOSEST = 1e-13, 1e-3  # relative tolerances that a run may have
+RTOL = 1e-9  # default relative tolerance
+TIGHT_RTOL = 1e-11  # of velocity steps, slow sliding and blocks under control, whose errors are small differences
+CYCLE_RTOL = 1e-8  # of commands that run seismic cycles
+FLOOR = 1e-4  # share of a variable's size below which its tolerance is absolute
 _MOST_STEPS = 20000  # between two requested instants
 _ITERATION_ERROR = 1e-3  # share of the tolerance; with the default 0.33 the slip of stiff earthquakes drifts by 1 %
 

@@ -16,7 +16,7 @@ from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.sensing import Sensor, Transducer
 from quakedesign.simulation.closed_loop import Load, Variation
 from quakedesign.simulation.earthquake import natural_peak
-from quakedesign.simulation.integrators import AdaptiveIntegrator, any_integrator, require_tolerance
+from quakedesign.simulation.integrators import RTOL, AdaptiveIntegrator, any_integrator, require_tolerance
 from quakedesign.simulation.recorder import Recorder
 from quakedesign.simulation.run_settings import (
     RunSetting,
@@ -32,7 +32,7 @@ from quakedesign.simulation.state_plant import PressurePath, SlidingVariation, T
 from quakedesign.simulation.stick_slip import disturbed, simulate_state
 from quakedesign.simulation.trajectory import OutcomeCriterion, Trajectory
 
-_METHOD, _RTOL, _SAMPLES = "dormand-prince", 1e-9, 2000
+_METHOD, _SAMPLES = "dormand-prince", 2000
 
 
 def simulate(
@@ -50,7 +50,7 @@ def simulate(
     plant: str | None = None,
     load: Load | None = None,
     variation: Variation | SlidingVariation | None = None,
-    rtol: float = _RTOL,
+    rtol: float = RTOL,
     checkpoint: str | Path | None = None,
     substeps: int = 1,
     actuator: Actuator | None = None,
@@ -145,7 +145,7 @@ def simulate(
             "compiled": compiled is not None,
             "load": load is not None,
             "variation": isinstance(variation, Variation),
-            "rtol": rtol != _RTOL,
+            "rtol": rtol != RTOL,
             "checkpoint": checkpoint is not None,
             "substeps": substeps != 1,
             "measurement": not isinstance(measurement, Transducer | None),

@@ -17,7 +17,7 @@ from quakedesign.fault.model import require_positive
 from quakedesign.laws import LinearLaw
 from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.sensing import Transducer
-from quakedesign.simulation.integrators import StoppedError, adaptive_integrators
+from quakedesign.simulation.integrators import TIGHT_RTOL, StoppedError, adaptive_integrators
 from quakedesign.simulation.recorder import NEVER, metrics
 from quakedesign.simulation.run_settings import RunSetting, library_versions
 from quakedesign.simulation.state_plant import Instruments, PressurePath, SlidingVariation, SpringSlider, Tide
@@ -25,7 +25,6 @@ from quakedesign.simulation.stick_slip import dynamic_rate
 from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion, signal
 
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run is recorded
-_RTOL = 1e-11
 PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 
@@ -251,7 +250,7 @@ def _followed(
 ) -> tuple["np.ndarray", dict[str, float]]:
     """Rows of (time, y, commanded pressure, pressure), and the event that ends them: opening or divergence."""
     sizes = [float(loop.slider.law.critical_slip)] * 2 + [1.0, 1.0]  # type: ignore[attr-defined]
-    flow = adaptive_integrators()[method].flow(loop.rates(), sizes, _SHARES, rtol=_RTOL)
+    flow = adaptive_integrators()[method].flow(loop.rates(), sizes, _SHARES, rtol=TIGHT_RTOL)
     own, fed, output = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output))
     z, y, held, modes = np.zeros(len(output)), loop.start, 0.0, np.zeros(len(loop.decay))
     rows, step = [[0.0, *y, 0.0, 0.0]], instruments.step

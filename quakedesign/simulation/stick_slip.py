@@ -17,6 +17,7 @@ from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.fault.model import require_positive
 from quakedesign.simulation.closed_loop import EnergyBudget
 from quakedesign.simulation.inputs import PressureCourse
+from quakedesign.simulation.integrators import RTOL, TIGHT_RTOL
 from quakedesign.simulation.recorder import Metrics
 from quakedesign.simulation.run_settings import library_versions
 from quakedesign.simulation.seismic_cycle import StateTrajectory
@@ -46,7 +47,7 @@ def simulate_state(
     times: "Sequence[float] | np.ndarray | None" = None,
     onset_rate: float | None = None,
     method: str = "radau",
-    rtol: float = 1e-9,
+    rtol: float = RTOL,
 ) -> StateTrajectory:
     """Simulate an uncontrolled fault whose friction has a state, under remote loading and a prescribed pressure.
 
@@ -120,7 +121,7 @@ def velocity_step(
     *,
     times: "Sequence[float] | np.ndarray | None" = None,
     method: str = "dop853",
-    rtol: float = 1e-11,
+    rtol: float = TIGHT_RTOL,
 ) -> StateTrajectory:
     """Slide a sample through a spring whose far end moves at given rates, as in the laboratory.
 

@@ -55,6 +55,7 @@ from quakedesign.simulation import (
     simulate_state,
 )
 from quakedesign.simulation import simulate as run_loop
+from quakedesign.simulation.integrators import CYCLE_RTOL
 from quakedesign.simulation.run_settings import PRINTED, STICK_SLIP
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, Tide
@@ -75,7 +76,6 @@ from quakedesign.synthesis import Design, design, guarantee
 # ----------------------------------------------------------------------
 # Runs of a fault whose friction has a state: without control, or in slow sliding under control.
 
-_RTOL = 1e-8
 _NATURAL = (True, "radau"), (True, "cvodes"), (False, "cvodes")  # inertia and method of cycles, tried in this order
 _MOMENT = 1e-3  # duration, relative to the initial age of the state, over which every solver succeeds
 _UNDISTURBED = 1e-3  # change of the logarithm of the slip rate
@@ -120,7 +120,7 @@ def run_state(
     _require_runnable(fault, plant)
     rate = fault.friction.operating_rate if loading_rate is None else loading_rate
     require_positive("Steady sliding at this rate is where the run begins.", loading_rate=rate)
-    settings: dict[str, Any] = {"inertia": PLANTS[plant], "method": method, "rtol": _RTOL}
+    settings: dict[str, Any] = {"inertia": PLANTS[plant], "method": method, "rtol": CYCLE_RTOL}
     begun = _start(fault, start, rate, hold, share, settings)
     run = simulate_state(
         fault,
@@ -158,7 +158,7 @@ def natural_run(fault: Fault) -> StateTrajectory:
     start = disturbed(fault, rate)
     for inertia, method in _NATURAL:
         try:
-            run = cycles(fault, rate, inertia=inertia, method=method, rtol=_RTOL)
+            run = cycles(fault, rate, inertia=inertia, method=method, rtol=CYCLE_RTOL)
         except SimulationError as error:
             failed = str(error)
             continue
