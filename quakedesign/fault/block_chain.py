@@ -36,9 +36,9 @@ class FaultBlock:
     Attributes
     ----------
     length : float
-        Along the fault [m].
+        Length of the block along the fault [m].
     effective_normal_stress : float
-        σ' [Pa].
+        σ'_n [Pa], positive in compression; that of the fault if left out.
     friction : FrictionLaw
     """
 
@@ -209,7 +209,10 @@ def add_springs(rows: Any, springs: Iterable[tuple[int, int, Fraction]], scale: 
         rows[i][i] -= K * scale
 
 
-BLOCK = {name: replace(PLANT[name], required=name == "length") for name in ("length", "effective_normal_stress")}
+BLOCK = {
+    name: replace(PLANT[name], required=name == "length", owner=FaultBlock)
+    for name in ("length", "effective_normal_stress")
+}
 WELL = {"position": FileEntry(name="position", unit="m", example="1 km", text="along the fault")}
 DIFFUSION = entries_of(BlockChain)
 """Entries of a file of several blocks outside of its tables."""

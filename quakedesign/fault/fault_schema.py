@@ -6,15 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 from quakedesign.fault.block_chain import BLOCK, DIFFUSION, WELL
-from quakedesign.fault.entries import FileEntry, entries_of
+from quakedesign.fault.entries import FileEntry, Table, entries_of
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, TEXTS, WIDTHS, written
 from quakedesign.fault.friction import friction_law, friction_laws
 from quakedesign.fault.friction.base import FrictionLaw
-from quakedesign.fault.model import BOXES, UncertaintyBox
+from quakedesign.fault.model import BOXES, Fault, Problems, Reference, UncertaintyBox
 from quakedesign.files import Json
 
 SCHEMA_NAME = "fault.schema.json"
-_COME_TO_REST = ("exponential-slip-weakening", "linear-slip-weakening")
 
 
 def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault", schema: bool = False) -> str:
@@ -36,7 +35,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
     """
     friction = friction_law(law)
     task = {key: entry for key, entry in TASK.items() if key not in friction.equilibrium.messages}
-    if needs_target := law not in _COME_TO_REST:
+    if needs_target := not _example(friction).rest_slip > 0:
         task["target_slip"] = replace(task["target_slip"], required=True)
     lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
     lines += [
@@ -65,6 +64,16 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
         *_lines(WIDTHS),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _example(friction: type[FrictionLaw]) -> Fault:
+    """Fault with the required examples of the template, without a task."""
+    values = [
+        Table({key: entry.example for key, entry in entries.items() if entry.required}, Problems()).read(entries)
+        for entries in (PLANT, entries_of(friction))
+    ]
+    idle = {"damping": 0.0, "reference": Reference(target_slip=1.0, operation_time=1.0), "sampling_time": 1e-3}
+    return Fault(name="example", source="", friction=friction(**values[1]), **values[0] | idle)
 
 
 def _lines(entries: Mapping[str, FileEntry]) -> Iterator[str]:

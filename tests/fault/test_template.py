@@ -135,3 +135,23 @@ def test_an_entry_is_declared_once_for_reading_writing_template_and_schema():
     assert f'# damping = "{entry.example}"  # η [kg/s], not negative; {entry.default_text}, if left out' in template()
     assert fault_schema()["properties"]["damping"]["examples"] == [entry.example]
     assert '\ndamping = "500000000000000.0 kg/s"\n' in fault_toml(load_fault("real-fault"))
+
+
+def test_a_block_has_the_descriptions_of_a_block():
+    block = fault_schema()["properties"]["block"]["items"]["properties"]
+    assert block["length"]["description"].startswith("Length of the block")
+    assert "that of the fault if left out" in block["effective_normal_stress"]["description"]
+
+
+def test_the_examples_of_a_law_decide_whether_the_template_needs_a_target_slip(tmp_path, monkeypatch):
+    """Weakening over 20 m instead of 2 cm leaves no next rest slip."""
+    header = "from dataclasses import dataclass, field\nfrom quakedesign.fault.friction.weakening import *\n"
+    body = "@dataclass(frozen=True, slots=True, kw_only=True)\nclass {0}(LinearSlipWeakening):\n"
+    body += '    name = "{0}"\n    critical_slip: float = field(metadata={{"unit": "m", "example": "{1}"}})\n'
+    (tmp_path / "written_laws.py").write_text(header + body.format("Short", "2 cm") + body.format("Long", "20 m"))
+    monkeypatch.syspath_prepend(tmp_path)
+    for law, needed in (("Short", False), ("Long", True)):
+        text = template(f"written_laws:{law}")
+        assert ("\n[task]" in text) is needed
+        assert ("\ntarget_slip = " in text) is needed
+        assert parse_fault(text, "own.toml", allow_code=True).friction.name == law

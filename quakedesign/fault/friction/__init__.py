@@ -15,7 +15,7 @@ def friction_laws() -> dict[str, type[FrictionLaw]]:
 
     An abstract base class counts as the law of its module but is not listed.
     """
-    return discovered(__name__, FrictionLaw, shared=("base", "weakening"))
+    return discovered(__name__, FrictionLaw)
 
 
 @checked
