@@ -1,11 +1,11 @@
 from .actuators import stages as stages
 from .actuators.chain import Actuator as Actuator
-from .actuators.flow_stages import Diffusion as Diffusion
-from .actuators.flow_stages import Lag as Lag
-from .actuators.sampled_stages import Delay as Delay
-from .actuators.sampled_stages import Quantisation as Quantisation
-from .actuators.sampled_stages import RateLimit as RateLimit
-from .actuators.sampled_stages import Saturation as Saturation
+from .actuators.delay import Delay as Delay
+from .actuators.lag_and_diffusion import Diffusion as Diffusion
+from .actuators.lag_and_diffusion import Lag as Lag
+from .actuators.pump_limits import Quantisation as Quantisation
+from .actuators.pump_limits import RateLimit as RateLimit
+from .actuators.pump_limits import Saturation as Saturation
 from .diffusion_layer import Layer as Layer
 from .diffusion_layer import with_response_area as with_response_area
 from .error_loop import SHORTEST as SHORTEST

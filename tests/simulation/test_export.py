@@ -34,8 +34,9 @@ from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.actuators.chain import Actuator
-from quakedesign.loop.actuators.flow_stages import Lag
-from quakedesign.loop.actuators.sampled_stages import Delay, RateLimit, Saturation
+from quakedesign.loop.actuators.delay import Delay
+from quakedesign.loop.actuators.lag_and_diffusion import Lag
+from quakedesign.loop.actuators.pump_limits import RateLimit, Saturation
 from quakedesign.loop.sensing import Averaging, Differentiator, OutputFeedback, Transducer
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.plant import uncertain_plant

@@ -14,7 +14,7 @@ from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.loop import simulation_scheme
 from quakedesign.loop.actuators.chain import Actuator
-from quakedesign.loop.actuators.sampled_stages import Saturation
+from quakedesign.loop.actuators.pump_limits import Saturation
 from quakedesign.loop.sensing import Differentiator, OutputFeedback
 from quakedesign.simulation import export, simulate
 from quakedesign.simulation.export import controller_step, export_controller

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.loop.actuators.base import FlowStage, SampledStage, Stage
-from quakedesign.loop.actuators.flow_stages import Diffusion, Lag
-from quakedesign.loop.actuators.sampled_stages import Delay
+from quakedesign.loop.actuators.delay import Delay
+from quakedesign.loop.actuators.lag_and_diffusion import Diffusion, Lag
 from quakedesign.loop.sensing.measurement import Entries
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ __all__ = ["Scheme", "Stepped", "scheme_of_run", "schemes", "simulation_scheme"]
 @cache
 def schemes() -> dict[str, type[Scheme]]:
     """Every scheme of the package, by name."""
-    return discovered(__name__, Scheme, shared=("base",))
+    return discovered(__name__, Scheme)
 
 
 @checked

@@ -13,7 +13,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.loop import Actuator
-from quakedesign.loop.actuators.sampled_stages import Delay
+from quakedesign.loop.actuators.delay import Delay
 from quakedesign.loop.schemes.base import MOST_STEPS, AperiodicClock
 from quakedesign.loop.schemes.explicit import Explicit
 from quakedesign.loop.sensing.measurement import Measurement
