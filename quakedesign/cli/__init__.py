@@ -9,6 +9,7 @@ import warnings
 from cyclopts import CoercionError, CycloptsError, MissingArgumentError
 
 from quakedesign.cli import (
+    block_commands,
     design_commands,
     fault_commands,
     gain_commands,
@@ -26,6 +27,7 @@ from quakedesign.text import one_line
 
 __all__ = [
     "app",
+    "block_commands",
     "design_commands",
     "fault_commands",
     "gain_commands",

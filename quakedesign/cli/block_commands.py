@@ -1,13 +1,23 @@
-"""Commands about one fault, for fault files with several blocks."""
+"""Command `blocks`, and what other commands do for fault files with several blocks."""
 
 import os
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from quakedesign.cli.app import new_file, progress
-from quakedesign.cli.options import Output, changed_options
+from quakedesign.cli.app import app, new_file, progress
+from quakedesign.cli.options import (
+    PLAIN,
+    Box,
+    ExactSeconds,
+    FaultName,
+    Force,
+    Output,
+    Shaking,
+    Whole,
+    changed_options,
+)
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.files import lock_folder, made_folder, require_writable
@@ -18,6 +28,63 @@ if TYPE_CHECKING:
     from quakedesign.cli.options import LawOptions
     from quakedesign.fault import BlockChain
     from quakedesign.studies.several_blocks import ChainRun, SlidingChainRun
+
+
+@app.command
+def blocks(
+    fault: FaultName,
+    /,
+    *,
+    most: Whole = 10,
+    least: Whole = 2,
+    wells: Literal["one", "each"] = "one",
+    coupling: str | None = None,
+    step: ExactSeconds | None = None,
+    box: Box = None,
+    disturbance: Shaking = None,
+    out: Path | None = None,
+    force: Force = False,
+    output: Output = PLAIN,
+) -> int:
+    """Check whether one block is an adequate model of a fault: guarantees of the fault cut into several blocks.
+
+    Each block has its own friction law of the box and its own disturbance. Springs connect neighbours. A law is
+    designed for each number of blocks. Exit code 0 only if every number of blocks has a proof.
+
+    Parameters
+    ----------
+    most
+        Largest number of blocks.
+    least
+        Smallest number of blocks.
+    wells
+        one: one well for all blocks, whose law measures the means of slip and slip rate; each: a well for each block.
+    coupling
+        Spring stiffness divided by the mass of a block, in 1/s^2; by default the stiffness of elastic strips.
+    step
+        Sampling time T_s; the fault's by default.
+    out
+        Folder for the certificate files, one for each number of blocks that has a proof.
+    """
+    from quakedesign.fault import load_fault
+    from quakedesign.guarantees.exact.guarantee_files import save_guarantee
+    from quakedesign.studies import one_block
+
+    loaded = load_fault(fault, box=box, disturbance=disturbance)
+    loaded.friction.require(blocks=fault)
+    files = {count: out / f"{loaded.name}-{count}-blocks.json" for count in range(least, most + 1)} if out else {}
+    if out is not None:
+        require_writable(out)
+        lock_folder(out)
+    for path in files.values() if out is not None and out.exists() else ():
+        new_file(path, "certificate file", force=force)
+    result = one_block(loaded, range(least, most + 1), wells=wells, coupling=coupling, step=step)
+    for count, proof in result.proofs.items():
+        if files and proof.proved:
+            with made_folder(files[count].parent):
+                save_guarantee(proof, files[count])
+    output.show(result.to_dict(), result.lines())
+    return 0 if result.proved else 1
 
 
 def several_blocks(
