@@ -1,7 +1,7 @@
-"""Discovery of extensions: one file each in a folder of the package, or a user-defined module."""
+"""Discovery of extensions: classes in a folder of the package, or in a user-defined module."""
 
 import sys
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from importlib import import_module
@@ -20,26 +20,13 @@ _imported: set[str] = set()
 _OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
 
 
-def discovered(package: str, kind: type, shared: Collection[str] | None = None) -> dict[str, Any]:
-    """Every concrete class of a kind with a name in the modules of a package, by name.
-
-    Parameters
-    ----------
-    shared : collection of str, optional
-        Modules that need no such class; by default none of the modules needs one.
-
-    Raises
-    ------
-    ImportError
-        For another module that defines none, so that no file is ignored silently.
-    """
+def discovered(package: str, kind: type) -> dict[str, Any]:
+    """Every concrete class of a kind with a name in the modules of a package, by name."""
     kinds: dict[str, Any] = {}
     for info in iter_modules(import_module(package).__path__):
-        module = import_module(f"{package}.{info.name}")
-        own = [item for item in vars(module).values() if isinstance(item, type) and issubclass(item, kind)]
-        if shared is not None and info.name not in shared and all(i.__module__ != module.__name__ for i in own):
-            raise ImportError(f"{module.__name__} defines no {kind.__name__}")
-        kinds |= {item.name: item for item in own if hasattr(item, "name") and not isabstract(item)}
+        own = vars(import_module(f"{package}.{info.name}")).values()
+        items = [item for item in own if isinstance(item, type) and issubclass(item, kind)]
+        kinds |= {item.name: item for item in items if hasattr(item, "name") and not isabstract(item)}
     return dict(sorted(kinds.items()))
 
 

@@ -1,4 +1,4 @@
-"""Friction laws: one module each, discovered in this folder."""
+"""Friction laws, discovered in the modules of this folder."""
 
 from functools import cache
 
@@ -11,10 +11,7 @@ __all__ = ["FrictionLaw", "friction_law", "friction_laws"]
 
 @cache
 def friction_laws() -> dict[str, type[FrictionLaw]]:
-    """Every friction law of the package by name; a module of this folder without a law is an error.
-
-    An abstract base class counts as the law of its module but is not listed.
-    """
+    """Every friction law of the package by name, without abstract base classes."""
     return discovered(__name__, FrictionLaw)
 
 

@@ -1,4 +1,4 @@
-"""Discretisation schemes of a control law, one a file, discovered in this folder."""
+"""Discretisation schemes of a control law, discovered in the modules of this folder."""
 
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -9,9 +9,6 @@ from quakedesign.discovery import discovered, named
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.laws import Controller
 from quakedesign.loop.schemes.base import Scheme, Stepped
-
-# ----------------------------------------------------------------------
-# Discretisation schemes of a control law, one a file, discovered in this folder.
 
 __all__ = ["Scheme", "Stepped", "scheme_of_run", "schemes", "simulation_scheme"]
 
