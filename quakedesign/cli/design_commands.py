@@ -163,8 +163,8 @@ def design(
     """Design, prove and simulate controllers, compare them with published gains, and write a report.
 
     Every designed controller runs as it is guaranteed: sampled, with a zero-order hold over T_s. Exit code 0 if every
-    design is proved at the fault's T_s and no run is an earthquake, diverges or opens the fault; with --continuous, if
-    the premise along the reference holds too. Exit code 1 otherwise.
+    design is proved at the fault's T_s and no run of a designed controller is an earthquake, diverges or opens the
+    fault; with --continuous, if the premise along the reference holds too. Exit code 1 otherwise.
 
     Parameters
     ----------

@@ -101,7 +101,8 @@ def scale(
     controller
         cta, dia or elqr.
     gains
-        published, or the numbers of the gains (λ = 1, divisor μ_res·N̂_min of the source).
+        published, or the numbers of the gains (of a sliding mode with λ = 1 and p = ν/(μ_res·N̂_min), N̂_min the least
+        of the source).
     clock
         Time scale from operation-time or natural-period; by default the one on which both faults agree.
     """

@@ -60,7 +60,7 @@ def synthesise(
         Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the largest |h'| of the fault.
     gain_range
         b_m and b_M, the range of the control coefficient β; 1 1 by default, for sampled that of the fault. For beta
-        the certified range contains this range and has the same middle.
+        the certified range contains this range and has the same geometric mean.
     bound
         Objectives decay and beta: largest norm of the gains; by default the smallest norm of gains from the literature.
     degree

@@ -237,7 +237,8 @@ class LawOptions:
         cta, dia or elqr, or your own law as module:Class; none (not for export): a run without control.
     gains
         published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
-        time), or the numbers of the gains (λ = 1, divisor μ_res·N̂_min). Rate-and-state faults: designed.
+        time), or the numbers of the gains (of a sliding mode with λ = 1 and p = ν/(μ_res·N̂_min), N̂_min the least of
+        the box). Rate-and-state faults: designed.
     scale
         λ of a sliding mode instead of that of the gains, decimal or p/q.
     feedforward
@@ -523,9 +524,10 @@ class EstimateOptions:
     differentiator_bound
         λ_d in m/s^(n_d + 1): the law uses estimates of a differentiator.
     differentiator_order
-        n_d; for 2, as printed in the paper, no λ_d works with a zero-order hold.
+        n_d, the number of derivatives; for 2, as printed in the paper, no λ_d satisfies the premise on λ_d with a
+        zero-order hold.
     filter_order
-        n_f of the differentiator.
+        n_f, the filter order.
     differentiator_steps
         Steps of the differentiator per reading.
     """

@@ -206,7 +206,7 @@ def sos(
     on
         A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. By default all of ℝⁿ.
     multiplier
-        Positive polynomial multiplier, or auto to search one and to try powers of 1 + x² + y² + … (x² + y² + … for
+        Positive polynomial multiplier, or auto to search for one and to try powers of 1 + x² + y² + … (x² + y² + … for
         forms).
     margin
         Decide polynomial − margin·(1 + Σ x_i^degree) instead (without the 1 for forms).
@@ -280,7 +280,7 @@ def attraction(
     field
         TOML file: in [field] the rate of every state, such as x = "-y" and y = "x + (x^2 - 1)*y", polynomials that
         vanish at the origin; above it V = "...", optional. By default V = x'Px with A'P + PA = -1 for the linearised
-        field; with --everywhere a V of degree 2 or 4 is searched.
+        field; with --everywhere a V of degree 2 or 4 is searched for.
     everywhere
         Prove global convergence, or refute V (without V, every V) by a point.
     relative

@@ -240,7 +240,8 @@ def sampling(
     controller
         cta, dia or elqr.
     gains
-        designed (in continuous time), published, or the numbers of the gains (λ = 1, divisor μ_res·N̂_min).
+        designed (in continuous time), published, or the numbers of the gains (of a sliding mode with λ = 1 and
+        p = ν/(μ_res·N̂_min), N̂_min the least of the box).
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes

@@ -179,7 +179,8 @@ class LoopSetup:
     )
     initial_slip_rate: Fraction = quantity(
         "m/s",
-        "Bound of the initial slip rate, such as '0.1 mm/s'; a negative value requires the plant without stick.",
+        "Bound of the initial slip rate, of either sign, such as '0.1 mm/s'; the guarantee is on the plant without "
+        "stick.",
     )
     jitter: Fraction = quantity(
         "s",

@@ -239,7 +239,7 @@ def _range(row: Row) -> str:
 
 LEGEND = (
     "worst: worst case found; pressure (p < 0: withdrawal): proved, else simulated",
-    "tracked: slip error <= 2 % of target, slip rate <= reference + 1 % of the peak",
+    "tracked: slip error <= 2 % of target, rate <= reference + 1 % of uncontrolled",
 )
 _LAWS = "2-CTA, 2-DIA: sliding modes; e-LQR: linear feedback with disturbance estimate"
 
