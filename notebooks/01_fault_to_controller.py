@@ -15,7 +15,7 @@
 
 # %% [markdown]
 # # From a fault to a controller with a proof
-# Without control, a strike-slip fault of 5 km slips within a minute: an earthquake of magnitude 5.8. With feedback of the fluid pressure the same slip takes a week.
+# Without control, a strike-slip fault of 5 km slips within a minute: an earthquake of magnitude 5.8. With feedback of the fluid pressure the same slip takes 7.67 days.
 # This notebook designs two controllers, proves guarantees and simulates. Numbers are in SI units.
 
 # %%
@@ -47,7 +47,7 @@ print("eigenvalues [1/s]:", [f"{z.real:.3f}" for z in model.eigenvalues])
 
 # %% [markdown]
 # ## A sliding mode with a proof
-# `design` proves the base gains of the continuous twisting algorithm (2-CTA) in continuous time, then the guarantee of the sampled loop, with an implicit step and zero-order hold. A solver proposes; rational arithmetic decides.
+# `design` first proves the gains of the continuous twisting algorithm (2-CTA), before they are scaled by $\lambda$, in continuous time. It then proves the guarantee of the sampled loop, with an implicit step and zero-order hold. A solver proposes; rational arithmetic decides.
 
 # %%
 cta = qd.design(fault, "cta")

@@ -38,7 +38,7 @@ certificate = qd.load_certificate(path)
 # %% [markdown]
 # ## What it says
 # The 2-CTA with gains from the literature, for $|\dot h| \le 1$ and $\beta = 1$. On every sign cell of the errors the signed powers become polynomials
-# (here $e_1 = \pm u_1^3$, $e_2 = \pm u_2^2$, $e_3 = \pm u_3$ with $u_i \ge 0$), so that "$V$ is positive" and "$V$ decreases" are statements about polynomials.
+# (here $e_1 = \pm u_1^3$, $e_2 = \pm u_2^2$, $e_3 = \pm u_3$ with $u_i \ge 0$; $e_3$ is the integral state plus $h$), so that "$V$ is positive" and "$V$ decreases" are statements about polynomials.
 
 # %%
 ((verdict, lines),) = qd.check_files([path]).values()

@@ -55,7 +55,7 @@ for name, found in reach.items():
 # %% [markdown]
 # ## Other objectives, at equal norm
 # `"beta"` maximises the range $[b/\rho, b\rho]$ of the control coefficient. `"decay"` minimises the certified settling time from $|e_i| \le \bar L$, reported as its
-# reciprocal: $\kappa$ alone would depend on the scale of $V$. The norm of the smallest published set is the bound; the other sets have larger norms. Every published set also gets
+# reciprocal: $\kappa$ alone would depend on the scale of $V$. The search keeps the norm of the gains at or below that of the smallest published set; the other published sets have larger norms. Every published set also gets
 # the best $V$ that is found for it. (`benchmarks/synthesis.py` runs every objective at the norm of every set.)
 
 # %%
@@ -66,7 +66,7 @@ display(pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.no
 # %% [markdown]
 # ## A map
 # A coarse map over $k_1$ and $k_2$ around the first published set, at two levels of $\bar L$, with $V$ of degree 5. Shaded points are screened in floating point; markers
-# are proved exactly. (The gains found above lie outside: they need a $V$ of degree 6.)
+# are proved exactly. (The gains found above are not on this map: it holds $k_3$ and $k_4$ at the published values, and they need a $V$ of degree 6.)
 
 # %%
 drawn = gain_map(

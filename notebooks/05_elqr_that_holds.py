@@ -77,8 +77,8 @@ plt.show()
 
 # %% [markdown]
 # ## One row for two bounds
-# $|h| \le g_1|x_1| + g_2|x_2|$ does not imply $\|h\| \le \|Gx\|$: at $x = (1, -g_1/g_2)$ the right-hand side is zero. With stiffness and damping each
-# uncertain by 1, every *constant* plant of the box is stable; one that switches between two of them is not.
+# $|h| \le g_1|x_1| + g_2|x_2|$ does not imply $\|h\| \le \|Gx\|$: at $x = (1, -g_1/g_2)$ the right-hand side is zero. In an example with
+# $\hat k = 1 \pm 1$ and $\hat\eta = 0.1 \pm 1$ every *constant* plant of the box is stable under the accepted $K$; one that switches between two of them is not.
 
 # %%
 row = examples.printed_row_example()
@@ -107,7 +107,7 @@ print(uncertainty_bounds(fault).table())
 
 # %% [markdown]
 # Conversely, with a given $Q$ the guarantee holds for every $R$ that leaves $Q - R\,W$ positive definite for some $w$. With $s_1 = R/w$ and $s_2 = R/(1-w)$ that
-# is a linear matrix inequality, $Q \ge \mathrm{diag}(g_1^2 s_1,\; g_2^2 s_2,\; 0,\; 0)$ and $\mathrm{diag}(s_1, s_2) \ge R\,11^\top$, which cvxpy solves and which is easy to extend. It also has a closed form:
+# is a linear matrix inequality, $Q \ge \mathrm{diag}(g_1^2 s_1,\; g_2^2 s_2,\; 0,\; 0)$ and $\mathrm{diag}(s_1, s_2) \ge R\,\mathbf{1}\mathbf{1}^\top$ with $\mathbf{1} = (1, 1)^\top$, which cvxpy solves and which is easy to extend. It also has a closed form:
 # $R < (ab - c^2)/(g_1^2 b + g_2^2 a + 2 g_1 g_2 |c|)$, where $a$, $b$ and $c$ are the entries of the Schur complement of $Q$ on $(x_1, x_2)$, that is, of $x^\top Q x$ minimised over the two integrals.
 
 # %%
@@ -146,8 +146,10 @@ print(sampled.sentence())
 # %% [markdown]
 # ## How fast can the fault slip?
 # The theorem is about a constant reference and a disturbance that vanishes. The task has neither: $r(t)$ moves and $|\varphi_e| \le 3.2\cdot10^{-4}$ m/s² does not
-# vanish. We therefore write $e_2' = s e_1 - w x_2 + \beta b(p-p^*) + \varphi_e - r''$ with the midpoint of every range, and collect all other terms in one bounded input, $a = \varphi_e - w r' - r'' + \delta_s e_1 - \delta_w e_2 + \delta_\beta b(p-p^*)$. The gains from $a$ to
-# $e_1$, $e_2$ and $p$ are integrals of absolute impulse responses, $g_1$, $g_2$, $g_p$; if $m = \delta_s g_1 + \delta_w g_2 + \delta_\beta g_p < 1$, then $|a| \le H/(1-m)$ for all $t \ge 0$, and $e_1$, $e_2$ and $p$ are bounded as well. *amplitude*: any
+# vanish. Let $s$ (slope of the net force in slip), $w$ (damping) and $\beta$ be the midpoints of their ranges over the box, $\delta_s$, $\delta_w$, $\delta_\beta$ the half-widths, and $b$ the nominal input gain (these letters are independent of those above).
+# Then $e_2' = s e_1 - w e_2 + \beta b(p-p^*) + a$, where one bounded input $a$ collects all other terms: $|a| \le |\varphi_e - w_* r' - r''| + \delta_s|e_1| + \delta_w|e_2| + \delta_\beta b|p-p^*|$, with any damping $w_*$ of the range.
+# The gains from $a$ to $e_1$, $e_2$ and $b(p-p^*)$ are integrals of absolute impulse responses, $G_1$, $G_2$, $G_p$. If $M = \delta_s G_1 + \delta_w G_2 + \delta_\beta G_p < 1$, then $|a| \le H/(1-M)$ for all $t \ge 0$, and $e_1$, $e_2$ and $p$ are bounded as well. $H$ bounds
+# $|\varphi_e - w_* r' - r''|$ plus the effect of the motion of $p^*$, which is a second input. *amplitude*: any
 # measurable disturbance of that size; *rate*: one that is also no faster than the sine of the task. This is continuous time, for a pressure without delay; `design.guarantee` is the result for the sampled loop.
 
 # %%

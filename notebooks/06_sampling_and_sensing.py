@@ -79,7 +79,7 @@ print(table.map("{:.3g}".format).to_string())
 
 # %% [markdown]
 # ## Orders of accuracy
-# Sampled explicitly, a homogeneous sliding mode of this kind has $|e_1|\sim T_s^3$, $|e_2|\sim T_s^2$, $|e_3|\sim T_s$. The implicit step loses one order of $e_1$
+# Sampled explicitly, a homogeneous sliding mode of this kind has $|e_1|\sim T_s^3$, $|e_2|\sim T_s^2$, $|e_3|\sim T_s$ ($e_3$: integral state plus $h$). The implicit step loses one order of $e_1$
 # (a constant force leaves $T_s^2$ times that force), and the estimate restores it.
 
 # %%
@@ -123,8 +123,8 @@ display(lagged.to_xarray()[["well_pressure", "injected_volume", "flow_rate"]].is
 
 # %% [markdown]
 # ## Sensing on the laboratory fault
-# Only the slip is measured; a differentiator supplies the slip rate. With a sliding mode the third derivative of the slip has no bound, so the printed order
-# $n_d=2$ with $\lambda_d=10^{-5}$ cannot follow. With $n_d=1$ there is an admissible $\lambda_d$ for the sampling period; it is computed.
+# Only the slip is measured; a differentiator supplies the slip rate. With a sliding mode the third derivative of the slip has no bound, so a differentiator of the printed order
+# $n_d=2$, with the bound $\lambda_d=10^{-5}$ m/s³ on this derivative, cannot follow. With $n_d=1$, where $\lambda_d$ bounds the acceleration, there is an admissible $\lambda_d$ for the sampling period; it is computed.
 
 # %%
 lab, cta = qd.load_fault("lab-fault"), qd.published("lab-fault")["cta"]

@@ -60,8 +60,8 @@ print(gains, "closed-loop poles:", np.round(np.abs(poles), 3))
 
 # %% [markdown]
 # ## Margins
-# The loop is opened at the pressure, and includes sampling, sums and zero-order hold. `loop_transfer` opens the loop of the package's law with these gains, in
-# continuous time because no scheme samples it. Sampling reduces the margins.
+# Two open loops, both cut at the pressure: the sampled one, with sums and zero-order hold, and that of the package's law with the same gains in continuous time
+# (`loop_transfer` of a law without a sampling scheme). Sampling reduces the margins.
 
 # %%
 law = control_law("elqr")(gains={name: Fraction(value) for name, value in gains.items()})

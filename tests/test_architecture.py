@@ -465,7 +465,7 @@ BUDGETS = {
     "sos": 6326,
     "laws": 3105,
     "loop": 4174,
-    "plant": 1445,
+    "plant": 1447,
     "guarantees": 13248,
     "lyapunov": 6953,
     "linear": 2393,

@@ -171,7 +171,7 @@ ROWS = (
     ),
     ErrataRow(
         number=2,
-        printed="unstable when k < −Aσ′μ_x1, η < −mμ_x2 (a comma)",
+        printed="unstable when k < −Aσ′μ_x1, η < −mμ_x2 (a comma, not 'or')",
         correct="k < −A(σ′−p)μ_x1 or η < −A(σ′−p)μ_x2",
         kind="counterexample",
         check=row_02,

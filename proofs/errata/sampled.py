@@ -114,8 +114,9 @@ def row_14(order: float = 2.0) -> Finding:
         bool(flips and half and alike and max(abs(s - order) for s in slopes) < 0.3 and round(linear, 2) == 0.43),
         f"slip rate < 0 for {shares['cta', 0.184]:.0%} (2-CTA) and {shares['dia', 0.184]:.0%} (2-DIA) of the time at "
         f"184 ms, {shares['cta', 0.00184]:.0%} at 1.84 ms; rms rate error ∝ T_s^{slopes[0]:.2f}, T_s^{slopes[1]:.2f} "
-        f"({errors['cta', 0.184]:.1e}, {errors['cta', 0.0184]:.1e}, {errors['cta', 0.00184]:.1e} m/s); e-LQR with the "
-        f"sine: {linear:.1%} of the task, amplitude {swing:.2e} m/s (simulated {simulated:.2e})",
+        f"({errors['cta', 0.184]:.1e}, {errors['cta', 0.0184]:.1e}, {errors['cta', 0.00184]:.1e} m/s); e-LQR, "
+        f"frequency response to the sine: slip rate < 0 for {linear:.1%} of the task, amplitude of the slip-rate error "
+        f"half-way {swing:.2e} m/s (simulated {simulated:.2e})",
     )
 
 
@@ -192,7 +193,7 @@ def held_radius(fault: qd.Fault, step: float, beta: float, weaker: float) -> flo
     return float(np.abs(np.linalg.eigvals(sampled.A - sampled.B @ K)).max())
 
 
-# Spectral radius at T_s and largest stable period [ms]: at rest friction, and at static friction with softening.
+# Spectral radius at T_s and largest stable period [ms]: at kinetic friction, and at static friction with softening.
 RADII = {"lab-fault": ((1.026, 0.989), (2.01, 0.699)), "real-fault": ((1.027, 182), (2.01, 128))}
 
 
@@ -201,8 +202,8 @@ def row_22(said: dict[str, tuple] = RADII) -> Finding:
     lines, right = [], True
     for fault in (LAB, REAL):
         steep = fault.authority * fault.effective_normal_stress * fault.friction.slip_slope
-        ends = ((1.0, 0.0), (fault.friction.bounds[1] / fault.friction.bounds[0], steep))
-        for (beta, weaker), (radius, limit) in zip(ends, said[fault.name], strict=True):
+        ends = {"kinetic": (1.0, 0.0), "static": (fault.friction.bounds[1] / fault.friction.bounds[0], steep)}
+        for (friction, (beta, weaker)), (radius, limit) in zip(ends.items(), said[fault.name], strict=True):
             found = held_radius(fault, fault.sampling_time, beta, weaker)
             period = 1e3 * brentq(
                 lambda T, f=fault, b=beta, w=weaker: held_radius(f, T, b, w) - 1,
@@ -211,7 +212,7 @@ def row_22(said: dict[str, tuple] = RADII) -> Finding:
             )
             right = right and round(found, 3 if radius < 2 else 2) == radius
             right = right and float(f"{period:.3g}") == limit
-            lines.append(f"{fault.name} {found:.3f} (limit {period:.4g} ms)")
+            lines.append(f"{fault.name} at {friction} friction {found:.3f} (limit {period:.4g} ms)")
     b = REAL.friction.residual * REAL.authority
     K = np.array([float(g) for g in published("real-fault")["elqr"].gains.values()])
     row = [-REAL.specific_stiffness, -REAL.specific_damping, 0, 0] - b * K

@@ -258,7 +258,7 @@ def require_name(name: str) -> None:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """Smooth slip r(t) from rest to rest, eq. ref, constant at its final value for t > operation_time (ERRATA 26).
+    """Smooth slip r(t) from rest to rest, constant at its final value for t > operation_time (row 26 of the errata).
 
     Attributes
     ----------
@@ -418,9 +418,9 @@ class Disturbance:
     frequency : float
         Angular frequency [rad/s], not negative.
     slip_growth : float
-        Slope of the disturbance in slip [1/s²]; known, and not part of the bound of a guarantee.
+        Slope of the disturbance in slip [1/s²]: a known term, not counted in the disturbance bound of a guarantee.
     rate_growth : float
-        Slope of the disturbance in slip rate [1/s]; known, and not part of that bound.
+        Slope of the disturbance in slip rate [1/s]: a known term, not counted in the disturbance bound of a guarantee.
     stresses : tuple of str
         Which of ``constant`` and ``amplitude`` were given as a shear stress: proofs cover it for every area per mass of
         the fault's box, while the number itself is for the nominal one.
@@ -477,7 +477,7 @@ class Disturbance:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Fault:
-    """Spring-slider analogue of one fault, eq. springmodel.
+    """Spring-slider model of one fault.
 
     Attributes
     ----------

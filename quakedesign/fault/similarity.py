@@ -248,7 +248,7 @@ def _canonical(sign: int, radicand: Fraction, degree: int) -> Radical:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Scales:
-    """Scale factors λ of the five independent dimensions, target over source.
+    """Scale factors λ, target over source, of mass, time and three independent lengths: fault, slip, normal direction.
 
     Attributes
     ----------

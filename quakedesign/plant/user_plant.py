@@ -23,7 +23,9 @@ Slopes = tuple[Any, Any] | Callable[[Fraction], tuple[Any, Any]]
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Sector:
-    """An uncertain term entry·φ(y, t) of a plant, y = row·(x, u − v): φ lies between low·y and high·y, φ(0, t) = 0.
+    """An uncertain term entry·φ(y, t) of a plant, y = row·x, or row·(x, u − v) with the controls u and their loads v.
+
+    φ lies between low·y and high·y, and φ(0, t) = 0.
 
     Attributes
     ----------

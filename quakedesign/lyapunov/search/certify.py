@@ -31,15 +31,15 @@ Number = str | float | Fraction
 def certify(
     subject: Subject, gains: tuple[Number, ...], *, lipschitz: Number, gain_range: tuple[Number, Number] = (1, 1)
 ) -> tuple[Verdict, Certificate | None]:
-    """Decide whether gains make the origin stable for |d| ≤ lipschitz and all β of a range.
+    """Decide whether gains make the origin stable for |ḣ| ≤ lipschitz and all β of a range.
 
     Stability is global and asymptotic, and in finite time if the field has a negative degree.
 
     Parameters
     ----------
     subject : str, type of Law or LoopField
-        Name of a law of the package, a user-defined class, or a bare closed loop; uncertain in ``beta`` or ``d`` or
-        both. A certificate for a law from outside the package is re-checked with ``check(subject)``.
+        Name of a law of the package, a user-defined class, or a bare closed loop; uncertain in ``beta`` or ``d`` = ḣ
+        or both. A certificate for a law from outside the package is re-checked with ``check(subject)``.
     gains : tuple of number or text
         Exact numbers (decimals, exponents or p/q) in the order of the law.
     lipschitz : number or text
