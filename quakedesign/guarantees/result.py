@@ -46,7 +46,7 @@ class Guarantee:
     @property
     def proved(self) -> bool:
         """Whether there is a guarantee."""
-        return bool(self.proof.proved)
+        return bool(self.proof.found)
 
     @property
     def verdict(self) -> Verdict:
@@ -160,7 +160,7 @@ class PlantGuarantee(Guarantee):
 
     def lines(self) -> list[str]:
         """Lines of text: the guarantee, then changes of the law."""
-        return self.proof.statement() if self.proof.proved else super().lines()
+        return self.proof.statement() if self.proof.found else super().lines()
 
     @property
     def controller(self) -> Any:

@@ -66,7 +66,7 @@ class SlidingGuarantee(Guarantee):
     @cached_property
     def worst(self) -> WorstCase | None:
         """Worst case found (lower bound); takes some tenths of a second for every corner of the box."""
-        return worst_sliding(self.proof) if self.proof.proved else None
+        return worst_sliding(self.proof) if self.proof.found else None
 
     def lines(self) -> list[str]:
         """Text for users."""
@@ -150,15 +150,15 @@ def guarantee_sliding(
         smaller = _designed(task, period, log_rate, setup, prove, reach.numbers)
         more = smaller.proved and (not result.proved or smaller.task.stress > result.task.stress)
         result = smaller if more else result
-    if not result.proof.proved and not remedy and stress:
+    if not result.proof.found and not remedy and stress:
         pumped = replace(setup, pump=pump)
         remedy = _under_less(guarantee_sliding(fault, step=step, spread=spread, tell=tell, setup=pumped))
         if remedy and result.held is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
             result = replace(result, proof=NoProof(reason=none))
-    if not result.proof.proved and not remedy:
+    if not result.proof.found and not remedy:
         remedy = _with_less_noise(task, period, setup, prove)
-    if not result.proof.proved:
+    if not result.proof.found:
         why = (stress and _beyond(fault, stress, setup)) or result.proof.reason
         return replace(result, proof=replace(result.proof, reason="; ".join(filter(None, (why, remedy)))))
     return result
@@ -218,7 +218,7 @@ def _proof(pump: Pump | None, tell: Tell, *, with_stress: bool) -> Prove:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
         tell(f"{under}: proof", _SEARCHED)
         proof = _within_pump(pump, proved_sliding(task, held, log_rate=log_rate))
-        tell(f"{under}: {'proved' if proof.proved else 'not proved'}", _SEARCHED)
+        tell(f"{under}: {'proved' if proof.found else 'not proved'}", _SEARCHED)
         return proof
 
     def about_the_largest(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
@@ -226,7 +226,7 @@ def _proof(pump: Pump | None, tell: Tell, *, with_stress: bool) -> Prove:
         proof: SlidingProof | NoProof
         for share in _SHARES if most else _SHARES[:1]:
             proof = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
-            if proof.proved:
+            if proof.found:
                 break
         return proof
 
@@ -246,12 +246,12 @@ def _designed(
     if isinstance(design, NoProof):
         return SlidingGuarantee(proof=design, task=task, held=None)
     proved = prove(task, design, log_rate)
-    return SlidingGuarantee(proof=proved, task=proved.task if proved.proved else task, held=design)
+    return SlidingGuarantee(proof=proved, task=proved.task if proved.found else task, held=design)
 
 
 def _within_pump(pump: Pump | None, proof: SlidingProof | NoProof) -> SlidingProof | NoProof:
     """A guarantee if its valve pressures lie within the pump limits."""
-    if pump is None or not proof.proved:
+    if pump is None or not proof.found:
         return proof
     too_much = pump.exceeded(*proof.valve_pressures)
     return NoProof(reason=too_much) if too_much else proof

@@ -85,7 +85,7 @@ class TrackingGuarantee(Guarantee):
 
         None for a law that uses the slip, the slip rate or the reference itself, or that is unstable by itself.
         """
-        if not (self.given and self.proof.proved) or self.proof.held.law.of_reference or self.grows_at_rest:
+        if not (self.given and self.proof.found) or self.proof.held.law.of_reference or self.grows_at_rest:
             return self.stick_search
         return worst_tracking(self.proof, sticks=True)
 
@@ -99,7 +99,7 @@ class TrackingGuarantee(Guarantee):
         return [*self._lines(), *tried, *(healed if excess else ()), *(self.notes or ())]
 
     def _lines(self) -> list[str]:
-        if not self.proof.proved:
+        if not self.proof.found:
             lines = [self.proof.sentence()]
             if self.unproved_step is not None:
                 lines = [f"not guaranteed at T_s = {float(self.unproved_step):g} s: {self.proof.reason}"]
@@ -133,7 +133,7 @@ class TrackingGuarantee(Guarantee):
     def stick_slip_gap(self) -> str:
         """Quantities neither proved nor searched on the stick–slip plant; empty for a design."""
         seen = self.worst_with_stick
-        if not self.proof.proved or (seen is not None and not (self.given and seen.pressures is None)):
+        if not self.proof.found or (seen is not None and not (self.given and seen.pressures is None)):
             return ""
         searched = "case" if seen is None else "pressure"
         return (
@@ -147,14 +147,14 @@ class TrackingGuarantee(Guarantee):
 
         The measurements do not respond to the pressure at rest, so that the law runs in open loop.
         """
-        if not self.proof.proved:
+        if not self.proof.found:
             return None
         return growth_at_rest(self.proof.held.law, self.proof.held.step)
 
     @property
     def differentiator_bound(self) -> UpperBound | None:
         """Least λ_d [m/s³] of the differentiator for the guarantee; None for a law without one."""
-        if not self.proof.proved or measured_by(self.proof.held.law) != MEASURED[2]:
+        if not self.proof.found or measured_by(self.proof.held.law) != MEASURED[2]:
             return None
         return UpperBound(least_bound(self.proof.slip_acceleration, self.proof.held.slip_noise, self.proof.held.step))
 
@@ -170,7 +170,7 @@ class TrackingGuarantee(Guarantee):
 
     def _at_rest(self) -> list[str]:
         """Warning about a law whose states grow while the fault is at rest; none for other laws."""
-        if not self.proof.proved:
+        if not self.proof.found:
             return []
         limited = self.proof.rest_limit is not None
         return list(filter(None, [warning_at_rest(self.proof.held.law, self.proof.held.step, limited=limited)]))
@@ -178,7 +178,7 @@ class TrackingGuarantee(Guarantee):
     def limit_lines(self) -> list[str]:
         """Performance limits at the same T_s, as text; empty if unknown."""
         limit = self.limit
-        if limit is None or not self.proof.proved:
+        if limit is None or not self.proof.found:
             return []
         held = self.proof.held
         step = f"{float(max(held.step, held.longest_step)):.6g} s"
@@ -197,7 +197,7 @@ class TrackingGuarantee(Guarantee):
     def _narrower_class(self) -> list[str]:
         """Note that the fault's own disturbance is also of the class ``rate``."""
         disturbance = self.fault.disturbance
-        own = self.proof.proved and self.proof.task.change is None
+        own = self.proof.found and self.proof.task.change is None
         if not own or disturbance.constant or not disturbance.largest_rate:
             return []
         change = UpperBound(self.fault.disturbance_bounds[1])
@@ -209,7 +209,7 @@ class TrackingGuarantee(Guarantee):
     @property
     def limit(self) -> SmallestPeak | None:
         """Performance limit at the same T_s, delay and measurements; None for the class ``rate``."""
-        if not self.proof.proved or self.proof.task.change is not None:
+        if not self.proof.found or self.proof.task.change is not None:
             return None
         held = self.proof.held
         rate_noise = None if held.law.of_slip_alone else held.rate_noise
@@ -224,7 +224,7 @@ class TrackingGuarantee(Guarantee):
     @property
     def leaves_with_stick(self) -> bool:
         """Whether the stick–slip plant exceeds the claims in the worst case found."""
-        if not self.proof.proved or self.worst_with_stick is None:
+        if not self.proof.found or self.worst_with_stick is None:
             return False
         claims, seen = self.proof.claims, self.worst_with_stick
         (least, largest), ends = claims.pressures[-1], seen.pressures
@@ -234,7 +234,7 @@ class TrackingGuarantee(Guarantee):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, SI; exact numbers as texts."""
-        if not self.proof.proved:
+        if not self.proof.found:
             gain = self.proof.small_gain
             other = self.shorter
             shorter = None if other is None else {"step": str(other.held.step), **other.claims.to_dict()}
@@ -249,7 +249,7 @@ class TrackingGuarantee(Guarantee):
                 **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
         bounds, held = self.proof.recomputed(), self.proof.held
-        small = None if not bounds.proved else float_above(bounds.small_gain)
+        small = None if not bounds.found else float_above(bounds.small_gain)
         return {
             "verdict": "proved",
             "sentence": self.proof.sentence(),
@@ -335,7 +335,7 @@ def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGua
     If a trajectory with stick exceeds a claim with a slowly varying input gain, the guarantee with an arbitrary gain
     replaces it, provided that its claims contain the trajectory.
     """
-    if not proof.proved:
+    if not proof.found:
         return TrackingGuarantee(fault=fault, proof=proof)
     seen = TrackingGuarantee(
         fault=fault, proof=proof, worst=worst_tracking(proof), stick_search=worst_tracking(proof, sticks=True)
@@ -347,13 +347,13 @@ def given_law_with_worst_case(
     fault: Fault, proof: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
 ) -> TrackingGuarantee:
     """The guarantee of a given law with the worst case found, for a law of the errors alone."""
-    worst = worst_tracking(proof) if proof.proved and not proof.held.law.of_reference else None
+    worst = worst_tracking(proof) if proof.found and not proof.held.law.of_reference else None
     return TrackingGuarantee(fault=fault, proof=proof, worst=worst, notes=notes, given=True)
 
 
 def _with_room(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
     arbitrary, worst = guarantee(proof.task, proof.held), seen.worst_with_stick
-    if not arbitrary.proved or worst is None:
+    if not arbitrary.found or worst is None:
         return seen
     exceeded = ["slip_error"] if worst.slip_error > proof.claims.slip_error else []
     faster = (worst.slip_rate_error or 0.0) > proof.claims.slip_rate_error

@@ -185,10 +185,10 @@ def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
         + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
         for name, proved in peaks.items()
-        if proved.proved
+        if proved.found
     ]
     if not lines:
-        reasons = {proved.reason for proved in peaks.values() if not proved.proved}
+        reasons = {proved.reason for proved in peaks.values() if not proved.found}
         return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
     return "certified from rest in continuous time: slip rate below " + ", ".join(lines)
 
@@ -328,7 +328,7 @@ def part_of_task(run: Trajectory, fault: Fault) -> str:
 def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     """Verdict on the sampled loop or in continuous time, with the reason if it is not positive."""
     if design.verdict is Verdict.PROVED:
-        ran: FaultProof | None = design.runs if design.runs is not None and design.runs.proved else None
+        ran: FaultProof | None = design.runs if design.runs is not None and design.runs.found else None
         lasts, proved = (ran.lasts, ran.plant) if ran else ("for all t >= 0", TrackingProof.plant)
         plant = "for the loop that ran"
         if run is not None and proved and run.provenance["plant"] != proved:

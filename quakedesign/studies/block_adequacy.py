@@ -26,12 +26,12 @@ class BlocksResult:
     @property
     def proved(self) -> bool:
         """Whether all numbers of blocks have a guarantee."""
-        return all(one.proved for one in self.proofs.values())
+        return all(one.found for one in self.proofs.values())
 
     def peaks(self, blocks: int) -> tuple[Any, Any] | None:
         """Largest proved slip error [m] and slip-rate error [m/s] of all blocks."""
         one = self.proofs[blocks]
-        if not one.proved:
+        if not one.found:
             return None
         outputs = one.claims.outputs
         return max(outputs[:blocks]), max(outputs[blocks:])
@@ -47,7 +47,7 @@ class BlocksResult:
         ]
         for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
-            if not one.proved or ends is None:
+            if not one.found or ends is None:
                 parts.append(f"{blocks:3} blocks: {one.sentence()}")
                 continue
             about = "its balance" if self.wells == "one" else "the reference"
@@ -62,8 +62,8 @@ class BlocksResult:
         rows = []
         for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
-            entry: dict[str, Any] = {"blocks": blocks, "verdict": "proved" if one.proved else "undecided"}
-            entry |= {"reason": None if one.proved else one.reason}
+            entry: dict[str, Any] = {"blocks": blocks, "verdict": "proved" if one.found else "undecided"}
+            entry |= {"reason": None if one.found else one.reason}
             entry |= {"slip_error": ends and ends[0].exact, "slip_rate_error": ends and ends[1].exact}
             rows.append(entry)
         return {"fault": self.fault.name, "wells": self.wells, "step": str(self.step), "blocks": rows}

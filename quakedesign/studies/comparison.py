@@ -102,7 +102,7 @@ class Entry:
     def proof(self) -> FaultProof | None:
         """Proof of the guarantee; None without one."""
         proof = self.guarantee.proof if self.guarantee else None
-        return proof if proof is not None and proof.proved else None
+        return proof if proof is not None and proof.found else None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""
@@ -213,14 +213,14 @@ def _guarantee_of(fault: Fault, design: Design, *, given: bool) -> Guarantee | N
     proof: Any = design.guarantee
     if design.sliding is not None:
         return design.sliding
-    if proof.proved and proof.kind == STICK_SLIP:
+    if proof.found and proof.kind == STICK_SLIP:
         return stick_slip_with_worst_case(fault, proof, design.compensation)
     if given:
         notes = getattr(design.controller, "notes", None)
         return replace(given_law_with_worst_case(fault, proof, notes), compensation=design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
     result = replace(with_worst_case(fault, proof), compensation=design.compensation, not_at_rest=tried)
-    return result if proof.proved or design.runs else replace(result, given=True)  # only T_s of the fault was tried
+    return result if proof.found or design.runs else replace(result, given=True)  # only T_s of the fault was tried
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], progress: Tell, *, whole: bool) -> Compared:
@@ -286,7 +286,7 @@ def _linear(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
     wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
-    proved = {kind: peak for kind, peak in peaks.items() if peak.proved}
+    proved = {kind: peak for kind, peak in peaks.items() if peak.found}
     return replace(entry, growth_per_step=growth, zero_order_hold=sampled, peaks=proved)
 
 

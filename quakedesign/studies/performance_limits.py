@@ -469,7 +469,7 @@ def _sliding_limits(
     path = setup if setup is not None and setup.path else None
     through = ExactSetup(diffusion=near_path(model))
     result = None if setup is None else guarantee_sliding(fault, stress=requested, spread=off, setup=through)
-    proof = result.proof if result is not None and result.proof.proved else None
+    proof = result.proof if result is not None and result.proof.found else None
     amplitude = requested if requested is not None or proof is None else proof.task.stress
     if amplitude is None or amplitude <= 0:
         why = f": {result.reason}" if result is not None and not result.proved else ""
@@ -481,7 +481,7 @@ def _sliding_limits(
     farthest, rock = longest_diffusion(push, withdrawal, step), (path or IDEAL).diffusion
     if path is not None and (farthest is None or rock <= farthest):
         behind = guarantee_sliding(fault, stress=requested, spread=off, setup=ExactSetup.of(path)).proof
-        proof = behind if behind.proved else None
+        proof = behind if behind.found else None
         push = replace(push, amplitude=proof.task.stress) if proof else push
     impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
     proved: dict[str, Bound | None] = {}
@@ -514,7 +514,7 @@ def _proved_steps(
     """Guarantees at increasing T_s up to nearly the longest, and that at the fault's own T_s, if there is one."""
     own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **sensing.wanted)
     longest = longest_step(task, **sensing.wanted)
-    if own is not None and own.proved:
+    if own is not None and own.found:
         own = _best_at(own, sensing)
     else:
         own = continued(task, step, longest, **sensing.wanted)
@@ -527,5 +527,5 @@ def _proved_steps(
 def _best_at(least_peak: TrackingProof, sensing: Sensing) -> TrackingProof:
     """The better of the designs for peak and for tracking: the one with the smaller proved slip-rate error."""
     tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **sensing.wanted)
-    proofs = [least_peak, *([tracking] if tracking.proved else [])]
+    proofs = [least_peak, *([tracking] if tracking.found else [])]
     return min(proofs, key=lambda g: g.claims.slip_rate_error)

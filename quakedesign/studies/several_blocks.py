@@ -205,7 +205,7 @@ class ChainRun:
     def lines(self) -> list[str]:
         """Lines of at most 80 characters: blocks and wells, with proved and simulated values."""
         chain, run, N = self.chain, self.run, len(self.chain.blocks)
-        if not self.proof.proved:
+        if not self.proof.found:
             return [_NO_RUN]
         rates, slips = self.proved_slip_rates, [UpperBound(v) for v in self.proof.claims.outputs[:N]]
         powers = [power_of(float(max(values))) for values in (rates, slips)]
@@ -327,7 +327,7 @@ def run_of_chain(
     """
     whole_periods(chain, rational(chain.fault.sampling_time), duration)  # reject before the long search
     proof = chain_law(chain, controller, certificate)
-    run = simulate_blocks(chain, proof.law, duration=duration) if proof.proved else None
+    run = simulate_blocks(chain, proof.law, duration=duration) if proof.found else None
     return ChainRun(chain=chain, controller=controller, proof=proof, run=run)
 
 
@@ -357,7 +357,7 @@ class SlidingChainRun:
 
     def row(self) -> list[str]:
         """As in `ChainRun`; slip rates themselves, and pressures relative to the plan."""
-        if self.run is None or self.proof is None or not self.proof.proved:
+        if self.run is None or self.proof is None or not self.proof.found:
             return [self.controller, "none", *[""] * 5]
         rate = SlidingReference(task=self.chain.fault.reference).first_rate * exponential(self.log_rate)
         slip = max(self.proof.claims.outputs[: len(self.chain.blocks)])
@@ -389,7 +389,7 @@ class SlidingChainRun:
     def within(self) -> bool:
         """Whether all errors of a controlled run are within the proved bounds of their blocks and wells."""
         assert self.proof is not None
-        assert self.proof.proved
+        assert self.proof.found
         N, claims, errors = len(self.chain.blocks), self.proof.claims, self.errors
         values = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
@@ -506,7 +506,7 @@ def run_sliding_chain(
     if loading_rate is not None:
         raise ParameterError("the far end rests in slow sliding. Received a loading rate. Omit it.")
     proof = chain_law(chain, controller, certificate, **(sliding or {}))
-    if not proof.proved:
+    if not proof.found:
         return SlidingChainRun(chain=chain, run=None, inertia=inertia, proof=proof, controller=controller)
     lag, covered, rate, _ = covered_stress(chain, proof)
     size = float(covered) if stress is None else stress

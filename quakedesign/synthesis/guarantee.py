@@ -275,7 +275,7 @@ def guarantee(
     if plant is None and usual and may_stick(family, setup, disturbance_class):
         mode = method_of(family).base_law(task, family, wanted.gains)
         sticking = guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
-        if sticking.proof.proved:
+        if sticking.proof.found:
             return sticking
         not_at_rest = sticking.proof.reason
     result = _sampled(fault, task, family, wanted)

@@ -361,7 +361,7 @@ class Samples(DesignMethod[SampledController]):
             return NoProof(reason=_STANDING)
         held = replace(exact, **path).held(law, step)
         proof = best_guarantee(task, held)
-        if proof.proved or proof.small_gain is not None or held.longest_step:
+        if proof.found or proof.small_gain is not None or held.longest_step:
             return proof
         largest, opposite = (spectral_radius(replace(held, law=_times(f, law)).loop(task)) for f in (1, -1))
         if largest < _STABLE:
@@ -381,15 +381,15 @@ class Samples(DesignMethod[SampledController]):
         """Guarantee with the worst case found, for a law of the errors alone."""
         proof = self.guarantee(fault, task, controller, setup)
         result = given_law_with_worst_case(fault, proof, controller.notes)
-        if proof.proved or proof.pressed or proof.reason == _STANDING or setup.longest_step:
+        if proof.found or proof.pressed or proof.reason == _STANDING or setup.longest_step:
             return result
         for factor in _FACTORS:
             other = self.guarantee(fault, task, replace(controller, law=_times(factor, controller.law)), setup)
-            if other.proved:
+            if other.found:
                 return replace(result, nearest=(FACTOR, other), factor=factor)
         for share in _DELAYS if setup.delay else ():
             other = self.guarantee(fault, task, controller, setup.with_given(delay=share * setup.delay))
-            if other.proved:
+            if other.found:
                 return replace(result, nearest=("delay", other))
         return result
 

@@ -54,7 +54,7 @@ def guarantee_plant(
             f"steepest the states ({shape}) grow by {radius:.4g} a sample",
         )
     proof = plant_guarantee(around, exact)
-    return replace(proof, notes=notes) if proof.proved else proof
+    return replace(proof, notes=notes) if proof.found else proof
 
 
 def _shown(plant: UncertainPlant) -> int:

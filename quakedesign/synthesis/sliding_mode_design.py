@@ -131,7 +131,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         made = sliding_mode(task, law, step, **options, setup=setup)
         if isinstance(made, NoProof):
             return TrackingGuarantee(fault=fault, proof=made)
-        if not made.proof.proved:
+        if not made.proof.found:
             laws, none = deadbeat(task, law, wanted.gains), made.proof
             longest = longest_step(task, kind=laws, setup=setup)
             again = laws.continued(task, step, longest, setup=setup)

@@ -107,15 +107,15 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
                 return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
             summed = by_differences(summed, step) if differs else summed
             proof = best_guarantee(task, exact.held(summed, step))
-            if proof.proved:
+            if proof.found:
                 return with_worst_case(fault, proof)
             other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
-            if other.proof.proved:
+            if other.proof.found:
                 return TrackingGuarantee(fault=fault, proof=proof, nearest=(GAINS, other.proof))
             return replace(other, proof=proof)
         entries: Any = {"measured": setup.measured, "setup": exact}
         designed = design_held(task, step, objective=wanted.objective, **entries)
-        if designed.proved:
+        if designed.found:
             return with_worst_case(fault, designed)
         if setup.longest_step or designed.pressed:
             nearest = nearest_setup(task, step, pressed=designed.pressed, **entries)
@@ -155,7 +155,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     without: dict[str, Any] = {}
     if problem.plant != TrackingProof.plant and may_stick(law, setup, problem.disturbance_class):
         sticking = design_stick_slip(task, step, **sticking_options(problem))
-        if sticking.proved:
+        if sticking.found:
             details = {"objective": problem.objective, "step": str(step), "reason": None, "measured": setup.measured}
             details |= {name: str(value) for name, value in sticking.held.noise.items()}
             return problem.judged(sticking.controller, name=law.name, details=details, runs=sticking)
@@ -193,7 +193,7 @@ def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: typ
     result = guarantee_sliding(
         fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
     )
-    reason = result.proof.reason if not result.proof.proved else None
+    reason = result.proof.reason if not result.proof.found else None
     if result.held is None:
         return problem.undecided(law.name, str(reason), sliding=result)
     near = quantity(float(path) ** 0.5, "m")

@@ -24,6 +24,8 @@ class Proof(ABC, Generic[B]):
 
     Attributes
     ----------
+    found : bool
+        True; False for `NoProof`. A proof from a file is not yet decided: `check` does that.
     kind : str
         Kind of its certificate file (proofs/FORMAT.md).
     plant : str
@@ -47,7 +49,7 @@ class Proof(ABC, Generic[B]):
     """
 
     __slots__ = ()
-    proved: ClassVar[Literal[True]] = True
+    found: ClassVar[Literal[True]] = True
     kind: ClassVar[str]
     plant: ClassVar[str] = ""
     scope: ClassVar[str] = ""
@@ -125,7 +127,7 @@ class NoProof:
         Whether only the pressure fails: it exceeds a pump limit, or opens the fault.
     """
 
-    proved: ClassVar[Literal[False]] = False
+    found: ClassVar[Literal[False]] = False
     bounds: ClassVar[Mapping[str, LowerBound | UpperBound]] = MappingProxyType({})
     reason: str
     small_gain: UpperBound | None = None

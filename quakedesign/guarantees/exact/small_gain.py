@@ -134,10 +134,12 @@ _HALVINGS = 96
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """Bounds for every trajectory of the uncertain quantities and all t ≥ 0.
+    """Bounds for every trajectory of the uncertain quantities and all t ≥ 0; from a search, estimates of them.
 
     Attributes
     ----------
+    found : bool
+        True; False for `NoProof`.
     slip_error : Fraction
         |e1| [m].
     slip_rate_error : Fraction
@@ -152,7 +154,7 @@ class Bounds:
         Upper bound of the spectral radius of M [-], below 1.
     """
 
-    proved: ClassVar[Literal[True]] = True
+    found: ClassVar[Literal[True]] = True
     slip_error: Fraction
     slip_rate_error: Fraction
     push: Fraction
@@ -193,7 +195,7 @@ def best_bounds(
     """Bounds of the theorem from the gains; in class ``rate`` the smaller of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
     results = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
-    proved = [bounds for bounds in results if bounds.proved]
+    proved = [bounds for bounds in results if bounds.found]
     if not proved:
         return results[0]
     every = {part.name: [getattr(bounds, part.name) for bounds in proved] for part in fields(Bounds)}

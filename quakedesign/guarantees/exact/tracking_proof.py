@@ -365,13 +365,13 @@ def guarantee(
     """
     if reach is not None:
         bounds = _bounds(task, held, held.loop(task), reach)
-        return bounds if not bounds.proved else _of_claims(task, held, _rounded(task, bounds), reach=reach)
+        return bounds if not bounds.found else _of_claims(task, held, _rounded(task, bounds), reach=reach)
     if held.pump is None or held.pump.rate is None or held.ramp:
         return _proved(task, held, slow_gain)
     ramp, longest = _FIRST * held.step, held.longest_ramp
     proof = _proved(task, replace(held, ramp=ramp), slow_gain)
     for _ in range(_RAMPS):
-        if proof.proved or proof.needs is None or ramp == longest:
+        if proof.found or proof.needs is None or ramp == longest:
             break
         if slow := held.pump.too_slow(UpperBound(proof.needs), longest):
             return replace(proof, reason=slow)
@@ -404,7 +404,7 @@ def _of_claims(
 
 def _claims(task: FaultPlant, held: SampledLoop) -> Claims | NoProof:
     bounds = _bounds(task, held, held.loop(task))
-    return bounds if not bounds.proved else _rounded(task, bounds)
+    return bounds if not bounds.found else _rounded(task, bounds)
 
 
 def _rounded(task: FaultPlant, bounds: Bounds) -> Claims:
@@ -418,7 +418,7 @@ def _slow_claims(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Cl
         return gains
     for turn in range(_TURNS + _LEAPS):
         bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
-        if not bounds.proved:
+        if not bounds.found:
             return bounds
         claims = _rounded(task, bounds)
         if claims.slip_error <= slip_error:
@@ -562,7 +562,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | 
         For a law with a steady-state error at rest under a constant pressure.
     """
     bounds = _continuous_bounds(task, law)
-    if not bounds.proved:
+    if not bounds.found:
         return bounds
     claims = Claims.of(task, bounds).rounded()
     if reason := claims.opens(task):

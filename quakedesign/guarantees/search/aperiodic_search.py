@@ -39,7 +39,7 @@ def aperiodic_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | 
         if not isinstance(reach, InvariantPolytope):
             return reach or proof
         proof = guarantee(task, held, reach=reach)
-        if proof.proved:
+        if proof.found:
             break
     return proof
 

@@ -190,7 +190,7 @@ class Compensation:
     @property
     def deadbeat(self) -> bool:
         """Whether the implicit step ends at e1 + T_s·w = 0 within the proved errors."""
-        root = self.proof.root if self.proof.proved else None
+        root = self.proof.root if self.proof.found else None
         return root is not None and set(root.slopes) == {1} and not root.remainder
 
     @property
@@ -198,7 +198,7 @@ class Compensation:
         return self.controller.sampling.scheme if self.controller.sampling else GUARANTEED
 
     def _end(self) -> str:
-        root = self.proof.root if self.proof.proved else None
+        root = self.proof.root if self.proof.found else None
         if root is None:
             return ""
         low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
@@ -243,22 +243,22 @@ def compensated(
         return NoProof(reason=str(error))
     held = _sampled(ImplicitRoot(pull=pull), weight, authority, step, setup)
     first = guarantee(task, held)
-    if first.proved:
+    if first.found:
         return first
     deadbeat = estimated(task, held)
-    if deadbeat is None or not deadbeat.bounds.proved:
+    if deadbeat is None or not deadbeat.bounds.found:
         return best_guarantee(task, held)
     size = deadbeat.bounds.slip_rate_error
     for share, slope in product(_REMAINDERS, _SLOPES):
         root = ImplicitRoot(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
         wider = replace(held, law=replace(held.law, root=root))
         near = estimated(task, wider)
-        if near is None or not near.bounds.proved:
+        if near is None or not near.bounds.found:
             continue
         errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
         within = holds(root, step, *errors)
         proof = guarantee(task, wider) if within else None
-        if proof is not None and proof.proved:
+        if proof is not None and proof.found:
             return proof
     return best_guarantee(task, held)
 
@@ -366,13 +366,13 @@ class Deadbeat(Kind):
             return None
         near = self.closest(task, step, longest.numbers, setup=setup)
         made = None if isinstance(near, NoProof) else self.made(task, step, near.numbers, setup=setup)
-        return made if made is not None and made.proof.proved else None
+        return made if made is not None and made.proof.found else None
 
     def at(self, task: FaultPlant, longest: Longest, objective: str = "peak") -> Compensation:
         """Design for the longest T_s with a guarantee, else the law of the search."""
         held = longest.guarantee.held
         made = design_compensated(task, self.controller, held.step, objective=objective, setup=held.setup)
-        if made.proof.proved:
+        if made.proof.found:
             return made
         return self.made(task, held.step, longest.numbers, setup=held.setup)
 
@@ -554,7 +554,7 @@ def _deadbeat_search(
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
         estimate = estimated(task, _sampled(_DEADBEAT, *choice, step, setup))
-        if estimate is not None and estimate.bounds.proved:
+        if estimate is not None and estimate.bounds.found:
             seen[choice] = estimate
     if not seen:
         return [str(weights[0]), str(_short(task.model.gain))]
@@ -602,7 +602,7 @@ def _sampled(
 
 
 def _bounds(estimate: BoundsEstimate) -> Bounds:
-    assert estimate.bounds.proved
+    assert estimate.bounds.found
     return estimate.bounds
 
 

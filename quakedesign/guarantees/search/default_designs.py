@@ -108,12 +108,12 @@ def sampled_design(
     wanted: Any = {"measured": measured, "setup": setup}
     proof = design_held(task, step, objective=objective, **wanted)
     longest = longest_step(task, **wanted)
-    if not proof.proved:
+    if not proof.found:
         proof = continued(task, step, longest, **wanted) or proof
-    reason = proof.reason if not proof.proved else ""
-    if not proof.proved and longest is not None:
+    reason = proof.reason if not proof.found else ""
+    if not proof.found and longest is not None:
         proof = design_at(task, longest)
-    if not proof.proved:
+    if not proof.found:
         return SampledDesign(step=step, runs=None, reason=reason)
     delayed, own = longest_delay(task, proof.held.step, **wanted), proof.held.delay
     return SampledDesign(
@@ -140,12 +140,12 @@ def sampled_sliding_mode(
     laws = Deadbeat(law)
     made = design_compensated(task, law, step, objective=objective, setup=setup)
     longest = longest_step(task, kind=laws, setup=setup)
-    if not made.proof.proved:
+    if not made.proof.found:
         made = laws.continued(task, step, longest, setup=setup) or made
-    reason = made.proof.reason if not made.proof.proved else ""
+    reason = made.proof.reason if not made.proof.found else ""
     if reason and longest is not None:
         made = laws.at(task, longest, objective)
-    if not made.without_stick.proved:
+    if not made.without_stick.found:
         return made, SampledDesign(step=step, runs=None, reason=reason)
     runs = tightened(made.without_stick)
     held = runs.held

@@ -93,7 +93,7 @@ def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None
         spread = replace(_PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
         bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
         least = min(least, _small(bounds))
-        if not bounds.proved or bounds.slip_error <= slip_error:
+        if not bounds.found or bounds.slip_error <= slip_error:
             return _closeness(bounds, least)
         slip_error = max(1.01 * float(bounds.slip_error), _LEAP * slip_error * (turn >= _FEW))
     return _closeness(None, least)
@@ -109,7 +109,7 @@ def _small(bounds: Bounds | NoProof) -> float:
 
 
 def _closeness(bounds: Bounds | NoProof | None, least: float) -> tuple[float, Bounds | None]:
-    return (_small(bounds), bounds) if bounds is not None and bounds.proved else (1 + least, None)
+    return (_small(bounds), bounds) if bounds is not None and bounds.found else (1 + least, None)
 
 
 def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | None:

@@ -72,10 +72,10 @@ def best_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoPro
         return aperiodic_guarantee(task, held)
     slow = slow_gain(task, held)
     proof = guarantee(task, held) if slow is None else guarantee(task, held, slow)
-    if slow is None or proof.proved:
+    if slow is None or proof.found:
         return proof
     anyhow = guarantee(task, held)
-    return anyhow if anyhow.proved or anyhow.pressed else proof  # a pressure is reduced more easily than a small gain
+    return anyhow if anyhow.found or anyhow.pressed else proof  # a pressure is reduced more easily than a small gain
 
 
 @overload
@@ -84,10 +84,10 @@ def tightened(proof: TrackingProof) -> TrackingProof: ...
 def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof: ...
 def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof:
     """Guarantee with a slowly varying input gain in place of one with an arbitrary gain, if one is found."""
-    if not proof.proved or proof.slow_gain is not None or proof.reach is not None:
+    if not proof.found or proof.slow_gain is not None or proof.reach is not None:
         return proof
     better = best_guarantee(proof.task, proof.held)
-    return better if better.proved else proof
+    return better if better.found else proof
 
 
 def slow_gain(task: FaultPlant, held: SampledLoop) -> SlowGain | None:
@@ -186,7 +186,7 @@ def nearby(
     if isinstance(laws, NoProof):
         return laws
     proof = best_guarantee(task, laws.held(laws.least_peak_near(near)))
-    return proof if proof.proved else best_guarantee(task, laws.held(near))
+    return proof if proof.found else best_guarantee(task, laws.held(near))
 
 
 def design_held(
@@ -245,29 +245,29 @@ def design_held(
     if behind_rock and (none := laws.without_bounds(x)) is not None and _hopeless(least):
         return none  # such a proof takes a minute
     seen = laws.seen(x)
-    if objective == "tracking" and seen is not None and seen.bounds.proved:
+    if objective == "tracking" and seen is not None and seen.bounds.found:
         limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
         _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
     proof = best_guarantee(task, laws.held(x))
-    if not proof.proved and seen is not None and seen.bounds.proved and proof.pressed:
+    if not proof.found and seen is not None and seen.bounds.found and proof.pressed:
         leaner = best_guarantee(task, laws.held(laws.least_pressure(x)[1]))
-        proof = leaner if leaner.proved else proof
+        proof = leaner if leaner.found else proof
     noise = {name: v for name, v in laws.template.noise.items() if v}
-    if proof.proved or not noise:
+    if proof.found or not noise:
         return proof
     quiet = replace(setup, slip_noise=Fraction(0), rate_noise=Fraction(0))
     without = design_held(task, step, objective=objective, room=room, measured=measured, setup=quiet)
-    return proof if not without.proved else _with_noise(without, noise)
+    return proof if not without.found else _with_noise(without, noise)
 
 
 def _with_noise(without: TrackingProof, noise: Mapping[str, Fraction]) -> TrackingProof | NoProof:
     """Guarantee with noise of a law that is proved without noise."""
     held = replace(without.held, **noise)  # type: ignore[arg-type]
     proof = best_guarantee(without.task, held)
-    if proof.proved:
+    if proof.found:
         return proof
     anyhow = guarantee(without.task, held)  # with an arbitrary input gain, which noise does not affect
-    why = anyhow.reason if not anyhow.proved and anyhow.small_gain is None else "nothing is proved"
+    why = anyhow.reason if not anyhow.found and anyhow.small_gain is None else "nothing is proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     noises = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
     return replace(proof, reason=f"with {noises} {why}; without it a law is proved")
@@ -343,7 +343,7 @@ class _Laws:
     def without_bounds(self, x: np.ndarray) -> NoProof | None:
         """Reason why a law has no bounds; None if it has bounds or does not exist."""
         seen = self.seen(x)
-        return seen.bounds if seen is not None and not seen.bounds.proved else None
+        return seen.bounds if seen is not None and not seen.bounds.found else None
 
     def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
         """Smallest peak cost near a start, with its numbers; ends early far from a guarantee.
@@ -363,7 +363,7 @@ class _Laws:
 
         def cost(x: np.ndarray) -> float:
             seen = self.seen(x)
-            if seen is None or not seen.bounds.proved:
+            if seen is None or not seen.bounds.found:
                 return 10 * _FAILED
             most = seen.bounds.push if seen.bounds.valve_push is None else seen.bounds.valve_push
             return self.quiet(x, 10 * log10(float(most)))
@@ -462,7 +462,7 @@ def _peak_cost(estimate: BoundsEstimate | None, period: Fraction) -> float:
     """Decibels of the slip-rate error; without a bound, a penalty for the distance from one."""
     if estimate is None:
         return 10 * _FAILED
-    if not estimate.bounds.proved:
+    if not estimate.bounds.found:
         return _FAILED * min(float(estimate.bounds.small_gain or 9), 9.0)
     return _decibels(estimate.bounds, period)
 
@@ -472,7 +472,7 @@ def _decibels(bounds: Bounds, period: Fraction) -> float:
 
 
 def _drift_cost(estimate: BoundsEstimate | None, limit: float) -> float:
-    if estimate is None or not estimate.bounds.proved:
+    if estimate is None or not estimate.bounds.found:
         return 10 * _FAILED
     over = max(0.0, float(estimate.bounds.slip_rate_error) / limit - 1)
     return 10 * log10(estimate.drift_gain) + 1000 * over
@@ -590,14 +590,14 @@ def continued(
     if longest is None or longest.guarantee.held.step < step:
         return None
     proof = nearby(task, step, longest.numbers, measured=measured, setup=setup)
-    return proof if proof.proved else None
+    return proof if proof.found else None
 
 
 def design_at(task: FaultPlant, longest: Longest) -> TrackingProof:
     """Design for a small slip-rate error at the T_s and setup of a guarantee."""
     held = longest.guarantee.held
     proof = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), setup=held.setup)
-    return min((longest.guarantee, *([proof] if proof.proved else [])), key=lambda g: g.claims.slip_rate_error)
+    return min((longest.guarantee, *([proof] if proof.found else [])), key=lambda g: g.claims.slip_rate_error)
 
 
 def longest_delay(
@@ -700,7 +700,7 @@ def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, setup: ExactSetu
         return None
     if pump is not None and pump.limits is not None:
         proof = best_guarantee(task, replace(held, pump=_unlimited(pump)))
-        if proof.proved:
+        if proof.found:
             low, high = map(Fraction, proof.claims.pressures[-1])
             wider = replace(pump, least=min(pump.limits[0], low), largest=max(pump.limits[1], high))
             return SATURATION, replace(proof, held=replace(proof.held, pump=wider))
@@ -785,7 +785,7 @@ def _farthest(
     for _ in range(_ATTEMPTS if good is not None else 0):
         assert good is not None
         proof = laws.proved(problem_with(at)[0], good)
-        if proof.proved:
+        if proof.found:
             return Longest(proof, good.numbers)
         at = Fraction(f"{float(at * _BACK):.3g}")
         nearer = search(at, good.numbers)
@@ -845,7 +845,7 @@ def reached(
     time, good, bad, small_gain = first, None, None, None
     for _ in range(attempts):
         proof = attempt(time)
-        if proof.proved:
+        if proof.found:
             proofs.append(proof)
             good = time
         else:
@@ -915,7 +915,7 @@ def certified_peaks(
         continuous_peaks(uncertain_plant(fault, rate_limited=disturbance_class == "rate"), law),
         controller.limits,
     )
-    if limits is None or not peaks.proved:
+    if limits is None or not peaks.found:
         return peaks
     low, high = peaks.claims.least_pressure, peaks.claims.largest_pressure
     if limits.lowest < low and high < limits.highest:

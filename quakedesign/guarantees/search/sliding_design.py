@@ -500,7 +500,7 @@ def what_would_do(
         held = replace(reach.held, slip_noise=noise)
         proof = prove(task, held, reach.log_rate)
         sentences = [_slower(fault, task, reach, loop, prove, spread)]
-        if proof.proved:
+        if proof.found:
             path = (f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
             sentences.append(f"at this V for {' and '.join(path)} with T_s = {float(held.step):.3g} s{_under(proof)}")
         if remedies := ", and ".join(filter(None, sentences)):
@@ -535,7 +535,7 @@ def _slower(
     slower, step = slow_sliding_plant(slow, task.stress, spread), rational(slow.sampling_time)
     held, _ = searched_sliding(slower, step, reach.log_rate, setup, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
     proof = None if held is None else prove(slower, held, reach.log_rate)
-    if proof is None or not proof.proved:
+    if proof is None or not proof.found:
         return ""
     return (
         f"with this path for V = {float(slower.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "

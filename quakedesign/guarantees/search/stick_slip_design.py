@@ -708,7 +708,7 @@ def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda what, d
     def search() -> dict[str, Any]:
         with np.errstate(all="ignore"):  # overflow gives no proposal
             fresh.append(_searched(task, held, tell))
-        return {"set": written(fresh[0].reach)} if fresh[0].proved else {"reason": fresh[0].reason}
+        return {"set": written(fresh[0].reach)} if fresh[0].found else {"reason": fresh[0].reason}
 
     stored = search_once(search, "polytope of a stick-slip law", task, held)
     if fresh:
@@ -732,7 +732,7 @@ def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlip
             if not growing.grown(tell) or (reach := growing.exact()) is None:
                 return proof
             proof = stick_slip_guarantee(task, held, reach)
-            if proof.proved:
+            if proof.found:
                 break
     except ParameterError as error:
         return NoProof(reason=str(error))
@@ -786,7 +786,7 @@ def design_stick_slip(
         except (ParameterError, ArithmeticError, ValueError):
             return NoProof(reason="no gains of this size are floats")
         proof = _healed(task, held, healing, tell)
-        if proof.proved:
+        if proof.found:
             return proof
         none.append(proof)
     return none[0]
@@ -798,8 +798,8 @@ def _healed(task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: T
     for _ in range(_GUESSES):
         more = task.area_per_mass[1] * healing * (task.normal_stress - least)
         proof = proved(replace(task, amplitude=task.amplitude + more), held, tell)
-        if not proof.proved or proof.covered_healing(task.amplitude) >= healing:
-            return replace(proof, healing=healing) if proof.proved else proof
+        if not proof.found or proof.covered_healing(task.amplitude) >= healing:
+            return replace(proof, healing=healing) if proof.found else proof
         least = Fraction(proof.claims.least_pressure) - _LOWER * task.normal_stress
     return NoProof(reason="the pressure falls too far for this healing")
 

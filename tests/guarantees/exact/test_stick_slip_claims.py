@@ -61,13 +61,13 @@ def test_the_largest_entry_of_each_facet_is_needed(proof):
     """A polytope whose facets all lie 2 % further inside is left; one facet further out is another set."""
     facets = proof.reach.facets
     smaller = replace(proof.reach, facets=tuple(tuple(v * F(102, 100) for v in row) for row in facets))
-    assert not stick_slip_guarantee(proof.task, proof.held, smaller).proved
+    assert not stick_slip_guarantee(proof.task, proof.held, smaller).found
 
 
 @pytest.mark.parametrize("name", ["rate_gain", "target_gain", "return_rate", "level_gain", "slip_gain"])
 def test_the_set_is_that_of_the_law(proof, name):
     law = replace(proof.held.law, **{name: getattr(proof.held.law, name) * F(11, 10)})
-    assert not stick_slip_guarantee(proof.task, replace(proof.held, law=law), proof.reach).proved
+    assert not stick_slip_guarantee(proof.task, replace(proof.held, law=law), proof.reach).found
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_the_set_is_that_of_the_law(proof, name):
 )
 def test_what_the_theorem_needs_of_the_fault_is_checked(proof, changed, reason):
     found = stick_slip_guarantee(replace(proof.task, **changed), proof.held, proof.reach)
-    assert not found.proved
+    assert not found.found
     assert any(part in found.reason for part in reason.split("|"))
 
 
@@ -232,7 +232,7 @@ def test_noise_of_the_slip_is_part_of_the_statement():
     assert "slip measured within 1 µm and slip rate measured exactly" in noisy.sentence()
     assert noisy.held.noise == {"slip_noise": F("1e-6")}
     more = replace(noisy.held, law=replace(noisy.held.law, rest_slip=F("2.4e-6")), slip_noise=F("1.2e-6"))
-    assert not stick_slip_guarantee(noisy.task, more, noisy.reach).proved
+    assert not stick_slip_guarantee(noisy.task, more, noisy.reach).found
 
 
 def test_the_loop_is_in_its_set_at_first_whatever_the_first_error_is(proof):
