@@ -232,7 +232,15 @@ def bounds_from(
 
 
 def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict[str, Any] | None]:
-    """Upper bound of the spectral radius of M and, if it is below 1, a bound of every output."""
+    """Upper bound of the spectral radius of M and, if it is below 1, a bound of every output.
+
+    Raises
+    ------
+    ValueError
+        For an input of the loop that no channel bounds.
+    """
+    if unbounded := {name for _, name in gains} - {channel.name for channel in channels}:
+        raise ValueError(f"every input of a loop needs a bound. Received {', '.join(sorted(unbounded))} without one.")
     loops = [
         [
             max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))

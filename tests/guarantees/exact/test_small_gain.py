@@ -8,7 +8,7 @@ import pytest
 
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, NoProof
-from quakedesign.guarantees.exact.sampled_loop import channels_of
+from quakedesign.guarantees.exact.sampled_loop import NOISELESS, channels_of
 from quakedesign.guarantees.exact.small_gain import bounds_from, spectral_radius
 from quakedesign.laws import ImplicitRoot, Power
 from quakedesign.plant import uncertain_plant
@@ -62,9 +62,20 @@ def gains(
     return {(y, name): (F(v),) for name, column in columns.items() for y, v in zip(outputs, column, strict=True)}
 
 
+def bounds(task, given, root, step, noise=NOISELESS):
+    """Bounds from the gains of those inputs that the loop has."""
+    names = {channel.name for channel in channels_of(task, root, step, noise)}
+    return bounds_from(task, {key: v for key, v in given.items() if key[1] in names}, root, step, noise)
+
+
+def test_an_input_without_a_bound_is_an_error():
+    with pytest.raises(ValueError, match="rate_noise, root, slip_noise without one"):
+        bounds_from(TASK, gains(), None, STEP)
+
+
 def test_one_channel_is_the_scalar_small_gain():
     """|a| ≤ F + m|a| + n·D, with m the ranges' halves times the gains."""
-    found, half = bounds_from(TASK, gains(), None, STEP), TASK.half_ranges
+    found, half = bounds(TASK, gains(), None, STEP), TASK.half_ranges
     m, n = (half["slip_error"] * a + half["slip_rate_error"] * b + half["push"] * c
             for a, b, c in ((F(1, 20), F(2, 5), F(2)), (F(1, 50), F(1, 12), F(1, 2))))  # fmt: skip
     a = (TASK.reference_force + TASK.amplitude + n * TASK.drift) / (1 - m)
@@ -83,7 +94,7 @@ def test_the_inputs_are_the_fixed_point_of_what_the_outputs_make_of_them(task, r
     for _ in range(1000):
         peaks = {y: sum(float(given[y, k][0]) * v for k, v in sizes.items()) for y in task.half_ranges}
         sizes = {c.name: float(c.own) + sum(float(s) * peaks[y] for y, s in c.shares.items()) for c in channels}
-    found = bounds_from(task, given, root, STEP, noise)
+    found = bounds(task, given, root, STEP, noise)
     assert isinstance(found, Bounds)
     assert float(found.slip_error) == pytest.approx(peaks["slip_error"], rel=1e-9)
     assert float(found.slip_rate_error) == pytest.approx(peaks["slip_rate_error"], rel=1e-9)
@@ -92,7 +103,7 @@ def test_the_inputs_are_the_fixed_point_of_what_the_outputs_make_of_them(task, r
 def test_noise_adds_what_its_gains_make_of_it():
     """Without anything else: 1e-6 m times the gain, and what the ranges make of that, (1 − m)⁻¹."""
     task = replace(TASK, amplitude=F(0), damping=F(0), target_slip=F(1, 10**30))
-    found = bounds_from(task, gains(drift=(0, 0, 0)), None, STEP, {"slip_noise": F(1, 10**6)})
+    found = bounds(task, gains(drift=(0, 0, 0)), None, STEP, {"slip_noise": F(1, 10**6)})
     half = task.half_ranges.values()
     m, n = (sum(h * g for h, g in zip(half, v, strict=True)) for v in ((F(1, 20), F(2, 5), F(2)), (F(1), F(7), F(40))))
     assert found.slip_error == pytest.approx(F(1, 10**6) * (1 + n / (1 - m) / 20), rel=1e-12)
@@ -109,7 +120,7 @@ def test_the_root_of_a_noisy_step_may_lie_wider_by_the_noise():
 
 def test_a_loop_through_the_implicit_step_can_fail_by_itself():
     root = ImplicitRoot(pull=PULL, slopes=(F(0), F(1)))
-    found = bounds_from(TASK, gains(root=(F("0.4"), 2, 13)), root, STEP)
+    found = bounds(TASK, gains(root=(F("0.4"), 2, 13)), root, STEP)
     assert isinstance(found, NoProof)
     assert found.small_gain >= 1
     assert found.reason.startswith("small gain")
@@ -120,7 +131,7 @@ def test_a_loop_through_the_implicit_step_can_fail_by_itself():
 def test_no_share_is_more_than_the_whole(share):
     """Of the whole an upper bound is said, of the share a lower one."""
     one = gains(acceleration=(F(share) / TASK.half_ranges["slip_error"], 0, 0), drift=(0, 0, 0))
-    found = bounds_from(TASK, one, None, STEP)
+    found = bounds(TASK, one, None, STEP)
     whole, part = (F(text.split()[-1].rstrip(",")) for text in
                    (found.reason.split(", which")[0], found.reason))  # fmt: skip
     assert F(99, 100) * whole <= part <= F(share) <= whole
@@ -129,7 +140,7 @@ def test_no_share_is_more_than_the_whole(share):
 def test_a_small_gain_of_one_proves_nothing():
     """Only the slip error's share of the acceleration, exactly 1."""
     one = gains(acceleration=(1 / TASK.half_ranges["slip_error"], 0, 0), drift=(0, 0, 0))
-    found = bounds_from(TASK, one, None, STEP)
+    found = bounds(TASK, one, None, STEP)
     assert isinstance(found, NoProof)
     assert found.small_gain == 1
 
@@ -139,7 +150,7 @@ def test_the_reason_is_the_largest_share_in_the_worst_part_of_the_period():
     parts = gains(acceleration=(0, 0, 0), drift=(0, 0, 0)) | {("push", "acceleration"): (F(1), F(2))}
     parts = {key: v if len(v) == 2 else v * 2 for key, v in parts.items()}
     parts["slip_error", "acceleration"] = (F(0), 3 / share)
-    found = bounds_from(TASK, parts, None, STEP)
+    found = bounds(TASK, parts, None, STEP)
     assert isinstance(found, NoProof)
     assert found.reason.endswith("the range of friction's slope in slip contributes 3")
     assert 3 + 2 * TASK.half_ranges["push"] <= found.small_gain <= F(1001, 1000) * (3 + 2 * TASK.half_ranges["push"])

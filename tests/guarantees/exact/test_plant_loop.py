@@ -1,0 +1,155 @@
+"""Loops of uncertain plants and bounds of their responses: the standalone checker's, and closed forms."""
+
+from dataclasses import replace
+from fractions import Fraction as F
+from math import exp
+
+import pytest
+from standalone_guarantee import CHECK
+
+from quakedesign.errors import ParameterError
+from quakedesign.exact import UpperBound
+from quakedesign.guarantees.exact.guarantee_files import guarantee_document
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, response_bounds
+from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof
+from quakedesign.plant.plant_values import ExactSector, SlowLoad
+
+checker = CHECK.beside("guarantee.plant")
+
+
+def rows(*lines):
+    return tuple(tuple(F(v) for v in line) for line in lines)
+
+
+STEP = F(2)
+PART = LinearPart(
+    A=rows([-2, 1], ["-1/2", -3]),
+    B=rows([1, 0], [0, 1]),
+    C=rows([1, 0], [1, 1], [0, 1]),
+    disturbances=((rows([1, 2])[0], F(1)), (rows([0, 1])[0], F(2)), (rows([1, 2])[0], F(3))),
+    loads=(
+        SlowLoad(control=rows([1, 0])[0], shift=rows([0, 0])[0], rate=F(1)),
+        SlowLoad(control=rows([1, 2])[0], shift=rows([0, 0])[0], rate=F(2)),
+    ),
+    sectors=(
+        ExactSector(entry=rows([1, 0])[0], row=rows([0, 1, 0, "1/8"])[0], slopes=(F(-1, 4), F(1, 2))),
+        ExactSector(entry=rows([0, 1])[0], row=rows([1, 0, 0, 0])[0], slopes=(F(-1, 8), F(1, 8))),
+    ),
+    noise=(F(1), F(0), F(2)),
+    start=(F(0), F(3)),
+    outputs=rows([1, 0], [1, -1]),
+)
+LAW = MatrixLaw(
+    step=STEP,
+    delay=F(0),
+    update=rows(["1/8", 0, 0], [0, 1, 0], ["1/16", 0, 1]),
+    measured=rows(["1/4", 0, 0], ["1/8", 0, 0], [0, 0, "1/8"]),
+    output=rows([0, "-1/8", 0], ["1/8", 0, "-1/8"]),
+    feedback=rows([0, "-1/8", 0], [0, 0, "-1/8"]),
+)
+"""Integral action from the first and the third measurement, which balances every load."""
+
+STATIC = replace(LAW, update=(), measured=(), output=((), ()))
+UNLOADED = replace(PART, loads=())
+DELAYS = [F(0), F(1, 2), F(2), F(7, 2)]
+
+
+def both(part, law, pieces):
+    """The loop of the package and, read from a file, of the checker."""
+    sizes = len(part.outputs), len(part.B[0])
+    claims = PlantClaims(**dict(zip(("outputs", "controls"), ((UpperBound(1),) * n for n in sizes), strict=True)))
+    inputs = (F(1),) * len(part.sectors)
+    file = guarantee_document(PlantProof(part=part, law=law, pieces=pieces, inputs=inputs, claims=claims))
+    plant = checker.read_plant(file["plant"])
+    return part.loop(law), checker.loop_of(plant, checker.read_law(file["law"], len(plant.C), len(plant.B[0])))
+
+
+def listed(value):
+    return [listed(v) for v in value] if isinstance(value, (list, tuple)) else value
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize(("part", "law"), [(PART, LAW), (UNLOADED, STATIC)], ids=["integral", "static"])
+def test_both_checkers_form_the_same_loop(part, law, delay):
+    package, standalone = both(part, replace(law, delay=delay), 1)
+    for ours, theirs in (("flow", "flow"), ("inputs", "inputs"), ("sampled", "told"), ("start", "start")):
+        assert listed(getattr(package, ours)) == listed(getattr(standalone, theirs)), ours
+    assert listed(package.rows) == listed(standalone.rows)
+    assert listed(package.segments) == listed(standalone.segments)
+
+
+@pytest.mark.parametrize("pieces", [1, 3])
+@pytest.mark.parametrize("delay", DELAYS)
+def test_both_checkers_have_the_same_bounds_of_the_responses(delay, pieces):
+    """The loop decays by e⁻²⁴ within the first eight periods, so that what follows them has no part in the bounds."""
+    package, standalone = both(UNLOADED, replace(STATIC, delay=delay), pieces)
+    found, other = response_bounds(package, pieces), checker.responses(standalone, pieces)
+    for ours, theirs in (("inputs", other.inputs), ("sampled", other.told)):
+        for row, line in zip(zip(*getattr(found, ours), strict=True), theirs, strict=True):
+            assert [float(v) for v in row] == pytest.approx([float(v) for v in line], rel=1e-7), ours
+    assert [float(v) for v in found.start] == pytest.approx([float(v) for v in other.start], rel=1e-7)
+
+
+LAG = LinearPart(
+    A=rows([-1]),
+    B=rows([1]),
+    C=rows([1]),
+    disturbances=((rows([1])[0], F(1)),),
+    loads=(),
+    sectors=(),
+    noise=(F(0),),
+    start=(F(3),),
+    outputs=rows([1]),
+)
+NONE = MatrixLaw(step=F(1), delay=F(0), update=(), measured=(), output=((),), feedback=rows([0]))
+
+
+@pytest.mark.parametrize("step", ["1", "0.955", "0.2"])
+def test_what_follows_the_periods_that_are_summed_is_added(step):
+    """The norm of 1/(s + 1) is 1. After eight periods of 0.955 s a share of e^−7.64 = 1/2081 is left."""
+    found = response_bounds(LAG.loop(replace(NONE, step=F(step))), 64)
+    assert 1 <= found.inputs[0][0] <= F(1002, 1000)
+    assert 3 <= found.start[0] <= F(3003, 1000)
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 5])
+def test_the_remainder_of_the_trapezoidal_rule_is_added(pieces):
+    """The response t·e⁻ᵗ of 1/(s + 1)², whose norm is 1, is concave before t = 2."""
+    double = replace(LAG, A=rows([-1, 1], [0, -1]), B=rows([0], [1]), C=rows([1, 0]), start=(F(0), F(0)),
+                     disturbances=((rows([0, 1])[0], F(1)),), outputs=rows([1, 0]))  # fmt: skip
+    found = response_bounds(double.loop(NONE), pieces)
+    below = sum(k / pieces * exp(-k / pieces) for k in range(1, 100 * pieces)) / pieces
+    assert below < 1 <= found.inputs[0][0]
+
+
+@pytest.mark.parametrize("pole", [F(0), F(1, 10)])
+def test_a_loop_that_does_not_decay_is_rejected(pole):
+    with pytest.raises(ParameterError, match="must be stable and decay fast"):
+        response_bounds(replace(LAG, A=((pole,),)).loop(NONE), 1)
+
+
+@pytest.mark.parametrize(("step", "delay", "valid"), [(1, 8, True), (1, "8.5", False), (1, -1, False), (0, 0, False),
+                                                      (-1, -1, False), (2, 16, True), ("1/2", 5, False)])  # fmt: skip
+def test_a_law_has_a_positive_step_and_a_delay_of_at_most_eight(step, delay, valid):
+    if valid:
+        assert replace(NONE, step=F(step), delay=F(delay)).delay == F(delay)
+    else:
+        with pytest.raises(ParameterError, match="positive step and a delay of 0 to 8 steps"):
+            replace(NONE, step=F(step), delay=F(delay))
+
+
+def test_a_loop_has_at_most_96_states():
+    """One of the plant, 48 of the law, one control that acts and those that wait."""
+    many = replace(NONE, update=rows(*[[0] * 94] * 94), measured=rows(*[[0]] * 94), output=rows([0] * 94))
+    assert len(LAG.loop(many).flow) == 96
+    with pytest.raises(ParameterError, match="at most 96 states. Received 97"):
+        LAG.loop(replace(many, delay=F(1, 2)))
+
+
+def test_a_load_that_the_law_cannot_balance_is_rejected():
+    """A law without integral action, and one whose integrator does not act on the loaded control."""
+    loaded = replace(UNLOADED, loads=PART.loads[1:])
+    with pytest.raises(ParameterError, match="load"):
+        loaded.loop(STATIC)
+    with pytest.raises(ParameterError, match="load"):
+        loaded.loop(replace(LAW, output=rows([0, "-1/8", 0], [0, 0, 0])))
