@@ -10,6 +10,7 @@ from quakedesign.fault.entries import FileEntry, Table, entries_of
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, TEXTS, WIDTHS, written
 from quakedesign.fault.friction import friction_law, friction_laws
 from quakedesign.fault.friction.base import FrictionLaw
+from quakedesign.fault.friction.weakening import SlipWeakening
 from quakedesign.fault.model import BOXES, Fault, Problems, Reference, UncertaintyBox
 from quakedesign.files import Json
 
@@ -35,7 +36,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
     """
     friction = friction_law(law)
     task = {key: entry for key, entry in TASK.items() if key not in friction.equilibrium.messages}
-    if needs_target := not _example(friction).rest_slip > 0:
+    if needs_target := not _comes_to_rest(_example(friction)):
         task["target_slip"] = replace(task["target_slip"], required=True)
     lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
     lines += [
@@ -74,6 +75,14 @@ def _example(friction: type[FrictionLaw]) -> Fault:
     ]
     idle = {"damping": 0.0, "reference": Reference(target_slip=1.0, operation_time=1.0), "sampling_time": 1e-3}
     return Fault(name="example", source="", friction=friction(**values[1]), **values[0] | idle)
+
+
+def _comes_to_rest(fault: Fault) -> bool:
+    """Whether the fault has a next rest slip; slip weakening is steepest where slip begins, which decides fast."""
+    if isinstance(fault.friction, SlipWeakening):
+        weakening = fault.authority * fault.effective_normal_stress * fault.friction.slip_slope
+        return weakening > fault.specific_stiffness
+    return fault.rest_slip > 0
 
 
 def _lines(entries: Mapping[str, FileEntry]) -> Iterator[str]:

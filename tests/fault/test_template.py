@@ -148,9 +148,15 @@ def test_the_examples_of_a_law_decide_whether_the_template_needs_a_target_slip(t
     header = "from dataclasses import dataclass, field\nfrom quakedesign.fault.friction.weakening import *\n"
     body = "@dataclass(frozen=True, slots=True, kw_only=True)\nclass {0}(LinearSlipWeakening):\n"
     body += '    name = "{0}"\n    critical_slip: float = field(metadata={{"unit": "m", "example": "{1}"}})\n'
-    (tmp_path / "written_laws.py").write_text(header + body.format("Short", "2 cm") + body.format("Long", "20 m"))
+    other = "@dataclass(frozen=True, slots=True, kw_only=True)\nclass Other(Weakening):\n    name = 'Other'\n"
+    other += "    domain, source = 'slip >= 0', 'none'\n    slip_slope = property(lambda self: 50 * self.drop)\n"
+    other += "    extended = lambda self, slip, rate, *state: self.coefficient(slip, rate)\n"
+    other += "    def coefficient(self, slip, rate, *state):\n"
+    other += "        import sympy as sp\n        return self.residual + self.drop * sp.exp(-50 * slip)\n"
+    text = header + body.format("Short", "2 cm") + body.format("Long", "20 m") + other
+    (tmp_path / "written_laws.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
-    for law, needed in (("Short", False), ("Long", True)):
+    for law, needed in (("Short", False), ("Long", True), ("Other", False)):
         text = template(f"written_laws:{law}")
         assert ("\n[task]" in text) is needed
         assert ("\ntarget_slip = " in text) is needed

@@ -12,11 +12,11 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Claims, SampledLoop, TrackingProof, load_guarantee, read_guarantee
-from quakedesign.guarantees.exact.plant_loop import LinearPart, ResponseBounds
-from quakedesign.guarantees.exact.plant_proof import peaks
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds
+from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof, peaks
 from quakedesign.guarantees.exact.sampled_loop import Channel, beside, through_layer
 from quakedesign.guarantees.exact.sliding_proof import _inside
-from quakedesign.laws import summed_integrals
+from quakedesign.laws import ImplicitRoot, Power, compensated, summed_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.plant import uncertain_plant
 from quakedesign.plant.plant_values import ExactSector
@@ -45,6 +45,22 @@ def test_aperiodic_sampling_accepts_a_pump_without_a_rate_limit_and_no_other():
     assert replace(LOOP, longest_step=F(2), pump=Pump(**limits)).slack == 1
     with pytest.raises(ParameterError, match="the rate limit of a pump"):
         replace(LOOP, longest_step=F(2), pump=Pump(**limits, rate=F(1)), ramp=F(1, 10))
+
+
+@pytest.mark.parametrize("missing", ["diffusion", "longest_step", "root"])
+def test_a_law_of_the_reference_has_no_guarantee_with_a_diffusion_path_aperiodic_sampling_or_a_root(missing):
+    plain = summed_integrals((F(5), F(3), F(7), F(0)), F(1))
+    law = replace(plain, of_reference=((F(1), F(0)),) * (len(plain.states) + 1))
+    assert replace(LOOP, law=law).law.of_reference
+    sign = Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip")
+    rooted = compensated(ImplicitRoot(pull=(sign,), slopes=(F(0), F(0)), remainder=F(0)), F(1, 2), F(1))
+    changed = {
+        "diffusion": {"law": law, "diffusion": F(1)},
+        "longest_step": {"law": law, "longest_step": F(2)},
+        "root": {"law": replace(rooted, of_reference=((F(1), F(0)),) * (len(rooted.states) + 1))},
+    }
+    with pytest.raises(ParameterError, match="a law that uses the slip, the slip rate or the reference itself"):
+        replace(LOOP, **changed[missing])
 
 
 def test_inputs_beside_the_disturbance_have_the_bounds_of_the_reference():
@@ -133,6 +149,8 @@ def test_the_limit_at_rest_follows_from_the_claims_at_the_valve():
         assert value <= getattr(found, name) <= value * F(1002, 1000), name
     assert (found.least, found.largest) == (-20 * 10**6, 15 * 10**6)
     aperiodic = TrackingProof(task=proof.task, held=proof.held, claims=CLAIMS).rest_limit
+    resolution = 2 * proof.held.slip_noise + rate * proof.held.step / 100
+    assert resolution <= aperiodic.resolution <= resolution * F(1002, 1000)
     fastest = 2 * proof.held.slip_noise + F(1, 500) * proof.held.longest_step
     assert fastest <= aperiodic.fastest <= fastest * F(1002, 1000)
 
@@ -193,6 +211,33 @@ def test_every_argument_stays_strictly_below_what_is_assumed_of_it(sectors, inpu
 def test_an_input_of_a_sector_without_width_has_no_effect():
     assert peaks(part(NARROW), replace(responses(1), start=(F(100), F(1), F(50)),
                  inputs=((F(7), F(1), F(7)),)), (F(5),)) == (100, 50)  # fmt: skip
+
+
+def test_a_negative_input_of_a_sector_proves_nothing():
+    """With a gain of 2 an argument of 1 − 200 would be below an input of −100."""
+    wide = replace(responses(2), inputs=((F(0), F(2), F(0), F(0)), (F(0), F(0), F(1, 2), F(0))))
+    assert peaks(part(WHOLE, WHOLE), wide, (F(-100), F(5))) is None
+
+
+def test_a_claim_may_be_as_large_as_its_bound():
+    proof = read_guarantee(PENDULUM)
+    bounds = (*proof.claims.outputs, *proof.claims.controls)
+    assert proof.supported(bounds)
+    for i, bound in enumerate(bounds):
+        assert not proof.supported((*bounds[:i], bound + F(1, 10**9), *bounds[i + 1 :]))
+
+
+def test_a_statement_about_a_plant_names_nothing_that_is_absent():
+    bare = part()
+    law = MatrixLaw(step=F(1), delay=F(0), update=(), measured=(), output=((),), feedback=((F(-1),),))
+    claims = PlantClaims(outputs=(UpperBound(2),), controls=(UpperBound(0),))
+    proof = PlantProof(part=bare, law=law, pieces=1, inputs=(), claims=claims)
+    assert proof.sentence() == (
+        "on the uncertain plant of the certificate (1 state, 1 control), from rest, with zero-order hold over 1 s, "
+        "for all t >= 0: |row 1| <= 2, |row 2| <= 0"
+    )
+    pushed = replace(bare, disturbances=(((F(1),), F(3)),))
+    assert "disturbances of at most 3, for all t" in replace(proof, part=pushed).sentence()
 
 
 PENDULUM = json.loads((FOLDER / "uncertain_plant_pendulum.json").read_text())
@@ -256,6 +301,8 @@ def test_a_statement_about_the_stick_slip_plant_names_what_it_covers():
         assert proof.bounds["slip_error"] == max(proof.claims.slip_behind, proof.claims.slip_ahead)
         assert proof.bounds["slip_rate_error"] == max(proof.claims.peak_slip_rate, proof.task.reference_rates[0])
         assert proof.valve_pressures == (proof.claims.least_pressure, proof.claims.largest_pressure)
+    wide = replace(exact, task=replace(exact.task, spreads=(F(0), F(0), F(1, 4))))
+    assert "(3.2 kPa of shear)" in wide.sentence()  # 4 kPa / 1.25, for the largest area per mass
     slow = replace(exact, claims=replace(exact.claims, peak_slip_rate=UpperBound(F(1, 10**7))))
     assert slow.bounds["slip_rate_error"] == exact.task.reference_rates[0] > F(1, 10**7)
 
@@ -266,6 +313,7 @@ def test_a_claim_with_more_healing_than_disturbance_is_undecided(healing):
     proof = load_guarantee(FOLDER / "stick_slip_real-fault.json")
     assert proof.supported(proof.claims)
     assert not replace(proof, healing=healing).supported(proof.claims)
+    assert not proof.supported(replace(proof.claims, slip_ahead=UpperBound(proof.claims.slip_ahead + F(1, 10**9))))
 
 
 def test_a_statement_about_slow_sliding_names_what_it_covers():
