@@ -466,7 +466,7 @@ BUDGETS = {
     "laws": 3105,
     "loop": 4174,
     "plant": 1447,
-    "guarantees": 13260,
+    "guarantees": 13259,
     "lyapunov": 6953,
     "linear": 2393,
     "synthesis": 1948,

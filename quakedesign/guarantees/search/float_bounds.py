@@ -33,7 +33,7 @@ _ALIKE = 0.99  # ratio of decays above which two modes are not separated
 _SOON = 1024  # periods
 _ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # positions of nominal loops in the range of a slowly varying gain
 _SPREAD = Fraction(1, 16)  # deviation of the gain from theirs, relative to its range
-_PARTS = SlowGain(parts=8, growth=Fraction(1))  # as in proofs; the input ``aged`` is neglected
+PARTS = SlowGain(parts=8, growth=Fraction(1))  # of estimates, which neglect the input ``aged``, and of proofs
 _TURNS, _LEAP = 10, 1.4  # iterations of the slip error to its fixed point, and least factor of a late one
 _FEW = 2
 
@@ -82,7 +82,7 @@ def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None
         bounds = None if values is None else values.bounds
         return _closeness(bounds, inf if bounds is None else _small(bounds))
     whole: dict[tuple[str, str], tuple[float, ...]] = {}
-    for model in (_PARTS.models(task)[0], _PARTS.models(task)[-1]):
+    for model in (PARTS.models(task)[0], PARTS.models(task)[-1]):
         gains = gains_of(held.loop(task, model))
         if gains is None:
             return inf, None
@@ -90,7 +90,7 @@ def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None
     whole |= {(y, "aged"): values for (y, name), values in whole.items() if name == "acceleration"}
     slip_error, least = 0.0, inf
     for turn in range(_TURNS):
-        spread = replace(_PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
+        spread = replace(PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
         bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
         least = min(least, _small(bounds))
         if not bounds.found or bounds.slip_error <= slip_error:

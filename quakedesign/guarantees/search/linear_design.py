@@ -33,6 +33,7 @@ from quakedesign.guarantees.exact.tracking_proof import (
 )
 from quakedesign.guarantees.search.aperiodic_search import aperiodic_guarantee, unclocked_estimate
 from quakedesign.guarantees.search.float_bounds import (
+    PARTS,
     BoundsEstimate,
     closeness,
     closeness_of_bounds,
@@ -59,7 +60,6 @@ from quakedesign.plant.of_fault import uncertain_plant
 # ----------------------------------------------------------------------
 # Guarantees with a slowly varying input gain, for friction that depends on the slip alone.
 
-_PARTS = 8
 _SHARE = 0.5  # growth α as a share of the slowest decay rate
 
 
@@ -97,9 +97,8 @@ def slow_gain(task: FaultPlant, held: SampledLoop) -> SlowGain | None:
     """
     if task.friction.rate_slope:
         return None
-    parts = SlowGain(parts=_PARTS, growth=Fraction(1))
-    decay = min(_decay(held.loop(task, model)) for model in parts.models(task))
-    return replace(parts, growth=short(_SHARE * decay, 2)) if decay > 0 else None
+    decay = min(_decay(held.loop(task, model)) for model in PARTS.models(task))
+    return replace(PARTS, growth=short(_SHARE * decay, 2)) if decay > 0 else None
 
 
 def _decay(loop: PeriodicLoop) -> float:
