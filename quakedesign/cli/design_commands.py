@@ -56,8 +56,8 @@ class DesignOptions(WellOptions):
         Measurement of the sampled e-LQR: slip-and-rate, or slip, from which it estimates the slip rate. Sliding modes
         measure both.
     disturbance_class
-        Disturbances of the guarantee. amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of
-        change is bounded by the fault's too, and it starts at 0, such as a tide.
+        Disturbances of the guarantee. amplitude: any disturbance bounded by the fault's amplitude; rate: also its
+        rate of change is bounded, by that in the fault file, and it starts at 0, as a tide does.
     scheme
         Scheme that simulates the gains designed with --continuous: continuous (default, as in the paper), or sampled
         with a zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as
@@ -251,7 +251,7 @@ def compare(
     verbose: Annotated[bool, Parameter(negative="")] = False,
     output: Output = PLAIN,
 ) -> int:
-    """Run the same work as `design` and print the comparison without writing files.
+    """Do the same as `design`, but only print the comparison; no files are written.
 
     Exit code as for `design`.
 

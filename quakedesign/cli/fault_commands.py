@@ -101,10 +101,11 @@ def scale(
     controller
         cta, dia or elqr.
     gains
-        published, or the numbers of the gains (of a sliding mode with λ = 1 and p = ν/(μ_res·N̂_min), N̂_min the least
-        of the source).
+        published, or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min
+        the smallest N̂ of the source).
     clock
-        Time scale from operation-time or natural-period; by default the one on which both faults agree.
+        Time scale from operation-time or natural-period; by default operation-time,
+        or natural-period if the ratio of the operation times differs from that of the natural periods.
     """
     from quakedesign.report.plain_text import scale_lines
     from quakedesign.studies.scaling import scale_answer
@@ -209,9 +210,9 @@ def identify(
 ) -> int:
     """Identify friction parameters, with confidence regions, from a laboratory record.
 
-    Velocity steps and slide-hold-slide tests give rate-and-state parameters; slip or a test with a stiff machine gives
-    slip-weakening parameters. The first line is the verdict: explains the record, does not, or cannot tell.
-    Exit code 0 only if the fit explains the record and every parameter is determined.
+    Velocity steps and slide-hold-slide tests give rate-and-state parameters; a measured slip, or a test on a stiff
+    machine, gives slip-weakening parameters. The first line is the verdict: explains the record, does not, or cannot
+    tell. Exit code 0 only if the fit explains the record and every parameter is determined.
 
     Parameters
     ----------

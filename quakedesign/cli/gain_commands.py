@@ -54,12 +54,12 @@ def synthesise(
         Objective sampled: preset or path of a .toml file.
     objective
         norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay, as the
-        inverse of the settling time from initial errors of at most the bound on |h'|. beta: widest certified range of
-        the control coefficient. sampled: smallest simulated error of proved gains on a fault.
+        inverse of the settling time from initial errors |e_i| of at most the number given as the bound on |h'|. beta:
+        widest certified range of the input gain β. sampled: smallest simulated error of proved gains on a fault.
     lipschitz
         Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the largest |h'| of the fault.
     gain_range
-        b_m and b_M, the range of the control coefficient β; 1 1 by default, for sampled that of the fault. For beta
+        b_m and b_M, the range of the input gain β; 1 1 by default, for sampled that of the fault. For beta
         the certified range contains this range and has the same geometric mean.
     bound
         Objectives decay and beta: largest norm of the gains; by default the smallest norm of gains from the literature.
@@ -219,7 +219,7 @@ def gain_map(
     lipschitz
         One or more bounds on |h'|; by default 25, 50, 75, 90 and 99 % of the bound that no proof can exceed.
     gain_range
-        b_m and b_M, the range of the control coefficient β.
+        b_m and b_M, the range of the input gain β.
     points
         Grid points along each axis.
     degree

@@ -225,10 +225,11 @@ def limits(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Give performance limits of every controller on a fault, with the proved bounds of a designed controller.
+    """Give performance limits that no controller can beat on a fault, with the proved bounds of a designed controller.
 
     The limits are the smallest slip-rate error (plant without stick) and slip rate (stick-slip plant), the longest T_s,
-    delay and diffusion time, the farthest well and the smallest withdrawal, for any disturbance of the given amplitude.
+    delay and diffusion time, the largest distance of a well and the smallest withdrawal, for any disturbance of the
+    given amplitude.
 
     Parameters
     ----------

@@ -237,8 +237,8 @@ class LawOptions:
         cta, dia or elqr, or your own law as module:Class; none (not for export): a run without control.
     gains
         published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
-        time), or the numbers of the gains (of a sliding mode with λ = 1 and p = ν/(μ_res·N̂_min), N̂_min the least of
-        the box). Rate-and-state faults: designed.
+        time), or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min the
+        smallest N̂ of the box). Rate-and-state faults: designed.
     scale
         λ of a sliding mode instead of that of the gains, decimal or p/q.
     feedforward
@@ -524,8 +524,8 @@ class EstimateOptions:
     differentiator_bound
         λ_d in m/s^(n_d + 1): the law uses estimates of a differentiator.
     differentiator_order
-        n_d, the number of derivatives; for 2, as printed in the paper, no λ_d satisfies the premise on λ_d with a
-        zero-order hold.
+        n_d, the number of derivatives; for 2, as printed in the paper, no λ_d satisfies the premise `differentiator`
+        with a zero-order hold.
     filter_order
         n_f, the filter order.
     differentiator_steps
@@ -637,12 +637,12 @@ class StateOptions:
         '5 MPa'; or pressures at times, linear in between, with a step at a repeated time: '0 s: 0 MPa, 1 day: 0 MPa,
         1 day: 5 MPa'; or FILE.csv with columns 'time [s]' and 'pressure [Pa]' in any units.
     start
-        Initial state: steady (sliding; default), locked (far end at rest for --hold) or late (in the seismic cycle, see
-        --share).
+        Initial state: steady (sliding; default), locked (far end of the spring at rest for --hold) or late (in the
+        seismic cycle, see --share).
     hold
         Time before the run in which the far end is at rest, such as '100 year'.
     share
-        Fraction of the recurrence interval before the run; 0.9 by default.
+        Fraction of the recurrence interval that has passed when the run starts; 0.9 by default.
     stress
         With --controller elqr: amplitude of a sinusoidal shear stress, such as '20 kPa'.
     stress_period

@@ -32,7 +32,7 @@ def certify(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Prove or refute given gains: of a sliding mode for a bound on |h'|, of the e-LQR on a fault.
+    """Prove or refute stability with given gains: of a sliding mode under a bound on |h'|, or of the e-LQR on a fault.
 
     Exit code 0 only if proved, including requested peaks.
 
@@ -50,7 +50,7 @@ def certify(
         Sliding mode: lipschitz (largest bound on |h'|; with --lipschitz also the smallest scale for it), beta (upper
         end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound of the settling time).
     gain_range
-        Sliding mode: b_m and b_M, the range of the control coefficient β; 1 1 by default. Give one
+        Sliding mode: b_m and b_M, the range of the input gain β; 1 1 by default. Give one
         value b twice to maximise the range.
     box
         e-LQR: uncertainty box, paper or ten-percent.

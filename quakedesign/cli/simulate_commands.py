@@ -230,7 +230,7 @@ def sampling(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Show effects of sampling: every scheme with the published controllers, orders of accuracy, sensitivities.
+    """Show effects of sampling on a law: every scheme, orders of accuracy, sensitivities; with the published laws.
 
     Runs are on the plant without stick. Errors are evaluated after the first quarter of each run. Runs with noise last
     a sixteenth of the task. Writes results.json and figures.
@@ -240,8 +240,8 @@ def sampling(
     controller
         cta, dia or elqr.
     gains
-        designed (in continuous time), published, or the numbers of the gains (of a sliding mode with λ = 1 and
-        p = ν/(μ_res·N̂_min), N̂_min the least of the box).
+        designed (in continuous time), published, or the numbers of the gains (of a sliding mode: with scale λ = 1
+        and control ν = p·μ_res·N̂_min, N̂_min the smallest N̂ of the box).
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes

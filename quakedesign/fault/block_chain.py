@@ -134,7 +134,7 @@ class BlockChain:
 
     @cached_property
     def flow(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Rows of q' [1/s] over the pressures q of blocks without a well in the middle, then over the well pressures.
+        """Coefficients of q' [1/s]: first of the pressures q of blocks without a well in the middle, then of the wells.
 
         Empty without a diffusivity.
         """

@@ -156,7 +156,7 @@ class Problems:
             self.errors += error.parts or (error,)
 
     def refuse(self, where: str = "") -> None:
-        """Raise the collected errors, if any, as one exception that numbers several; `where` begins its message."""
+        """Raise the collected errors, if any, as one exception, whose message starts with `where` and numbers them."""
         if not self.errors:
             return
         kinds = {type(error) for error in self.errors}
@@ -169,7 +169,7 @@ class Problems:
         raise error from None
 
     def resolved(self, value: _Value | None, where: str = "") -> _Value:
-        """Raise the collected errors, see `refuse`, or return the value, which is None only if there are errors."""
+        """Raise the collected errors, see `refuse`, or return the value; it may be None only if there are errors."""
         self.refuse(where)
         assert value is not None
         return value
@@ -268,7 +268,7 @@ class Reference:
         t_op [s], positive.
     ramp : float, optional
         Rate-and-state friction: fraction of the slip that follows a smooth ramp, above 0 and below 1. The rest is
-        released at a constant rate. None: a constant rate for all of it.
+        released at a constant rate. Omitted: a constant rate for all of it.
     """
 
     target_slip: float = field(metadata=quantity("m", "5 cm", "the next rest slip", symbol="d_{max}"))
@@ -295,7 +295,7 @@ class Reference:
         Raises
         ------
         ParameterError
-            For a stage without powers, or whose powers overflow.
+            For a value of `stage` that cannot be raised to a power, or whose powers overflow.
         """
         if isinstance(stage, type) or not hasattr(stage, "__pow__"):
             raise ParameterError(
@@ -491,7 +491,7 @@ class Fault:
     length : float
         L_ac, length of the activated fault [m].
     width : float, optional
-        Second side of the patch [m]; None for a square patch, as in the paper.
+        Second side of the patch [m]; omitted for a square patch, as in the paper.
     damping : float
         η [kg/s], not negative.
     effective_normal_stress : float

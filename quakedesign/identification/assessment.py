@@ -74,7 +74,7 @@ class Assessment:
 def checks_of(
     fit: Fit, raw: Record, record: Record, used: ndarray, loading: Loading | None, values: Mapping[str, float]
 ) -> tuple[tuple[Check, ...], float]:
-    """Tests of beginning, residuals, peaks and halves of the `used` means of a record; and residuals over noise."""
+    """Tests of beginning, residuals, peaks and halves, on the means `used` by the fit; and residuals over noise."""
     time = record.time[used]
     begins = np.empty(0) if loading is None else loading.steps
     first = float(begins[0]) if len(begins) else float("inf")
@@ -131,7 +131,8 @@ def sign_check(
 def unsteady_beginning(difference: Any, values: Mapping[str, float], loading: Loading) -> str:
     """Reason why a fitted beginning off steady sliding hides the sign of a - b; empty if it does not.
 
-    It hides the sign, like a drift, if it changes friction by more than the change of rate and does not decay before.
+    It hides the sign, like a drift, if its effect on friction exceeds that of the rate step and has not decayed by
+    then.
     """
     step, slip = loading.first_step, values.get("critical_slip", 0.0)
     moved = abs(values.get("evolution_effect", 0.0) * values.get(START_STATE, 0.0))

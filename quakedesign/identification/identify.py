@@ -248,7 +248,7 @@ def identify(
         A record, or the path of its file, see `read_record`.
     law : str, optional
         Name of a friction law with state, or of one that depends on slip. By default the ageing and the slip law are
-        both fitted, and the one with smaller residuals is selected.
+        both fitted, and the likelier one is selected.
     stiffness : float, optional
         Exact machine stiffness [Pa/m; N/m for a record of forces, 1/m for one of friction alone]; fitted unless given.
     normal_stress : float, optional
@@ -258,7 +258,7 @@ def identify(
     states : int
         1, or 2 for a second evolution effect with its own critical slip; a fault file cannot state two.
     trend : str
-        ``"displacement"``, ``"time"`` or ``"none"``; chosen by likelihood by default.
+        ``"displacement"``, ``"time"`` or ``"none"``; by default one is fitted if an F test (level 1 %) requires it.
     seed : int
         Seed of the random starting points.
 
@@ -545,7 +545,7 @@ def profiled(
 
 
 def needed(best: Fit, squares: float, fewer: int = 1) -> bool:
-    """Whether a fit is significantly better (level 1 %) than one with `fewer` parameters less.
+    """Whether a fit is significantly better (level 1 %) than one that lacks `fewer` of its parameters.
 
     `squares` is the latter's sum of squares. Fisher's F test; an improvement below machine resolution does not count.
     """

@@ -40,7 +40,7 @@ _PLACES |= {"reference": (None, 0), "reference_rate": (None, 1)}
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SampledLaw(SampledController):
-    """A user-defined sampled linear law: p = Cz + Dy and z⁺ = Az + By once every T_s, z = 0 initially, all exact.
+    """A user-defined sampled linear law: p = Cz + Dy and z⁺ = Az + By every T_s, matrices rational, z = 0 initially.
 
     Built by `from_statespace`, `from_gains`, `from_pid` or `load`; accepted by `guarantee`, `simulate`,
     `loop_transfer`, `compare`, `campaign_problem` and `export_controller`.

@@ -18,7 +18,8 @@ of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the
 
 With one well, identical blocks and symmetric springs, the springs drop out of the mean force. This is the force on one
 block whose coefficient is the mean of μ at x*. N then lies in the range of one block whose friction weakens and
-strengthens 1 + X times as fast. If X > 1, blocks may move backward, where weakening strengthens, X − 1 times as fast.
+strengthens 1 + X times as fast. If X > 1, blocks may move backward, at up to X − 1 times
+the rate of the reference; weakening friction then increases again.
 
 If no such F is found, nothing is proved: the bound of the sectors is then set to 1e-30.
 """

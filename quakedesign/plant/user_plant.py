@@ -88,7 +88,7 @@ class UncertainPlant:
         What is measured; all states unless given.
     sectors : mapping of str to Sector
     gains : mapping of str to (number, number)
-        Range of the gain on a control minus its loads, by its name; it may vary between them at any rate.
+        Range of the gain on a control minus its loads, by the control's name; it may vary within it at any rate.
     disturbances : mapping of str to (sequence, number)
         How it enters x′, and its largest size.
     loads : mapping of str to (sequence, sequence or None, number)
@@ -203,7 +203,7 @@ class UncertainPlant:
     def from_blocks(
         cls, fault: Fault | BlockChain, blocks: int | None = None, *, wells: str = "each", coupling: Any = None
     ) -> Self:
-        """Plant of the strips of a fault, coupled by springs, each with its own friction of the box and disturbance.
+        """Plant of the blocks of a fault, coupled by springs, each with its own friction of the box and disturbance.
 
         States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa].
         With an independent well for each block, errors are relative to the reference, and all are measured. With

@@ -69,8 +69,8 @@ def simulate(
     ----------
     fault : Fault
     controller : Controller, optional
-        None: no fluid is injected. A fault with a friction state is then loaded at its operating rate from near steady
-        sliding, and only `duration`, `samples`, `method` and `plant` apply; for others see `simulate_state`.
+        None: no fluid is injected. A fault with a friction state is then loaded at its `operating_rate` from near
+        steady sliding, and only `duration`, `samples`, `method` and `plant` apply; for others see `simulate_state`.
     step : float, optional
         Length of one step [s]; by default T_s of a sampled law, else of the fault.
     scheme : str or Scheme, optional

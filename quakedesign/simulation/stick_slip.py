@@ -423,8 +423,8 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
 def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
     """A run at a loading rate [m/s] from near steady sliding, until events repeat.
 
-    Without repeated events the run ends at a load of at most 1000 aσ', that of a stable fault at 10 aσ'. `settings` as
-    in `locked`.
+    Without repeated events the run ends at a load of at most 1000 aσ'; the run of a stable fault ends at 10 aσ'.
+    `settings` as in `locked`.
     """
     unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)
     loads, most = _FIRST_LOADS, _MOST_LOADS if derive(fault).unstable else _FIRST_LOADS

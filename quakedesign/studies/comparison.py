@@ -73,7 +73,7 @@ class Entry:
     zero_order_hold : HeldLoop or None
         For a linear law: stability with zero-order hold over T_s, see `Design.held_loop`.
     peaks : mapping of str to ContinuousProof
-        For a designed linear law that is proved: peaks in continuous time by class; no class without any.
+        For a designed linear law that is proved: peaks in continuous time by class; empty if there are none.
     given : bool
         Whether the law is given, not designed.
     guarantee : Guarantee or None
@@ -105,7 +105,7 @@ class Entry:
         return proof if proof is not None and proof.found else None
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None for what a report adds."""
+        """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None if a report fills it."""
         design = self.design
         return {
             "guarantee": self.guarantee.to_dict() | {"certificate": None} if self.guarantee else None,
@@ -171,8 +171,8 @@ def compared(
 ) -> Compared:
     """Runs of all controllers of a fault, as `quakedesign.report.compare` shows them; schemes by origin.
 
-    The flag of a design is True for a verdict on a given law. Runs go on in the background while further designs are
-    made, if these come from a generator.
+    `designs` are pairs of a design and a flag, True if the law was given, not designed. Runs go on in the background
+    while further designs are made, if these come from a generator.
     """
     require_fault(fault)
     fault.friction.require(plant=plant)

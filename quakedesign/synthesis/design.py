@@ -60,7 +60,7 @@ class Design:
     premises : tuple of Premise
         Premises of the guarantee of a sampled law (those named in `REACH`), and of the certificate.
     domain : Domain or None
-        Certified domain of the self-consistent premise on |h'|.
+        Certified set of initial errors for which the premise on |h'| holds along every trajectory.
     details : mapping
         Results of the synthesis; exact numbers as texts.
     setup : LoopSetup
@@ -235,7 +235,8 @@ def design(
 
     With `continuous`: the paper's designs, without a sampled guarantee. 2-CTA, 2-DIA: λ grows until the proved bound on
     |h'| is 1.1 times what reference and disturbance require; also without `continuous` if no T_s is proved. e-LQR:
-    Riccati equation with the sound bound on the uncertainty, then an exact proof about any constant reference.
+    Riccati equation with the corrected bound on the uncertainty (errata, rows 7 and 10), then an exact proof about any
+    constant reference.
 
     Rate-and-state friction: an e-LQR of the slip alone controls slow sliding along the task, through the diffusion path
     (`Design.sliding`); sliding modes do not apply.

@@ -113,7 +113,7 @@ class SlidingPush:
 # slip-rate error and the largest withdrawal.
 #
 # **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
-# without stick (linear continuation) no controller keeps the slip error within E and the slip-rate error below X for
+# without stick no controller keeps the slip error within E and the slip-rate error below X for
 # all t if
 #
 #     X ≤ 2H·h(T + θ + τ),   h: impulse response of h″ = σh − wh′ from acceleration to slip,

@@ -176,7 +176,7 @@ class StickSlipProof(Proof[StickSlipClaims]):
             over = f"sampling intervals from {over} to {LowerBound(held.longest_step):.6g} s in any order"
         return (
             f"from rest, with zero-order hold over {over} and {self._measured()}, "
-            f"for every disturbance of at most {size}, for all friction and constant parameters of the box: "
+            f"for every disturbance of at most {size}, for every friction law and all constant parameters of the box: "
             f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, whether the fault slides or sticks, "
             f"the slip stays between {behind} behind and {ahead} ahead of the reference, the pressure between "
             f"{pressures}, for all t >= 0"

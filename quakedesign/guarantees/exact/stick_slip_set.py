@@ -12,38 +12,38 @@ checked.
 **Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion
 is one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the
 block before the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0
-and ξ ≥ 0 at its end, or the *rest* map with a slip D until the last stop.
+and ξ ≥ 0 at its end, or the *rest* map with a slip δ until the last stop.
 
 **Sliding map.** With S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
 linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
 bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
-**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, integration by parts gives D = f(0)y + ∫f·(G + φ)dt up to the
-stop. Before it G ≤ −H + |S⁻|(D − ξ), and the difference of both decreases with the slip. So
+**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, integration by parts gives δ = f(0)y + ∫f·(G + φ)dt up to the
+stop. Before it G ≤ −H + |S⁻|(δ − ξ), and the difference of both decreases with the slip. So
 
-    D·(1 − |S⁻|T²/2 − δ) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
+    δ·(1 − |S⁻|T²/2 − ε) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
 
-for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and δ the width of its range times (e^{wx} − 1)/w. Moreover,
-G(D) ≤ −H gives the condition of rest, b·β_max·U ≥ H − |S⁻|D.
+for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and ε the width of its range times (e^{wx} − 1)/w. Moreover,
+G(δ) ≤ −H gives the condition of rest, b·β_max·U ≥ H − |S⁻|δ.
 
-The possible D and U depend on r′ at the sample. This condition uses the U of the least r′, so that the ends of r′
+The possible δ and U depend on r′ at the sample. This condition uses the U of the least r′, so that the ends of r′
 suffice.
 
-**Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. Where a facet falls with this
-difference and r′ counts as 0, the difference may be 0 for r′ up to max|r″|T/2.
+**Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. Where a facet function decreases
+with this difference and is evaluated at r′ = 0, the difference may be 0 for r′ up to max|r″|T/2.
 
-**Input gain.** For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0 replace a factor m1 of ξ by its
-chord. m1 is at most |n3·s|ψ/b larger, which adds |n3·s|ψ/b times ξ ≥ 0. Products of the chord with β lie below their
-chords by as much as the bβU in that ξ takes off. Where U < 0 replace m1 by the chord of β·m1, over β: all terms with U
-are convex in β. So |n3·s|ψ/b counts with y and H alone.
+**Input gain.** For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ + (|n3·s|ψ/b)·ξ,
+with M the chord of m1 and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1 the chord of β·m1
+may stand for β·M if the term −bβU·X1 of the last ξ is omitted; the same holds for J. Where U < 0 replace m1 by the
+chord of β·m1, over β: all terms with U are convex in β. So |n3·s|ψ/b counts with y and H alone.
 
 **Sliding mode.** The target rate is r′ + w, w the solution of the implicit step. That step is shown to be deadbeat, w =
 −e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
 1/T, whose states stay in the polytope.
 
 **Law.** `StickSlipLaw`; d = D_level + p*(x1) also changes by −σξ [Pa], σ = S_chord/(bβ). State at the samples: z = (e1,
-y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet exceeds 1 after either map. Each is the maximum of a
-linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
+y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet function exceeds 1 after either map. Its largest value
+is that of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
 
 **Noise.** The measured slip is x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is measured exactly, including whether it
 is 0. Let e1 be the slip minus the reference plus N, and let d exclude m·n of its own sample, m and c the slip and
@@ -57,8 +57,9 @@ facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|
 response to an impulse, and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. m ≥ 0 is
 required up to T_m, so that V is one function for all h, not only for the state's own h. g is Lipschitz, so V″ ≥ −B
 almost everywhere, and V is below its chord over Δ plus Δ²B/8: bounds at five intervals suffice, with B from |l″|,
-|g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so both ends suffice. A period that ends at rest is
-one of T_m in whose last part nothing releases the block: the slip until a stop has the bound of T_m.
+|g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so both ends suffice. A shorter
+period that ends at rest can be extended to T_m, as nothing releases the block in the added time; so the bound of T_m on
+the slip until a stop covers it.
 
 **Peaks.** Between samples y stays below the larger of its values at both ends, the latter under the largest force, as
 y″ = −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
@@ -127,8 +128,8 @@ class StickSlipPolytope:
         For each of the 3 slices its vertices, each by the indices of three constraints: facets, then y ≥ 0, then the
         ends of the slice.
     resting : tuple of tuple of Basis
-        For each of the 7 combinations its vertices in (e1, y, d, D), each by four constraints: the same, then D ≥ 0,
-        the condition of rest, then bounds of D.
+        For each of the 7 combinations its vertices in (e1, y, d, δ), each by four constraints: the same, then δ ≥ 0,
+        the condition of rest, then bounds of δ.
 
     Raises
     ------
@@ -436,7 +437,7 @@ def ranges(task: FaultPlant, ahead: Fraction, push: Range, moved: Fraction) -> R
 
 
 def stop_bounds(task: FaultPlant, held: SampledStickSlip, plant: Ranges) -> tuple[tuple[Fraction, Fraction], ...]:
-    """Pairs (g, h) with D ≤ g·y + h for the slip D [m] until a last stop within a period.
+    """Pairs (g, h) with δ ≤ g·y + h for the slip δ [m] until a last stop within a period.
 
     Upper bounds of the exponentials: (1 − e^{−wm})/w ≤ m − wm²/2 + w²m³/6, (e^{wx} − 1 − wx)/w² ≤ x²/2/(1 − wx/3) and
     (e^{wx} − 1)/w ≤ x/(1 − wx/2).
@@ -761,7 +762,7 @@ def slices(task: FaultPlant, held: SampledStickSlip) -> tuple[tuple[Constraint, 
 def polytopes(
     task: FaultPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], plant: Ranges | None
 ) -> list[list[Constraint]]:
-    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, D) if ranges exist.
+    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, δ) if ranges exist.
 
     The condition of rest depends on r′. The condition at the least r′ holds wherever that at another r′ does, so that
     on its polytope the ends of r′ suffice.
@@ -837,7 +838,7 @@ class Verifier:
         """Upper bounds of c·z + k, or of 1 + (c − n)·z + k where `which` names facets.
 
         The second bound decides where a period changes nothing, as at rest: there c − n has the sign opposite to that
-        of e1, y and D; D is at most g·y by the last constraint, and e1 at most the end of its slice.
+        of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of its slice.
         """
         factors, off = _middles(factors)
         constants, above = _middles(constants)
@@ -858,7 +859,7 @@ class Verifier:
         return np.asarray(largest + constants)
 
     def _rest(self, left: np.ndarray, off: np.ndarray) -> np.ndarray:
-        """Bound of the remainder of the multipliers, within `off`, by the signs of e1, y and D."""
+        """Bound of the remainder of the multipliers, within `off`, by the signs of e1, y and δ."""
         left = left * np.array([self.sign, 1, 1, 1][: left.shape[1]])
         left[:, 2] = abs(left[:, 2])
         return np.asarray((np.maximum(left + off, 0) * self.sizes).sum(axis=1))

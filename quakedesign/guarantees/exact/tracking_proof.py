@@ -343,7 +343,8 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
     largest = claims.largest_step
     step = "" if largest is None else f", commanded changes of at most {largest.quantity('Pa')} a sample"
     return (
-        f"on the plant without stick, {start}, {when}, {kind}, for all friction and constant parameters of the box: "
+        f"on the plant without stick, {start}, {when}, {kind}, "
+        f"for every friction law and all constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, the slip stays within "
         f"{claims.slip_error.quantity('m')} of the reference, the pressure {', at the valve '.join(pressures)}{step}"
     )

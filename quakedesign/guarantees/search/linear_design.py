@@ -637,7 +637,7 @@ def nearest_setup(
     pressed: bool = False,
     setup: ExactSetup = PLAIN,
 ) -> tuple[str, TrackingProof] | None:
-    """A quantity of the setup that fails, and a guarantee with nearly its largest value.
+    """The quantity of the setup that prevents a guarantee, and a guarantee for nearly its largest possible value.
 
     With `pressed` the pressure fails: it exceeds a pump limit or opens the fault. Then the quantity is the smallest
     sufficient pump of a design without pump limits, or else the largest disturbance. Otherwise it is the first quantity

@@ -89,12 +89,13 @@ def worst_tracking(claim: TrackingProof | ContinuousProof, *, sticks: bool = Fal
     The search makes forward and backward sweeps of the maximum principle, six steps per flow, from random costates. A
     trajectory lasts 64 to 512 periods, depending on the decay of the loop. It maximises the error at the end of the
     last period, or at a time between its samples, where the error is larger with a delay. In continuous time a period
-    is 1/|λ| of the fastest pole. A rate-limited disturbance is optimal for a costate (`_steepest`). With `sticks`
-    friction prevents backward slip, and the reference has its largest rate or 1/20 of it. Further trajectories then
-    switch after random times, or rest until the reference has made up the proved slip error, then accelerate
-    (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact solution, also
-    outside its sector. With jitter each event is earliest or latest; with aperiodic sampling each interval is shortest
-    or longest. Pressures step at once, and an averaged measurement is that at the midpoint of its interval.
+    is 1/|λ| of the fastest pole. In the class `rate` the disturbance is the optimal one for a costate (`_steepest`).
+    With `sticks` friction prevents backward slip, and the reference has its largest rate or 1/20 of it. Further
+    trajectories then switch after random times, or rest until the reference has made up the proved slip error, then
+    accelerate (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact
+    solution, also outside its sector. With jitter each event is earliest or latest; with aperiodic sampling each
+    interval is shortest or longest. Pressures step at once, and an averaged measurement is that at the midpoint of its
+    interval.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)

@@ -134,7 +134,7 @@ def certified_domain(problem: DomainProblem) -> Domain:
     low_beta, high_beta = coefficient_range(problem.fault, problem.controller.divisor)
     certified = problem.certificate.loop.uncertain["beta"]
     if low_beta < certified[0] or high_beta > certified[1]:
-        return _domain(problem, Fraction(0), "", "the control coefficient β, which leaves its certified range")
+        return _domain(problem, Fraction(0), "", "the input gain β, which leaves its certified range")
 
     def whole(step: int) -> bool:
         return problem.holds_whole(_level(step, problem.sets.degree))

@@ -85,7 +85,7 @@ def test_four_digits_are_not_below(value, rounded):
 @pytest.mark.parametrize(
     ("amplitude", "change", "said"),
     [
-        (F("0.00032"), None, "for every disturbance of at most 0.00032 m/s^2 (4 kPa of shear), for all"),
+        (F("0.00032"), None, "for every disturbance of at most 0.00032 m/s^2 (4 kPa of shear), for every"),
         (
             F("0.00032"),
             F("0.0002208"),
@@ -96,8 +96,8 @@ def test_four_digits_are_not_below(value, rounded):
             F(2, 3),
             "at most 0.333 m/s^2 (4.16 MPa of shear) that starts at 0 and changes by at most 0.666 m/s^3 (class rate)",
         ),
-        (F(0), None, "with zero-order hold over 1 s, without disturbance, for all friction"),
-        (F(0), F(0), "with zero-order hold over 1 s, without disturbance, for all friction"),
+        (F(0), None, "with zero-order hold over 1 s, without disturbance, for every friction law"),
+        (F(0), F(0), "with zero-order hold over 1 s, without disturbance, for every friction law"),
     ],
 )
 def test_a_sentence_says_which_disturbances_and_none_that_are_larger(amplitude, change, said):
@@ -108,7 +108,7 @@ def test_a_sentence_says_which_disturbances_and_none_that_are_larger(amplitude, 
 
 def test_parameters_are_said_to_be_constant_for_a_spring_that_stiffens_at_once_pulls_more_than_any_disturbance():
     """At the end of the task, by a tenth: 0.1·k̂·785 mm, k̂ = 0.48/s², which no sampled law can know of for a period."""
-    assert "for all friction and constant parameters of the box" in sentence_of(
+    assert "for every friction law and all constant parameters of the box" in sentence_of(
         TASK, CLAIMS, "with zero-order hold over 1 s"
     )
     assert TASK.stiffness[0] * TASK.target_slip / 10 == F("0.03768") > 100 * TASK.amplitude
