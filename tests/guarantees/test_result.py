@@ -9,7 +9,7 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import CertificateError
 from quakedesign.exact import LowerBound, UpperBound
-from quakedesign.guarantees import NoProof, PlantGuarantee, TrackingProof
+from quakedesign.guarantees import NoProof, PlantGuarantee, TrackingProof, tracking_result
 from quakedesign.guarantees.exact.plant_proof import PlantProof
 from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.guarantees.sliding_result import SlidingGuarantee
@@ -29,10 +29,11 @@ def stored(kind):
     return next(claim for claim in claims if kind != "stick_slip" or not claim.held.law.pull)
 
 
-def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si():
+def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si(monkeypatch):
     sticking, slow = stored("stick_slip"), stored("slow_sliding")
-    printed = qd.guarantee(FAULT, law=qd.SampledLaw.from_pid(3e8, 1e8, 2e8, N=40, step="50 ms"))
+    printed = qd.guarantee(FAULT, law=qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184"))
     seen = WorstCase(slip_error=3e-6, slip_behind=1e-6, slip_ahead=3e-6, peak_slip_rate=2e-6)
+    monkeypatch.setattr(tracking_result, "worst_tracking", lambda *_, **__: replace(seen, slip_rate_error=1e-6))
     stick_slip = StickSlipGuarantee(fault=FAULT, proof=sticking, worst=seen)
     sliding = SlidingGuarantee(proof=slow, task=slow.task, held=slow.held)
     common = {"slip_error", "peak_slip_rate", "least_pressure", "largest_pressure"}

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from thinned import few
 
 from quakedesign.errors import ParameterError, RecordError
 from quakedesign.fault import fault_toml, load_fault, parse_fault, with_accepted_fit
@@ -85,7 +86,7 @@ def test_a_sign_that_a_trend_turns_is_not_told():
     assert not found.explained
 
 
-@pytest.mark.parametrize("second", [(-0.004, 2e-4), (0.004, 4e-4)])
+@few("second", [(-0.004, 2e-4), (0.004, 4e-4)], every=2)
 def test_slow_evolution_that_looks_like_a_trend_leaves_the_sign_open(second):
     """a - b - b_2 has the other sign than a - b: evolution follows the step, and the beginning has none."""
     plain = ((60.0, 1e-6), (40.0, 1e-5))
@@ -270,7 +271,7 @@ def test_a_trend_is_told_with_the_unit_of_what_it_is_along():
     assert said.endswith("at 1e-06 m/s, on a trend of 5 1/m, on a trend of 3e-06 1/s")
 
 
-@pytest.mark.parametrize("seed", [1, 4])
+@few("seed", [1, 4], every=2)
 def test_a_sign_that_the_other_law_does_not_have_is_open(seed):
     """A short step on a strong trend, which each law explains, with another sign of a - b; the truth is +0.0005."""
     made = synthetic.sliding(

@@ -88,7 +88,7 @@ def test_the_library_writes_the_same_bytes(path):
         assert certificate_text(load_certificate(path)) == text
 
 
-@pytest.mark.parametrize("name", STATEMENTS)
+@few("name", STATEMENTS, every=3)
 def test_a_name_says_law_and_gains(name):
     certificate = load_certificate(ROOT / "certificates" / f"{name}.json")
     wanted, *gains = name.split("_")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from flint import ctx
 from stick_slip_box import STICK, box, period_of
+from thinned import few
 
 from quakedesign.guarantees import read_guarantee
 from quakedesign.guarantees.exact import stick_slip_set as package
@@ -117,7 +118,7 @@ def values(functions, points):
 SLACK = 2e-4  # of the integration, in units of a facet
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@few("seed", [1, 2], every=2)
 @pytest.mark.parametrize("facet", range(11))
 @NOISY
 def test_no_plant_that_slides_is_beyond_its_bound(facet, seed, noisy):
@@ -162,7 +163,8 @@ def test_no_plant_that_ends_at_rest_is_beyond_its_bound(facet, noisy):
         assert (rows @ points - limits[:, None])[-7:, mine].max() <= SLACK  # condition of rest, slip until the stop
 
 
-def test_bounds_at_the_intervals_that_decide_hold_for_all_between():
+@pytest.mark.parametrize("apart", [4, pytest.param(2, marks=pytest.mark.slow)])
+def test_bounds_at_the_intervals_that_decide_hold_for_all_between(apart):
     """Beside a grid of intervals, where the bounds of some facets are larger than at the intervals that decide."""
     p, (before, place, *_) = period("aperiodic"), courses(1, "aperiodic")
     plain, larger = copy(p), set()
@@ -175,7 +177,7 @@ def test_bounds_at_the_intervals_that_decide_hold_for_all_between():
                 return values([f for slot, f in functions if slot == one], mine)
 
             decided, alone = (bound(slides(each, row, given, cut=False)) for each in (p, plain))
-            for share in range(1, 24, 2):
+            for share in range(1, 24, apart):
                 plain.respond(p.law.step + Fraction(share, 24) * (p.law.longest - p.law.step))
                 found = bound(plain.sliding(row, given, cut=False))
                 assert (found - decided).max() <= 1e-9
@@ -281,7 +283,7 @@ def test_bounds_of_a_slide_are_those_that_are_written(facet, noisy):
 
 
 @pytest.mark.parametrize("cut", [False, True])
-@pytest.mark.parametrize("facet", range(11))
+@few("facet", range(11), every=2)
 @NOISY
 def test_both_checkers_bound_a_slide_alike(facet, cut, noisy):
     """The same functions on every slice: two programs, written apart, with the numbers of one format."""

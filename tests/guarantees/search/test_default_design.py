@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from thinned import few
 
 import quakedesign as qd
 from quakedesign.cli.design_commands import positive
@@ -179,7 +180,7 @@ def searched(longest, first, most=None):
     return asked, found[-1].held.step if found else None
 
 
-@pytest.mark.parametrize("first", [pytest.param("1/10", marks=pytest.mark.slow), "1", "40"])
+@few("first", ["40", "1", "1/10"], every=3)
 def test_the_longest_time_is_found_within_a_sixteenth(first):
     asked, found = searched(F(3), F(first))
     assert F(15, 16) * 3 <= found <= 3
