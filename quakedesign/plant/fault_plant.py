@@ -13,7 +13,7 @@ every friction μ(x) with the given bounds and slopes. As k̂, N̂ and φ1 are c
 from collections.abc import Iterable
 from dataclasses import fields
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise, product
 from math import comb
 
@@ -283,6 +283,7 @@ def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
     return left, right
 
 
+@lru_cache(maxsize=64)
 def _range_of(shape: tuple[Fraction, ...]) -> Range:
     """Enclosure of a polynomial on [0, 1], by halving."""
     n = len(shape) - 1
