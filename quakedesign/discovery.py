@@ -21,7 +21,7 @@ _OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
 
 
 def discovered(package: str, kind: type) -> dict[str, Any]:
-    """Every concrete class of a kind with a name in the modules of a package, by name."""
+    """All concrete subclasses of a class in the modules of a package that have a name, by this name."""
     kinds: dict[str, Any] = {}
     for info in iter_modules(import_module(package).__path__):
         own = vars(import_module(f"{package}.{info.name}")).values()
@@ -59,7 +59,7 @@ def _raised_by(error: BaseException) -> str | None:
 def named(
     name: str, known: Mapping[str, type[Kind]], kind: type, what: str, *, in_file: bool = False, code: bool = False
 ) -> type[Kind]:
-    """Class of a name, or a user-defined one: ``module:Class`` of a module that can be imported.
+    """Class registered under a name, or a user-defined class ``module:Class`` of a module that can be imported.
 
     Parameters
     ----------

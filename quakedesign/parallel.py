@@ -74,7 +74,7 @@ class Background:
 
 @contextmanager
 def in_background() -> Iterator[Background]:
-    """Runs in parallel to the caller's work, in the order of submission; all end with the block."""
+    """Queue for runs in parallel with the caller's work, in order of submission; all end with the block."""
     interval = sys.getswitchinterval()
     executor = ThreadPoolExecutor(1)
     background = Background(executor)
@@ -100,7 +100,7 @@ class Interruption(KeyboardInterrupt):
     """Exception raised by a signal that ends the command.
 
     After a plain `KeyboardInterrupt` inside ``exec`` of a text, as in generated classes, Python ends itself with
-    SIGINT, for any exit code.
+    SIGINT, whatever exit code was requested.
     """
 
 
@@ -183,7 +183,7 @@ _ending: _Ending | None = None
 
 
 def remedy(text: str) -> None:
-    """Set the text printed at an interruption, in place of the statement whether anything was written."""
+    """Set the text printed at an interruption, in place of the statement of whether anything was written."""
     if _ending is not None:
         _ending.remedy = text
 
@@ -611,5 +611,5 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
 
 
 def crew_or_here(workers: int, scheduler: str | None = None, executor: Executor | None = None) -> Crew:
-    """As `crew_of`, but this process for one worker."""
+    """As `crew_of`, but with one worker the tasks run in this process."""
     return InProcess() if workers == 1 and not (scheduler or executor) else crew_of(workers, scheduler, executor)

@@ -164,7 +164,8 @@ def design(
 
     Every designed controller runs as it is guaranteed: sampled, with a zero-order hold over T_s. Exit code 0 if every
     design is proved at the fault's T_s and no run of a designed controller is an earthquake, diverges or opens the
-    fault; with --continuous, if the premise along the reference holds too. Exit code 1 otherwise.
+    fault; with --continuous, if the premises control_coefficient, along_reference and friction_slope hold too. Exit
+    code 1 otherwise.
 
     Parameters
     ----------

@@ -53,9 +53,9 @@ def synthesise(
     fault
         Objective sampled: preset or path of a .toml file.
     objective
-        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: fastest certified decay, as the
-        inverse of the settling time from initial errors |e_i| of at most the number given as the bound on |h'|. beta:
-        widest certified range of the input gain β. sampled: smallest simulated error of proved gains on a fault.
+        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: shortest certified settling time from
+        all |e_i| ≤ L̄ (the number of --lipschitz). beta: widest certified range of the input gain β. sampled: smallest
+        simulated error of proved gains on a fault.
     lipschitz
         Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the largest |h'| of the fault.
     gain_range

@@ -165,7 +165,9 @@ Shaking = Annotated[
         help="Amplitude in place of the fault's, such as '1e-4 m/s^2', or '35 kPa' of shear stress on the fault.",
     ),
 ]
-Box = Annotated[str | None, Parameter(help="Uncertainty box: paper or ten-percent.")]
+Box = Annotated[
+    str | None, Parameter(help="Uncertainty box: paper (friction alone) or ten-percent (also k/m, η/m and A/m).")
+]
 Scheduler = Annotated[
     str | None, Parameter(help="Address of a dask.distributed scheduler to use instead of processes of this machine.")
 ]

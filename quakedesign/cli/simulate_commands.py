@@ -230,7 +230,7 @@ def sampling(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Show effects of sampling on a law: every scheme, orders of accuracy, sensitivities; with the published laws.
+    """Show effects of sampling on a law, beside the published laws: every scheme, orders of accuracy, sensitivities.
 
     Runs are on the plant without stick. Errors are evaluated after the first quarter of each run. Runs with noise last
     a sixteenth of the task. Writes results.json and figures.

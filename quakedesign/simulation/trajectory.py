@@ -41,7 +41,7 @@ def signal(title: str, unit: str, default: Any = MISSING) -> Any:
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class Trajectory(ABC):
-    """Result of a run: signals over time with their SI units, metrics, outcome; None where a run does not have it.
+    """Result of a run: signals over time with their SI units, metrics, outcome; None for what a run does not have.
 
     Attributes
     ----------
@@ -229,7 +229,7 @@ class OutcomeCriterion:
     - ``tracked``, if it has a controller, its slip error never exceeds 2 % of the target slip (over the time in which
       errors count), and its slip rate never exceeds the largest of the reference by more than 1 % of the natural peak
       (over the whole run);
-    - an ``earthquake``, if its slip rate exceeds that of the reference by 10 % of the natural peak or more at any time;
+    - an ``earthquake``, if its slip rate ever exceeds the largest of the reference by 10 % of the natural peak or more;
     - ``slow slip`` otherwise, or ``diverged`` if the numbers of its law overflow, since the rest of the run is unknown.
 
     A stable fault has no natural earthquake. Its natural peak is replaced by ω_n·d_max, the peak slip rate of a

@@ -164,7 +164,8 @@ def estimate(
 ) -> tuple[float, np.ndarray | None]:
     """Small gain and bounds of a loop without delay, in floats; None if a condition of the theorem fails.
 
-    None also for an eigenvalue over a period above `slowest`. Responses are summed over at most `forget` periods.
+    Also None if an eigenvalue of the map of a period exceeds `slowest` in magnitude. Responses are summed over at most
+    `forget` periods.
     """
     loop = part.loop(law)
     flow, rows = np.array(loop.flow, dtype=float), np.array(loop.rows, dtype=float)

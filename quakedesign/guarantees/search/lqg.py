@@ -155,9 +155,10 @@ _FAINT = 1e-12  # process noise of all states, so that the filter forgets its in
 
 @dataclass(frozen=True, slots=True)
 class LawFamily:
-    """Laws with parameters x, their initial values and admissible range, and the `room` of ``tracking``.
+    """Laws with parameters x, with their initial values and admissible range.
 
-    To avoid slow convergence, the peak cost also includes a weighted slip error divided by `period` [s].
+    The objective ``tracking`` may have `room` times the least bound of the slip-rate error. To avoid slow convergence,
+    the peak cost also includes a weighted slip error divided by `period` [s].
     """
 
     law: Callable[[np.ndarray], LinearLaw]

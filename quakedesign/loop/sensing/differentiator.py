@@ -175,7 +175,7 @@ DISCRETISATIONS = ("euler", "homogeneous", "implicit")
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Differentiator:
-    """Estimates slip and its first n_d derivatives exactly once |x1^(n_d+1)| ≤ L_d < λ_d, and filters with order n_f.
+    """Estimates slip and n_d derivatives, exact after a transient if |x1^(n_d+1)| ≤ L_d < λ_d; filter order n_f.
 
     With measurement errors of at most ε and sampling period T, the error of the estimate of derivative i is a multiple
     of λ_d·δ^(n_d+1−i), δ = max(T, (ε/λ_d)^(1/(n_d+1))); for ``euler`` with n_d = 1 only. Levant and Livne (2020),
