@@ -475,7 +475,7 @@ BUDGETS = {
     "identification": 4061,
     "studies": 4128,
     "report": 4096,
-    "cli": 3530,
+    "cli": 3531,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

@@ -47,11 +47,11 @@ def certify(
     lipschitz
         Sliding mode: bound on |h'|, in the unit of ν per second.
     maximize
-        Sliding mode: lipschitz (largest bound on |h'|; with --lipschitz also the smallest scale for it), beta (upper
+        Sliding mode: lipschitz (largest bound on |h'|; also the smallest λ for the bound of --lipschitz), beta (upper
         end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound of the settling time).
     gain_range
-        Sliding mode: b_m and b_M, the range of the input gain β; 1 1 by default. Give one
-        value b twice to maximise the range.
+        Sliding mode: b_m and b_M, the range of the input gain β; 1 1 by default. For
+        --maximize beta-factor give b, the centre of the range, twice.
     box
         e-LQR: uncertainty box, paper or ten-percent.
     feedback

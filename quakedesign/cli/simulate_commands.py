@@ -80,7 +80,8 @@ def simulate(
     weight
         Weight of the disturbance estimate in the schemes compensated and stick-slip, above 0, at most 1.
     authority
-        B0 of a sampled scheme in m^2/kg; guarantee prints weight and authority of the sliding modes that it proves.
+        Nominal input gain B0 of a sampled scheme in m^2/kg; guarantee prints weight and authority of the sliding
+        modes that it proves.
     seed
         Seed of noise and jitter.
     out

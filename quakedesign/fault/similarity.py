@@ -107,8 +107,8 @@ def dimensional_matrix(units: Sequence[str]) -> "sp.Matrix":
 def quantities(fault: Fault) -> dict[str, Quantity]:
     """Every parameter of a fault by dotted name, including those of its friction law.
 
-    If the dimensionless parameters of a friction law cannot scale it as a whole, friction has no scale of its
-    own; the constant friction coefficient 1 is then one more parameter, the same for every fault.
+    If no scaling of the dimensionless parameters of a friction law scales its friction coefficient, friction has no
+    scale of its own; the constant coefficient 1 is then one more parameter, the same for every fault.
     """
     law = fault.friction
     named = {name: (unit, attrgetter(name)(fault)) for name, unit in PLANT_UNITS.items()}

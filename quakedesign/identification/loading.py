@@ -156,7 +156,7 @@ class Loading:
         return float(np.log(fast / slow)) if slow > 0 and fast > 0 else None
 
     def delays(self, record: Record) -> tuple[ndarray, ndarray]:
-        """Samples after each change of rate with a time uncertain by noise, and the largest errors of the times [s]."""
+        """Samples after each change of rate whose time noise makes uncertain, and the largest error of it [s]."""
         begins, rates = self.pieces.begins, self.pieces.rates
         ends = np.append(begins[1:], np.inf)
         off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)
@@ -189,7 +189,7 @@ class Loading:
 
 
 def prepared(record: Record, rates: Sequence[float] = (), fixed: Pieces | None = None) -> tuple[Record, Loading | None]:
-    """A record as means of its samples, with the driving load point and normal load; and their motion.
+    """The record as means of its samples, with load point and normal load that drive the model; and their `Loading`.
 
     `rates` of the load point [m/s], or the pieces, may be given. Raises `RecordError` if the record contradicts them.
     """

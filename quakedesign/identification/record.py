@@ -42,7 +42,7 @@ class Record:
     normal_unit : str
         ``"Pa"``, ``"N"`` or nothing.
     counts : ndarray or None
-        Number of measurements whose mean each sample is, or its weight; 1 by default.
+        Number of measurements that were averaged into each sample, or the weight of the sample; 1 by default.
     load_rates : ndarray or None
         Rates of the load point from each sample on [m/s], where these were recorded in place of its displacement.
     remarks : tuple of str
@@ -338,7 +338,7 @@ def scatter(time: ndarray, values: ndarray) -> float:
 
 
 def reading_step(values: ndarray) -> float:
-    """Resolution of quantised values, whose first ones repeat or often bend by it; otherwise 1e-9 of their range."""
+    """Resolution of quantised values (the first repeat or often turn by one step); otherwise 1e-9 of the range."""
     levels, first = np.unique(values), np.diff(values[:_FIRST])
     step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
     quantised = np.any(first == 0) or np.sum(np.abs(np.diff(first)) > step / 2) > _BENDS
@@ -350,10 +350,10 @@ def thinned(record: Record, begins: ndarray | None = None, *, follow: bool = Fal
 
     `begins` are times at which the rate of loading changes [s]; `follow` says whether it changes in between as well.
 
-    After every change of the rate of loading, a window lasts at most half of the time since then, and an eighth of
-    the piece. A window over which friction, slip or normal load bends by more than its noise explains is halved, the
-    most curved first, until there are `MOST_MEANS`; eight means are then taken in every window, so that a bend hidden
-    by noise moves a mean by a twentieth of its noise. Samples at and just after a step are kept.
+    After every change of the rate of loading, a window lasts at most half of the time since then, and at most an eighth
+    of the time until the next change. A window over which friction, slip or normal load bends by more than its noise
+    explains is halved, the most curved first, until the windows, of eight means each, give `MOST_MEANS`, so that a bend
+    hidden by noise moves a mean by a twentieth of its noise. Samples at and just after a step are kept.
     """
     count = len(record.time)
     if count <= MOST_PLAIN:

@@ -51,7 +51,7 @@ class Column:
 
 
 def read_columns(path: str | Path) -> list[Column]:
-    """Columns of a file, of equal length; `RecordError` for an unknown format, or a line unlike its headings."""
+    """Columns of a file, of equal length; `RecordError` for an unknown format or a line that misfits the headings."""
     data = read_bytes(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
     if data.startswith(b"MATLAB 5.0"):
         columns = _matlab(data, path)

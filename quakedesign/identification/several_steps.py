@@ -1,7 +1,7 @@
 """Several velocity steps of one experiment: each fitted alone, and one law fitted to all.
 
 The common fit shares the parameters of the law and the stiffness. Each step has its own level, trend, beginning, delays
-and noise; its samples are weighted by the standard deviation of its noise.
+and noise; its residuals are divided by the standard deviation of its noise.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ class Steps:
     ----------
     steps : tuple of Identification
     common : Identification
-        Identification of the shared parameters; samples of its fit are in deviations of the noise of each step.
+        Identification of the shared parameters; samples of its fit are in standard deviations of their step's noise.
     probability : float
         Probability of differences as large as these by chance, if one law holds for all steps (Fisher's F).
     """
@@ -208,7 +208,7 @@ def _assessed(common: Identification, steps: Sequence[Identification], probabili
 
 @dataclass(frozen=True, kw_only=True)
 class _Joint(Experiment):
-    """Steps with shared coordinates; samples are made independent, in deviations of the noise of their step."""
+    """Steps with shared coordinates; samples are made independent, in standard deviations of their step's noise."""
 
     fits: tuple[Fit, ...]  # separate fits of the steps, which give the weights of samples
     parts: tuple[Experiment, ...]

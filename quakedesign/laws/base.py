@@ -270,7 +270,7 @@ class Controller(Law):
         return float(self.sampling.step) if self.sampling else None
 
     def other_step(self, fault: Fault) -> str:
-        """Note that T_s of a sampled law differs from that of the fault; empty if both are equal."""
+        """A note if T_s of a sampled law differs from that of the fault; empty if both are equal."""
         if self.sampling_time in (None, fault.sampling_time):
             return ""
         return f"NOT for the fault's T_s = {fault.sampling_time:g} s: it runs once every {self.sampling_time:.4g} s"

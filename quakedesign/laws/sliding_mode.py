@@ -72,7 +72,7 @@ class SlidingMode(Controller):
     @property
     @abstractmethod
     def lipschitz_limit(self) -> Fraction:
-        """Bound on |h'| that no Lyapunov function can exceed with these gains (ERRATA, end)."""
+        """Bound on |h'| that no Lyapunov function can exceed with these gains."""
 
     @property
     def numbers(self) -> dict[str, Fraction]:

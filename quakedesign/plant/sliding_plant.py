@@ -1,6 +1,6 @@
 """Plant of a rate-and-state fault in slow sliding, in rationals, and cells of its parameter box.
 
-Quantities are per unit of area. Cuts of the box of constants give cells that cover it for every choice of cuts.
+Quantities are per unit of area. Cuts divide the box of constants into cells; whatever the cuts, these cover the box.
 """
 
 from collections.abc import Mapping
@@ -99,7 +99,7 @@ class SlidingPlant:
 
     @property
     def course(self) -> str:
-        """Empty text, as the reference slides throughout."""
+        """Empty text: a statement about slow sliding names the distance elsewhere."""
         return ""
 
     def differences(self, other: "SlidingPlant") -> list[str]:
@@ -168,7 +168,7 @@ def _in_words(value: Fraction | str | bool) -> str:
 
 
 # ----------------------------------------------------------------------
-# Repeated cuts of a box of constants: the cells cover it for every choice of cuts.
+# Repeated cuts of a box of constants: whatever the cuts, the cells cover it.
 
 MOST_CELLS = 64
 Cuts = tuple[tuple[str, Fraction] | None, ...]

@@ -334,7 +334,7 @@ def simulate_sliders(
     times : sequence of float, optional
         Ascending instants to return [s] in addition to start, changes of inputs and end; every step unless given.
     method, rtol
-        As of `simulate_state`.
+        As for `simulate_state`.
     """
     require_positive(duration=duration)
     slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
@@ -391,7 +391,7 @@ def natural_cycles(
     inertia : bool
         Whether blocks have their mass.
     method, rtol
-        As of `simulate_state`.
+        As for `simulate_state`.
     """
     far = float(chain.blocks[0].friction.operating_rate) if loading_rate is None else loading_rate
     require_positive(loading_rate=far)

@@ -52,7 +52,7 @@ class Integrator:
         Parameters
         ----------
         field : callable
-            Time derivative of the state [its unit per s] as a function of the passed share of the step
+            Time derivative of the state [its unit per s] as a function of the elapsed share of the step
             [-, 0 to 1] and the state.
         state : SX, float or ndarray
         step : SX or float

@@ -98,7 +98,7 @@ class StateTrajectory(Trajectory):
 
     @cached_property
     def slip_events(self) -> tuple[SlipEvent, ...]:
-        """Every event of a run that returned every step."""
+        """All events; the run must have returned every step."""
         ends = (self.onsets.tolist(), self.arrests.tolist(), self.event_slips.tolist())
         return tuple(self._event(*one) for one in zip_longest(*ends))
 

@@ -146,7 +146,7 @@ class Plane:
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityRegions:
-    """Stable and unstable regions of a fault; its own verdict is exact."""
+    """Stable and unstable regions around a fault; only the verdict on the fault itself is exact."""
 
     verdict: StabilityVerdict  # Verdict on the fault itself
     stiffness: np.ndarray  # Stiffnesses per area of both planes [Pa/m]
@@ -435,7 +435,7 @@ def _rock(fault: Fault) -> list[str]:
 
 
 def box_sentence(fault: Fault) -> str:
-    """Friction laws without a state and parameters that a guarantee covers; numbers are rounded inward."""
+    """Parameters, and friction laws without a state, that a guarantee covers; numbers are rounded inward."""
     law = fault.friction
     low, high = UpperBound(rational(law.bounds[0])), LowerBound(rational(law.bounds[1]))
     slopes = [f"{LowerBound(rational(law.slip_slope)):.4g} per m of slip"] * (law.slip_slope > 0)

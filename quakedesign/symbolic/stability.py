@@ -229,7 +229,7 @@ def _ratio(terms: list[sp.Expr], box: BallBox) -> Interval:
 def critical_stiffness(
     fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True
 ) -> float:
-    """Stiffness k_c [N/m] below which the fault is unstable, in closed form; not positive if none is unstable.
+    """Stiffness k_c [N/m] below which the fault is unstable, in closed form; not positive if it is always stable.
 
     Parameters
     ----------

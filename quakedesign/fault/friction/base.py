@@ -93,7 +93,7 @@ class FrictionLaw(ABC):
         """Largest chord slope |Δμ/Δrate| [s/m] at a fixed state."""
 
     def require(self, **given: object) -> None:
-        """Reject a value other than None that does not apply to the equilibrium of a fault with this friction."""
+        """Reject arguments, other than None, that have no meaning for a fault with this friction in its equilibrium."""
         for name, message in self.equilibrium.messages.items():
             if (value := given.get(name)) is not None:
                 raise ParameterError(message.format(value=value, law=self.name, states=", ".join(self.state_names)))
