@@ -2,8 +2,8 @@
 
 Usage: ``python tests/mutation.py MODULE.py... --tests TEST... [--results FILE]``. The tests are collected once and
 run once to record which of them reaches which line. Every mutant then gets a forked child, in which the code of
-the functions is exchanged and the tests that reach the line run, fastest first, until one fails. Results are
-JSON lines: a killed mutant is not tried again, a surviving one is, unless ``mutation_equivalents.toml``
+the functions is exchanged and the tests that reach the line run, the fastest case of each first, until one fails.
+Results are JSON lines: a killed mutant is not tried again, a surviving one is, unless ``mutation_equivalents.toml``
 explains it with a reason: by module, line and mutation, or by a rule for all lines and mutations that match its
 patterns. A rule names the tests of what it excepts. Without tests the results so far are reported.
 
@@ -459,8 +459,12 @@ class Mutation:
         elif not names:  # a default, or a line that is not traced
             names = [name for name, lines in known.items() if lines.intersection(mutant.within)] or list(known)
         reaching = {name: reached[name][0] / (1 + kills[mutant.path, mutant.function, name]) for name in names}
-        chosen, left = [], self.options.seconds
+        ranks, seen = {}, Counter()  # the fastest of every test function before the second of any
         for name in sorted(reaching, key=reaching.__getitem__):
+            ranks[name] = seen[name.partition("[")[0]]
+            seen[name.partition("[")[0]] += 1
+        chosen, left = [], self.options.seconds
+        for name in sorted(reaching, key=lambda name: (ranks[name], reaching[name])):
             left -= reached[name][0]
             if left >= 0:
                 chosen.append(name)
