@@ -19,11 +19,14 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import SampledLoop, TrackingProof, guarantee
 from quakedesign.guarantees.exact.limit_theorems import (
     farthest_well,
+    infeasibility,
     longest_diffusion,
     longest_reaction,
+    nearest_proved_well,
     smallest_peak,
     smallest_stick_slip_rate,
     smallest_withdrawal,
+    too_slow,
 )
 from quakedesign.laws import ErrorModel, disturbance_estimate
 from quakedesign.plant import uncertain_plant
@@ -546,6 +549,52 @@ def test_the_longest_diffusion_time_does_as_well():
 
     assert escapes(REAL, pressure, 0.184, path(1.03 * limit))
     assert not escapes(REAL, pressure, 0.184, path(0.93 * limit))
+
+
+WITHDRAWAL = F(10**5)
+JUST = F(1, 10**9)  # seconds
+
+
+@pytest.mark.parametrize(("share", "infeasible"), [(F(1), False), (F(1) + JUST, True), (F(99, 100), False)])
+def test_sampling_and_delay_are_infeasible_where_their_sum_is_above_the_longest_reaction(share, infeasible):
+    late = longest_reaction(REAL, WITHDRAWAL)
+    step, delay = F(2, 3) * late * share, F(1, 3) * late * share
+    reason = too_slow(REAL, WITHDRAWAL, step, delay)
+    assert bool(reason) is infeasible
+    assert too_slow(replace(REAL, change=F(1, 10**4)), WITHDRAWAL, step, delay) == ""  # the limit is for any change
+    if infeasible:
+        assert f"at most 100 kPa can hold the fault with T_s and delay above {late.quantity('s')} in all" in reason
+        assert late < step + delay
+
+
+def test_nothing_is_too_slow_where_there_is_no_limit():
+    still = replace(REAL, amplitude=F(0))
+    assert longest_reaction(still, WITHDRAWAL) is None
+    assert too_slow(still, WITHDRAWAL, F(10**6), F(10**6)) == ""
+    assert infeasibility(still, WITHDRAWAL, F(10**6), F(10**6)) == ""
+
+
+@pytest.mark.parametrize("what", ["delay", "diffusion"])
+def test_a_path_is_infeasible_beyond_its_own_limit_for_any_step(what):
+    late, far = longest_reaction(REAL, WITHDRAWAL), longest_diffusion(REAL, WITHDRAWAL, F(0))
+    limit = {"delay": late, "diffusion": far}[what]
+    said = {"delay": "with a delay above", "diffusion": "through a diffusion path of L^2/D above"}[what]
+    for value, infeasible in ((F(limit), False), (limit + JUST, True), (limit / 2, False)):
+        given = {"delay": F(0), "diffusion": F(0)} | {what: value}
+        reason = infeasibility(REAL, WITHDRAWAL, **given)
+        assert bool(reason) is infeasible
+        assert infeasibility(replace(REAL, change=F(1, 10**4)), WITHDRAWAL, **given) == ""
+    beyond = infeasibility(REAL, WITHDRAWAL, **{"delay": F(0), "diffusion": F(0)} | {what: limit + JUST})
+    assert f"at most 100 kPa can hold the fault {said} {limit.quantity('s')}, for any T_s" in beyond
+
+
+def test_a_proved_well_is_at_the_distance_of_its_diffusion_time_rounded_down():
+    distance = nearest_proved_well(LowerBound(2), F(3))
+    assert 0 <= 6 - distance**2 < 1e-12
+    assert 0 <= farthest_well(UpperBound(2), F(3)) ** 2 - 6 < 1e-12
+    for diffusivity in (F(0), F(-1)):
+        with pytest.raises(ParameterError, match="a diffusivity above 0"):
+            nearest_proved_well(LowerBound(2), diffusivity)
 
 
 def law_for(task, step):
