@@ -12,6 +12,7 @@ from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Claims, SampledLoop, TrackingProof, load_guarantee, read_guarantee
+from quakedesign.guarantees.exact.guarantee_files import guarantee_document, guarantee_text
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds
 from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof, peaks
 from quakedesign.guarantees.exact.sampled_loop import Channel, beside, through_layer
@@ -340,3 +341,46 @@ def test_a_statement_about_slow_sliding_names_what_it_covers():
 )
 def test_ends_of_a_range_are_printed_inward_with_the_digits_that_they_need(low, high, text):
     assert _inside(low, high) == text
+
+
+# ---------------------------------------------------------------- files
+
+
+LOOPS = {
+    "jitter alone": {"jitter": F(1, 100)},
+    "a late pressure alone": {"delay_jitter": F(1, 100)},
+    "averaging alone": {"averaging": F(1, 50)},
+    "an initial slip alone": {"initial_slip": F(1, 10**5)},
+    "an initial slip rate alone": {"initial_slip_rate": F(1, 10**5)},
+    "noise of the slip rate alone": {"rate_noise": F(1, 10**6)},
+    "limits of a pump": {"pump": Pump(least=F(-(10**6)), largest=F(10**6))},
+    "a pump without limits": {"pump": Pump()},
+    "a pump with a rate": {"pump": Pump(rate=F(10**7)), "ramp": F(1, 10), "largest_step": True},
+}
+
+
+@pytest.mark.parametrize("setup", LOOPS.values(), ids=LOOPS)
+def test_a_file_says_each_part_of_a_loop_whatever_else_there_is(setup):
+    """Read again, it is the same loop; a pump without limits is none."""
+    counted = {"largest_step": UpperBound(5)} if setup.get("largest_step") else {}
+    loop = replace(LOOP, **{name: value for name, value in setup.items() if name != "largest_step"})
+    claim = TrackingProof(task=TASK, held=loop, claims=replace(CLAIMS, **counted))
+    again = read_guarantee(json.loads(guarantee_text(claim)))
+    assert again.held == (replace(loop, pump=None) if loop.pump == Pump() else loop)
+    assert again.claims == claim.claims
+
+
+@pytest.mark.parametrize(("rows", "stands"), [("00", False), ("10", True), ("01", True)])
+def test_a_law_of_the_reference_has_a_row_that_is_not_zero(rows, stands):
+    law = replace(LAW, of_reference=((F(0), F(0)),) * len(LAW.states) + ((F(rows[0]), F(rows[1])),))
+    raw = guarantee_document(TrackingProof(task=TASK, held=replace(LOOP, law=law), claims=CLAIMS))
+    if stands:
+        assert read_guarantee(raw).held.law == law
+    else:
+        with pytest.raises(CertificateError, match="of_reference must not be zero"):
+            read_guarantee(raw | {"loop": raw["loop"] | {"of_reference": [["0", "0"]] * (len(LAW.states) + 1)}})
+
+
+def test_only_a_guarantee_is_written():
+    with pytest.raises(ParameterError, match="a claim must be a guarantee"):
+        guarantee_text(LOOP)
