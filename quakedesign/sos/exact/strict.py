@@ -191,12 +191,14 @@ def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
 def written(value: Any) -> Any:
     """Entries of a file for a value; the inverse of `read_as`."""
     match value:
+        case int() | str():
+            return value
         case Fraction():
             return exact_text(value)
-        case PolynomialEntries():
-            return polynomial_text(value)
         case tuple() | list():
             return [written(entry) for entry in value]
+        case PolynomialEntries():
+            return polynomial_text(value)
         case Mapping():
             return {key: written(entry) for key, entry in value.items()}
     if parts := _parts(cast(Any, type(value))):
