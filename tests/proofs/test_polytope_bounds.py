@@ -187,3 +187,12 @@ def test_numbers_with_errors_contain_all_that_they_stand_for():
     assert (third.off, third.at) == (1, -ONE // 3)
     with pytest.raises(CHECK.Refused, match="must be below 2\\^192"):
         Near.of(F(1 << 200))
+
+
+def test_a_function_too_large_for_the_integers_of_the_check_is_refused():
+    polytope, _ = made(Random(8), 0)
+    for place in range(3):
+        more = [NOTHING] * 3
+        more[place] = Near(-POLYTOPE.LARGEST * 100, 0)
+        with pytest.raises(CHECK.Refused, match="must be below 2\\^192"):
+            polytope.largest(Function([F(0)] * 3, F(0), more))
