@@ -466,7 +466,7 @@ BUDGETS = {
     "laws": 3105,
     "loop": 4175,
     "plant": 1449,
-    "guarantees": 13264,
+    "guarantees": 13265,
     "lyapunov": 6953,
     "linear": 2393,
     "synthesis": 1949,

@@ -221,7 +221,7 @@ _FAINT = Fraction(1, 1 << 60)
 
 @dataclass(frozen=True, slots=True)
 class ResponseBounds:
-    """Bounds of every row: per flowing input, per sampled input, and of the initial states."""
+    """Bounds of every row: for each input of the flow, each sampled input, and the initial states."""
 
     inputs: tuple[Row, ...]
     sampled: tuple[Row, ...]

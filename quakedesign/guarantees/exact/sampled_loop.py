@@ -45,7 +45,8 @@ class ExactSetup:
     jitter, delay_jitter : Fraction
         Largest timing errors of a measurement and its pressure [s], and additionally of the pressure alone [s].
     averaging : Fraction
-        Averaging time [s]: each measurement except the first is a mean over times within half of it from its instant.
+        Averaging time [s]: each measurement except the first is a mean over times that differ from its nominal instant
+        by at most half the averaging time.
     pump : Pump, optional
         Limits at the valve, which the loop must never reach.
     ramp : Fraction
@@ -342,7 +343,7 @@ def _measurement_errors(task: FaultPlant, noise: Mapping[str, Fraction], jitter:
 
 
 def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
-    """Inputs of reference, initial state and late pressures, those in `names`."""
+    """Those of the inputs reference, initial state and late pressures that are in `names`."""
     for name in ("reference", "reference_rate"):
         if name in names:
             yield Channel(name=name, own=task.reference_rates[0], shares={})

@@ -15,14 +15,14 @@ remain relative to V and D/V: V does not follow r′.
 ln((1 + √(1 + 1/s²))/2). With m = μ* − aY − bZ, 2m/a ≥ 1, this is below 4a·e^{−2m/a} =: ε, as (1 − e^{−2μ*/a})^{−2} < 4.
 So it equals logarithmic friction under a shear stress that is larger by at most N_max·ε, far below 1 Pa.
 
-**Inertia.** Let |y| ≤ Y, |z| ≤ Z, |q| ≤ Q so far. Then ŝ′ = λ(s − ŝ) + r with λ = (Na + HVe^y)/(mVe^y) ≥ λ₀ =
-N_min·a/(mVe^Y) and r = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|r|/λ₀ it decreases, so |ŝ| ≤ S + sup|r|/λ₀:
-the fault with mass is one without mass (ŝ in place of s) under a stress that is larger by sup|r|/λ₀, a few Pa. In r,
+**Inertia.** Let |y| ≤ Y, |z| ≤ Z, |q| ≤ Q so far. Then ŝ′ = λ(s − ŝ) + κ with λ = (Na + HVe^y)/(mVe^y) ≥ λ₀ =
+N_min·a/(mVe^Y) and κ = N′(ay + bz) + Nbz′ + Kx′ − μ*q′. Where |ŝ| > S + sup|κ|/λ₀ it decreases, so |ŝ| ≤ S + sup|κ|/λ₀:
+the fault with mass is one without mass (ŝ in place of s) under a stress that is larger by sup|κ|/λ₀, a few Pa. In κ,
 |N′| ≤ KV(1 + W)/μ* + |q′|, |z′| ≤ ζ with ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), or ρe^Y(Y + Z) for the
 slip law, and |x′| ≤ V(e^Y − 1 + W). The well pressure minus the plan, u, acts on the fault through filters 1/(1 +
-s/λ_n), one of which has the rate λ. So q′ = λ(h − w) − δ′ with h the input and w the output of that filter, δ = p* −
-plan, |δ′| ≤ d. Filters are means over the past, with a mean delay E in all. So |u − δ| ≤ U gives |h − δ| ≤ U + dE and,
-as |w − δ| = |q| ≤ Q, |q′| ≤ λ(U + dE + Q) + d. A diffusion path has λ = π²/(4τ) < 5/(2τ) and E = τ/2, and E = τ/2 + ℓ
+s/λ_n), one of which has the rate λ. So q′ = λ(i − w) − Δ′ with i the input and w the output of that filter, Δ = p* −
+plan, |Δ′| ≤ d. Filters are means over the past, with a mean delay E in all. So |u − Δ| ≤ U gives |i − Δ| ≤ U + dE and,
+as |w − Δ| = |q| ≤ Q, |q′| ≤ λ(U + dE + Q) + d. A diffusion path has λ = π²/(4τ) < 5/(2τ) and E = τ/2, and E = τ/2 + ℓ
 with a lag ℓ before it; a lag alone has λ = 1/ℓ, E = ℓ.
 
 **Sectors.** For |y| ≤ Y, f/y lies between (1 − e^{−Y})/Y and (e^Y − 1)/Y, with midpoint c and half-width δ. For |z| ≤
@@ -32,8 +32,8 @@ of the ranges of a cell the loop of `sliding_loop` has the inputs
     e = ŝ − (N − N₀)(ay + bz) − N₀((a − a₀)y + (b − b₀)z) − HV(f − cy) + (μ* − μ₀)q,    φ = f − cy,
     h = (ρ/ρ₀ − 1)(cy + c_z·z + φ) + (ρ/ρ₀)(g − c_z·z),
 
-so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δμ|q|, |φ| ≤ δ|y| and, with r = sup|ρ/ρ₀ − 1|, |h| ≤
-r|cy + c_z·z| + rδ|y| + (1 + r)δ_z|z|. For the slip law (ρ/ρ₀)e^y lies between (1 − r)e^{−Y} and (1 + r)e^Y, with
+so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δμ|q|, |φ| ≤ δ|y| and, with χ = sup|ρ/ρ₀ − 1|, |h| ≤
+χ|cy + c_z·z| + χδ|y| + (1 + χ)δ_z|z|. For the slip law (ρ/ρ₀)e^y lies between (1 − χ)e^{−Y} and (1 + χ)e^Y, with
 midpoint c_z and half-width δ_z. Then z′ = −ρ₀c_z(y + z) − ρ₀h does not contain φ, and |h| ≤ δ_z|y + z|. ω is another
 input. Noise of the measured slip, drift of p* from the plan and the truncation error R of the diffusion modes are
 inputs as in `small_gain`. q is that of the loop plus R. y and its combinations with z include the direct feedthrough of
@@ -45,7 +45,7 @@ HVc = B, By = X + e and |X′| ≤ KV(e^Y − 1 + W) + N₀b₀ζ + μ₀q̇, |z
 the period that begin before R has decayed to a sixteenth, y, ay + bz and cy + c_z·z have the gains of the part that
 ends with the step. Their bounds are larger by the above constant, with θ the beginning of the first other part.
 
-**Conclusion.** Let the bounds that follow for |y|, |z|, |q| and |u − δ| lie below Y, Z, Q and U. y, z and q are
+**Conclusion.** Let the bounds that follow for |y|, |z|, |q| and |u − Δ| lie below Y, Z, Q and U. y, z and q are
 continuous and initially 0, and u is determined by samples before it acts. So none of them ever reaches its claim: until
 then it would have obeyed the smaller bound. The slip rate never exceeds Ve^Y, on every cell. ∎
 """
@@ -265,7 +265,7 @@ def channels_of(
 
 
 def inertia(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> Fraction:
-    """Stress equivalent of inertia, sup|r|/λ₀ [Pa]."""
+    """Stress equivalent of inertia, sup|κ|/λ₀ [Pa]."""
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
     grown, moved = exponential(claims.log_rate), _fastest_push(task, held, claims)
@@ -390,7 +390,7 @@ def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
 
 
 def settled(loop: PeriodicLoop) -> Fraction:
-    """First such time [s] at which the weight of the truncation error is at most 1/16; 0 if there is none."""
+    """First of the times `after_a_step` [s] with a weight of the truncation error of at most 1/16; 0 if there is none."""
     times = sorted(after_a_step(loop))
     return next((t for t in times for fading in loop.fading.values() if fading.weight(t) <= _FADED), _ZERO)
 
