@@ -390,7 +390,7 @@ def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
 
 
 def settled(loop: PeriodicLoop) -> Fraction:
-    """First of the times `after_a_step` [s] with a weight of the truncation error of at most 1/16; 0 if there is none."""
+    """First of the times `after_a_step` [s] at which the truncation error has at most a weight of 1/16; 0."""
     times = sorted(after_a_step(loop))
     return next((t for t in times for fading in loop.fading.values() if fading.weight(t) <= _FADED), _ZERO)
 

@@ -10,7 +10,7 @@ from standalone_guarantee import CHECK
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document
-from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, response_bounds
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, response_bounds, solved
 from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof
 from quakedesign.plant.plant_values import ExactSector, SlowLoad
 
@@ -153,3 +153,52 @@ def test_a_load_that_the_law_cannot_balance_is_rejected():
         loaded.loop(STATIC)
     with pytest.raises(ParameterError, match="load"):
         loaded.loop(replace(LAW, output=rows([0, "-1/8", 0], [0, 0, 0])))
+
+
+# ---------------------------------------------------------------- balance of loads
+
+
+@pytest.mark.parametrize(
+    ("equations", "unknowns", "solution"),
+    [
+        ([[2, 1, 5], [1, -1, 1]], 2, (2, 1)),
+        ([[1, 1, 3], [2, 2, 6]], 2, (3, 0)),
+        ([[0, 0, 2, 8], [0, 3, 0, 6]], 3, (0, 2, 4)),
+        ([[0, 0, 0]], 2, (0, 0)),
+        ([], 2, (0, 0)),
+        ([[0], [0]], 0, ()),
+    ],
+)
+def test_a_solution_satisfies_every_equation_and_what_is_free_is_zero(equations, unknowns, solution):
+    given = [[F(v) for v in row] for row in equations]
+    assert solved(given, unknowns) == tuple(map(F, solution))
+    assert all(sum(a * b for a, b in zip(row, solution, strict=False)) == row[-1] for row in given)
+
+
+@pytest.mark.parametrize(
+    ("equations", "unknowns"),
+    [([[1, 1, 3], [2, 2, 7]], 2), ([[0, 0, 1]], 2), ([[0], [1]], 0), ([[1], [0]], 0), ([[0, 5, 1], [0, 0, 1]], 2)],
+)
+def test_equations_that_contradict_each_other_leave_a_load_without_balance(equations, unknowns):
+    with pytest.raises(ParameterError, match="must balance every load at zero error"):
+        solved([[F(v) for v in row] for row in equations], unknowns)
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+def test_both_checkers_move_the_equilibrium_with_a_load_alike(delay):
+    """Also by the shift of the states, which no measurement sees, and by the controls that are on their way."""
+    wide = replace(
+        PART,
+        A=rows([-2, 1, 0], ["-1/2", -3, 0], [1, 0, -1]),
+        B=rows([1, 0], [0, 1], [0, 0]),
+        C=rows([1, 0, 0], [1, 1, 0], [0, 1, 0]),
+        disturbances=((rows([1, 2, 3])[0], F(1)),),
+        loads=(SlowLoad(control=rows([1, 2])[0], shift=rows([0, 0, 5])[0], rate=F(2)),),
+        sectors=(),
+        start=(F(0), F(3), F(0)),
+        outputs=rows([1, 0, 0], [1, -1, 2]),
+    )
+    package, standalone = both(wide, replace(LAW, delay=delay), 1)
+    assert listed(package.inputs) == listed(standalone.inputs)
+    moved = next(column for column in package.inputs if F(-5) in column)
+    assert {F(-1), F(-2)} <= set(moved) or delay == 0
