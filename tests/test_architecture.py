@@ -465,7 +465,7 @@ BUDGETS = {
     "sos": 6328,
     "laws": 3105,
     "loop": 4175,
-    "plant": 1449,
+    "plant": 1453,
     "guarantees": 13265,
     "lyapunov": 6953,
     "linear": 2393,

@@ -283,14 +283,18 @@ def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
     return left, right
 
 
-@lru_cache(maxsize=64)
 def _range_of(shape: tuple[Fraction, ...]) -> Range:
     """Enclosure of a polynomial on [0, 1], by halving."""
+    return _range_by(shape, _HALVINGS)
+
+
+@lru_cache(maxsize=64)
+def _range_by(shape: tuple[Fraction, ...], halvings: int) -> Range:
     n = len(shape) - 1
     rows = [  # Bernstein coefficients, whose hull contains every value
         [sum((Fraction(comb(i, j), comb(n, j)) * shape[j] for j in range(i + 1)), Fraction(0)) for i in range(n + 1)]
     ]
-    for _ in range(_HALVINGS):
+    for _ in range(halvings):
         rows = [half for row in rows for half in _halves(row)]
     return _hull(v for row in rows for v in row)
 
