@@ -32,7 +32,7 @@ def accepted(name):
     return {BY_NAME[name]["verdict"]} | ({"undecided"} if name in OPEN else set())
 
 
-@few("name", NAMES, every=4)
+@few("name", NAMES, every=6)
 def test_the_verdict_is_right_and_its_proof_checks(name):
     found = answer(name)
     assert str(found.verdict) in accepted(name)

@@ -533,7 +533,8 @@ def friction_run(found, law, blocks, seed):
     return largest[: 2 * blocks]
 
 
-@few("wells", ["each", "one"], every=2)
+@pytest.mark.slow
+@pytest.mark.parametrize("wells", ["each", "one"])
 def test_several_blocks_stay_inside_and_both_checkers_decide(wells, checker):
     plant = qd.UncertainPlant.from_blocks(REAL, 2, wells=wells)
     found = qd.guarantee(plant, step="0.184").proof
