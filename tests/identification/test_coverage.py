@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from identification_coverage import holds, identified, one, synthetic
-from thinned import few
 
 from quakedesign.fault import friction_law
 from quakedesign.identification.fitting import fit
@@ -49,7 +48,8 @@ def test_the_joint_region_holds_the_truth_in_90_to_99_of_100_records(kind):
     assert 90 <= inside <= 99
 
 
-@few("kind", ["trend", "noisy load point", "correlated transducer", "unsteady beginning"], every=4)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["trend", "noisy load point", "correlated transducer", "unsteady beginning"])
 def test_three_records_with_a_trouble_hold_the_truth(kind):
     """Regions at 95 %: two of three at least but once in 140 times."""
     assert sum(holds(found.fit, truth) for found, truth in (identified(kind, seed) for seed in range(3))) >= 2

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from thinned import few
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.loading import (
@@ -57,7 +56,8 @@ def test_rates_and_times_come_back(noise):
     np.testing.assert_allclose(pieces.position(TIME), moved(), atol=8e-7)
 
 
-@few("fading", [0.9, 0.0], every=2)
+@pytest.mark.slow
+@pytest.mark.parametrize("fading", [0.0, 0.9])
 def test_errors_of_rates_are_as_large_as_rates_scatter(fading):
     """Over 40 noises, against the scatter of the rates that are found; none of them makes a change of rate."""
     time, found, told = np.arange(0.0, 55.0, 0.05), [], []

@@ -460,6 +460,7 @@ def test_every_snippet_of_the_page_runs(tmp_path, monkeypatch, capsys):
     assert names["hinf"].step == Fraction("0.184")
 
 
+@pytest.mark.slow
 def test_a_law_without_a_guarantee_names_a_smaller_delay_that_has_one(monkeypatch):
     """150 ms has no guarantee for this law, three quarters of it have one; multiples of the law are not tried here."""
     monkeypatch.setattr("quakedesign.synthesis.method._FACTORS", ())

@@ -8,7 +8,6 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from thinned import few
 
 import quakedesign as qd
 from quakedesign.cli.design_commands import positive
@@ -180,7 +179,8 @@ def searched(longest, first, most=None):
     return asked, found[-1].held.step if found else None
 
 
-@few("first", ["40", "1", "1/10"], every=3)
+@pytest.mark.slow
+@pytest.mark.parametrize("first", ["40", "1", "1/10"])
 def test_the_longest_time_is_found_within_a_sixteenth(first):
     asked, found = searched(F(3), F(first))
     assert F(15, 16) * 3 <= found <= 3
