@@ -3,9 +3,10 @@
 Usage: ``python tests/mutation.py MODULE.py... --tests TEST... [--results FILE]``. The tests are collected once and
 run once to record which of them reaches which line. Every mutant then gets a forked child, in which the code of
 the functions is exchanged and the tests that reach the line run, the fastest case of each first, until one fails.
-Results are JSON lines: a killed mutant is not tried again, a surviving one is, unless ``mutation_equivalents.toml``
-explains it with a reason: by module, line and mutation, or by a rule for all lines and mutations that match its
-patterns. A rule names the tests of what it excepts. Without tests the results so far are reported.
+Results are JSON lines: a killed mutant is not tried again; a surviving one is, and so is an undecided one, for which
+not all tests fitted into the time, unless ``mutation_equivalents.toml`` explains it with a reason: by module, line
+and mutation, or by a rule for all lines and mutations that match its patterns. A rule names the tests of what it
+excepts. Without tests the results so far are reported. A test that fails without a mutation ends the run.
 
 Not mutated: annotations, strings, messages of errors, imports, and ``strict`` of ``zip``, which guards no input.
 """
@@ -384,9 +385,11 @@ class Mutation:
         items = {item.nodeid: item for item in session.items}
         reached = self.reached(session.items)
         self.seconds = {name: seconds for name, (seconds, _, _) in reached.items()}
-        for name, (_, passed, _) in reached.items():
+        for name, (seconds, passed, _) in reached.items():
+            if not passed and seconds < LONGEST:
+                raise pytest.UsageError(f"{name} fails without a mutation")
             if not passed:
-                print(f"fails or takes too long without a mutation, left out: {name}")
+                print(f"takes too long without a mutation, left out: {name}")
         past, known = read_results(self.options.results), Explanations()
         kills: Counter[tuple[str, str, str]] = Counter()
         with open(self.options.results, "a", encoding="utf-8") as stream:
@@ -404,11 +407,12 @@ class Mutation:
                         index not in drawn
                         or skipped
                         or known.of(key)
-                        or past.get((*key, count), "survived") != "survived"
+                        or past.get((*key, count), "survived") not in ("survived", "undecided")
                     ):
                         continue
-                    names = self.choose(mutant, reached, kills)
+                    names, all_of_them = self.choose(mutant, reached, kills)
                     status, killer = self.try_out(mutant, by_path[mutant.path], modules, [items[n] for n in names])
+                    status = "undecided" if status == "survived" and not all_of_them else status
                     kills[mutant.path, mutant.function, killer] += 1
                     row = [*key, count, mutant.lines[0], status, killer, len(names)]
                     stream.write(json.dumps(row, ensure_ascii=False) + "\n")
@@ -450,8 +454,8 @@ class Mutation:
             return "survived", "tests fail or are slow by themselves"
         return ("timeout" if ending == "timeout" else "killed"), killer
 
-    def choose(self, mutant: Mutant, reached: dict, kills: Counter) -> list[str]:
-        """Return the tests that reach the mutant, the most promising ones first, within the time for one mutant."""
+    def choose(self, mutant: Mutant, reached: dict, kills: Counter) -> tuple[list[str], bool]:
+        """Return the tests that reach a mutant, within the time for it, best ones first, and whether they are all."""
         known = {name: paths.get(mutant.path, set()) for name, (_, passed, paths) in reached.items() if passed}
         names = [name for name, lines in known.items() if lines.intersection(mutant.lines)]
         if not mutant.function:  # a constant: any test may read it
@@ -468,7 +472,7 @@ class Mutation:
             left -= reached[name][0]
             if left >= 0:
                 chosen.append(name)
-        return chosen
+        return chosen, len(chosen) == len(names)
 
 
 # ---------------------------------------------------------------- results
@@ -533,7 +537,7 @@ def report(options: argparse.Namespace) -> int:
             key = mutant.key()
             status = results.get((*key, seen[key]), "not tried")
             seen[key] += 1
-            if status in ("survived", "not tried"):
+            if status in ("survived", "undecided", "not tried"):
                 status = known.of(key) or status
             if status == "survived":
                 print(f"{key[0]}:{mutant.lines[0]}: {mutant.text}\n    {mutant.mutation}")
@@ -542,7 +546,7 @@ def report(options: argparse.Namespace) -> int:
             print(f"explained, but no mutant any more: {key}")
     for name, counts in totals.items():
         print(f"{name}: {sum(counts.values())} mutants; {', '.join(f'{n} {s}' for s, n in sorted(counts.items()))}")
-    return int(any(counts["survived"] or counts["not tried"] for counts in totals.values()))
+    return int(any(counts[open_] for counts in totals.values() for open_ in ("survived", "undecided", "not tried")))
 
 
 def main() -> int:

@@ -1,12 +1,14 @@
-"""The tool that mutates the deciding rooms changes one place at a time, and neither texts nor messages."""
+"""The tool that mutates the deciding modules changes one place at a time, and neither texts nor messages."""
 
 import ast
 import gc
 import importlib.util
 import re
 import sys
+from collections import Counter
 from fnmatch import fnmatch
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -157,3 +159,16 @@ def test_every_single_mutant_that_is_explained_can_be_made():
     single = set(tool.Explanations().single)
     made = {m.key() for path in {key[0] for key in single} for m in tool.mutants_of(tool.ROOT / path, compiled=False)}
     assert not single - made
+
+
+def test_the_first_case_of_every_test_comes_before_a_second_and_it_says_whether_all_fit():
+    lines = {"file.py": {3, 4}}
+    seconds = {"a[1]": 1.0, "a[2]": 2.0, "a[3]": 3.0, "b": 4.0, "c[x]": 0.5, "elsewhere": 0.1, "failing": 0.1}
+    reached = {name: (s, name != "failing", {} if name == "elsewhere" else lines) for name, s in seconds.items()}
+    mutant = SimpleNamespace(path="file.py", lines=range(4, 5), within=range(1, 9), function="f")
+    for limit, chosen in ((100, ["c[x]", "a[1]", "b", "a[2]", "a[3]"]), (6, ["c[x]", "a[1]", "b"])):
+        tried = tool.Mutation(SimpleNamespace(modules=[], seconds=limit))
+        assert tried.choose(mutant, reached, Counter()) == (chosen, limit == 100)
+    many = Counter({("file.py", "f", "b"): 9})
+    tried = tool.Mutation(SimpleNamespace(modules=[], seconds=100))
+    assert tried.choose(mutant, reached, many)[0][0] == "b"
