@@ -100,7 +100,7 @@ class Interruption(KeyboardInterrupt):
     """Exception raised by a signal that ends the command.
 
     After a plain `KeyboardInterrupt` inside ``exec`` of a text, as in generated classes, Python ends itself with
-    SIGINT, whatever exit code was requested.
+    SIGINT, also if another exit code was requested.
     """
 
 

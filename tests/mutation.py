@@ -346,6 +346,15 @@ def passes(item) -> bool:
     return not any(report.failed for report in runtestprotocol(item, log=False, nextitem=None))
 
 
+def refuse_failures(reached: dict) -> None:
+    """Raise for a test that fails without a mutation: it would hide what it detects; name tests that are too long."""
+    for name, (seconds, passed, _) in reached.items():
+        if not passed and seconds < LONGEST:
+            raise pytest.UsageError(f"{name} fails without a mutation")
+        if not passed:
+            print(f"takes too long without a mutation, left out: {name}")
+
+
 def first_failure(items) -> bytes:
     """Run tests until one fails, and return its name."""
     return next((item.nodeid for item in items if not passes(item)), "").encode()
@@ -385,11 +394,7 @@ class Mutation:
         items = {item.nodeid: item for item in session.items}
         reached = self.reached(session.items)
         self.seconds = {name: seconds for name, (seconds, _, _) in reached.items()}
-        for name, (seconds, passed, _) in reached.items():
-            if not passed and seconds < LONGEST:
-                raise pytest.UsageError(f"{name} fails without a mutation")
-            if not passed:
-                print(f"takes too long without a mutation, left out: {name}")
+        refuse_failures(reached)
         past, known = read_results(self.options.results), Explanations()
         kills: Counter[tuple[str, str, str]] = Counter()
         with open(self.options.results, "a", encoding="utf-8") as stream:

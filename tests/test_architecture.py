@@ -471,7 +471,7 @@ BUDGETS = {
     "linear": 2393,
     "synthesis": 1949,
     "rocq": 842,
-    "simulation": 9745,
+    "simulation": 9746,
     "identification": 4061,
     "studies": 4128,
     "report": 4096,

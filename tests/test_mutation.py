@@ -3,6 +3,7 @@
 import ast
 import gc
 import importlib.util
+import json
 import re
 import sys
 from collections import Counter
@@ -172,3 +173,25 @@ def test_the_first_case_of_every_test_comes_before_a_second_and_it_says_whether_
     many = Counter({("file.py", "f", "b"): 9})
     tried = tool.Mutation(SimpleNamespace(modules=[], seconds=100))
     assert tried.choose(mutant, reached, many)[0][0] == "b"
+
+
+def test_a_test_that_fails_without_a_mutation_ends_the_run_and_a_long_one_is_named(capsys):
+    tool.refuse_failures({"quick": (0.1, True, {}), "long": (tool.LONGEST, False, {})})
+    assert capsys.readouterr().out == "takes too long without a mutation, left out: long\n"
+    with pytest.raises(pytest.UsageError, match="broken fails without a mutation"):
+        tool.refuse_failures({"quick": (0.1, True, {}), "broken": (tool.LONGEST / 2, False, {})})
+
+
+@pytest.mark.parametrize(("status", "code"), [("killed", 0), ("timeout", 0), ("survived", 1), ("undecided", 1)])
+def test_a_report_is_clean_where_all_mutants_are_detected(status, code, tmp_path, capsys):
+    module = PATH.parent / "data" / "thinned.py"
+    results, seen = tmp_path / "results.jsonl", Counter()
+    with results.open("w", encoding="utf-8") as stream:
+        for number, mutant in enumerate(tool.mutants_of(module, compiled=False)):
+            key = mutant.key()
+            stream.write(json.dumps([*key, seen[key], 1, status if number == 3 else "killed", "", 1]) + "\n")
+            seen[key] += 1
+    assert tool.report(SimpleNamespace(modules=[module], results=results)) == code
+    said = capsys.readouterr().out
+    assert (f"1 {status}" in said) or status == "killed"
+    assert ("→" in said) is (status == "survived")

@@ -282,7 +282,7 @@ def attraction(
         vanish at the origin; above it V = "...", optional. By default V = x'Px with A'P + PA = -1 for the linearised
         field; with --everywhere a V of degree 2 or 4 is searched for.
     everywhere
-        Prove global convergence, or refute it by a point: for the given V or, without one, for every V.
+        Prove global convergence. A point may refute the given V or, without one, every V.
     relative
         Relative width of the last bisection interval, from 1e-6 to below 1.
     degree

@@ -108,7 +108,7 @@ def quantities(fault: Fault) -> dict[str, Quantity]:
     """Every parameter of a fault by dotted name, including those of its friction law.
 
     If no scaling of the dimensionless parameters of a friction law scales its friction coefficient, friction has no
-    scale of its own; the constant coefficient 1 is then one more parameter, the same for every fault.
+    scale; the constant coefficient 1 is then one more parameter, the same for every fault.
     """
     law = fault.friction
     named = {name: (unit, attrgetter(name)(fault)) for name, unit in PLANT_UNITS.items()}

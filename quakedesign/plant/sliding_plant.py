@@ -1,6 +1,6 @@
 """Plant of a rate-and-state fault in slow sliding, in rationals, and cells of its parameter box.
 
-Quantities are per unit of area. Cuts divide the box of constants into cells; whatever the cuts, these cover the box.
+Quantities are per unit of area. The cells into which cuts divide the box of constants cover it for all cuts.
 """
 
 from collections.abc import Mapping
@@ -168,7 +168,7 @@ def _in_words(value: Fraction | str | bool) -> str:
 
 
 # ----------------------------------------------------------------------
-# Repeated cuts of a box of constants: whatever the cuts, the cells cover it.
+# Repeated cuts of a box of constants: the cells cover it for all cuts.
 
 MOST_CELLS = 64
 Cuts = tuple[tuple[str, Fraction] | None, ...]

@@ -116,7 +116,8 @@ def natural_peak(fault: Fault) -> float | None:
 
 def _alone(fault: Fault) -> Fault:
     """Fault reduced to the properties on which its natural earthquake depends."""
-    task = replace(fault.reference, operation_time=1e4 * fault.sampling_time)  # no part of the earthquake
+    longest = min(fault.reference.operation_time, 1e4 * fault.sampling_time)  # a fault without control has no task
+    task = replace(fault.reference, operation_time=longest)
     return replace(fault, reference=task).with_disturbance(Disturbance()).with_box("paper")
 
 
