@@ -138,3 +138,15 @@ def test_no_more_measures_are_kept_than_are_asked_for_again(monkeypatch):
     ]
     assert [memoryless_earthquake.natural_peak(fault) for fault in stable] == [None, None]
     assert list(memoryless_earthquake._PEAKS) == [memoryless_earthquake._alone(stable[1])]
+
+
+def test_the_natural_peak_is_computed_once_for_all_tasks_of_a_fault(monkeypatch):
+    """A run without control has no task: the peak of another operation time is that of a run with it."""
+    fault = load_fault("lab-fault")
+    other = dataclasses.replace(
+        fault, reference=dataclasses.replace(fault.reference, operation_time=3 * fault.reference.operation_time)
+    )
+    monkeypatch.setattr(memoryless_earthquake, "_PEAKS", {})
+    expected = memoryless_earthquake.natural_earthquake(other, compiled=False).criterion.natural_peak
+    monkeypatch.setattr(memoryless_earthquake, "natural_earthquake", None)
+    assert memoryless_earthquake.natural_peak(fault) == memoryless_earthquake.natural_peak(other) == expected
