@@ -299,12 +299,14 @@ def test_both_build_the_same_loop_in_continuous_time():
 FORWARD = ("reference_acceleration", "reference_jerk")
 HEARD = (NOISES, NOISES[:1], NOISES[1:], ("root", *NOISES), ("root", "slip_noise"))
 OFF = ((*NOISES, "late"), ("slip_noise", "late"), ("root", *NOISES, "late"), ("late",))
+REFERENCE = ("reference", "reference_rate")
+REFERRED = (REFERENCE, (*REFERENCE, *NOISES, "late"))  # never with an implicit step
 
 
 @pytest.mark.usefixtures("coarse")
 @few(
     ("more", "held"),
-    [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in (*HEARD, *OFF))],
+    [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in (*HEARD, *OFF, *REFERRED))],
     every=2,
 )
 @pytest.mark.parametrize("asked", [(), ("asked",)])
@@ -331,7 +333,7 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkey
         watched = {"stepped": True, "pulse": checker.Pulse(0, step, F(0), F(0), F(0)), "off": jitter} if late else {}
         inputs = [[] for name in names if name != "late"]
         loop = checker.Loop([[F(0)] * 3] * 3, events, [[]] * len(seen), inputs, given, step, off, asked=bool(asked))
-        loop = replace(loop, told=told, **watched)
+        loop = replace(loop, told=told, referred="reference" in more, **watched)
         segments = tuple(Segment(jump=(), duration=step) for _ in events)
         ours = PeriodicLoop(states=(), flow=(), segments=segments, inputs={}, outputs={})
         found = certified_bounds(task, ours, root, noise, jitter)
@@ -344,7 +346,7 @@ def test_both_draw_the_same_bounds_from_the_same_gains(more, held, asked, monkey
             assert (found.valve_push is None, found.stepped is None) == (not asked, not late)
             assert abs(theirs[1] - found.small_gain) <= max(found.small_gain / 2**19, F(1, 2**40))
     assert 2 < proved < 8
-    assert not held or entered == 8 * [name in ("root", *NOISES) for name in names]  # with the sample alone
+    assert not held or entered == 8 * [name in ("root", "reference_rate", *NOISES) for name in names]  # with the sample alone
 
 
 @pytest.mark.parametrize(
