@@ -176,10 +176,10 @@ def test_the_first_case_of_every_test_comes_before_a_second_and_it_says_whether_
 
 
 def test_a_test_that_fails_without_a_mutation_ends_the_run_and_a_long_one_is_named(capsys):
-    tool.refuse_failures({"quick": (0.1, True, {}), "long": (tool.LONGEST, False, {})})
+    tool.refuse_failures({"quick": (0.1, True, {}), "long": (tool.LONGEST / 2, None, {})})
     assert capsys.readouterr().out == "takes too long without a mutation, left out: long\n"
     with pytest.raises(pytest.UsageError, match="broken fails without a mutation"):
-        tool.refuse_failures({"quick": (0.1, True, {}), "broken": (tool.LONGEST / 2, False, {})})
+        tool.refuse_failures({"quick": (0.1, True, {}), "broken": (2 * tool.LONGEST, False, {})})
 
 
 @pytest.mark.parametrize(("status", "code"), [("killed", 0), ("timeout", 0), ("survived", 1), ("undecided", 1)])
