@@ -49,15 +49,16 @@ class DesignOptions(WellOptions):
         Control law to design: cta, dia, elqr or all. For several blocks: centralised, or decentralised, which computes
         the pressure of each well from its own measurements.
     objective
-        tracking, or peak for the smallest certified slip-rate error.
+        peak: the smallest certified slip-rate error. tracking: the smallest slip error under a drifting disturbance,
+        with a slip-rate error of at most 1.6 times the smallest.
     continuous
         Design in continuous time, as in the paper, instead of for the sampled loop with a guarantee.
     measured
         Measurement of the sampled e-LQR: slip-and-rate, or slip, from which it estimates the slip rate. Sliding modes
         measure both.
     disturbance_class
-        Disturbances of the guarantee. amplitude: any disturbance bounded by the fault's amplitude; rate: also its
-        rate of change is bounded, by that in the fault file, and it starts at 0, as a tide does.
+        Disturbances of the guarantee. amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of
+        change is bounded too, by the fault's amplitude times frequency, and it starts at 0, as a tide does.
     scheme
         Scheme that simulates the gains designed with --continuous: continuous (default, as in the paper), or sampled
         with a zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as

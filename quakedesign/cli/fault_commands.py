@@ -185,6 +185,9 @@ def init(
     return 0
 
 
+_AROUND = "Preset or .toml file, from which the file to write takes everything but the friction."
+
+
 @app.command
 def identify(
     data: Path,
@@ -201,7 +204,7 @@ def identify(
     states: Whole = 1,
     trend: Literal["auto", "displacement", "time", "none"] = "auto",
     seed: Whole = 0,
-    fault: FaultName = "lab-fault",
+    fault: Annotated[FaultName, Parameter(help=_AROUND)] = "lab-fault",
     out: Path | None = None,
     figure: Path | None = None,
     force: Force = False,
@@ -246,11 +249,9 @@ def identify(
     states
         Number of friction states; 2 may explain a record that 1 does not, but a fault file contains one only.
     trend
-        Drift of friction, linear in displacement or time, or none; chosen by likelihood by default.
+        Drift of friction, linear in displacement or time, or none; by default kept if significant (F test at 1 %).
     seed
         Seed of the random starting points.
-    fault
-        Preset or .toml file for everything but the friction in the file to write.
     out
         Fault file to write; its friction covers the whole confidence region where a fault file can express that.
     figure
@@ -315,8 +316,8 @@ def identify(
 def schema(command: str, /, *, output: Output = PLAIN) -> int:
     """Print the JSON Schema (draft 2020-12) of what a command prints with --json.
 
-    The schema is for faults of one block. Required keys are in every output; options add further keys, whose values
-    may be null. Units are in the table of keys (docs/reference/json.md).
+    The schema is for faults of one block; it recognises the output for several blocks. Required keys are in every
+    output; options add further keys, whose values may be null. Units are in the table of keys (docs/reference/json.md).
 
     Parameters
     ----------

@@ -78,10 +78,11 @@ def guarantee(
     controller
         elqr, or a sliding mode: cta, dia. For several blocks: centralised (default) or decentralised.
     objective
-        Design objective: tracking, or peak for the smallest certified slip-rate error.
+        Of a design. peak: the smallest certified slip-rate error. tracking: the smallest slip error under a drifting
+        disturbance, with a slip-rate error of at most 1.6 times the smallest.
     gains
         k1 to k4 of an e-LQR whose integrals are summed once per sample; by default a law with a disturbance estimate is
-        designed. For a sliding mode its base gains, scaled by λ.
+        designed. For a sliding mode its base gains (λ = 1), which the command scales by λ.
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
@@ -236,8 +237,8 @@ def limits(
     pressure
         Largest withdrawal, such as '20 MPa'; the effective normal stress by default.
     around
-        Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; noise limits
-        the slip-rate error of every controller.
+        Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; with noise
+        the smallest slip-rate error of every controller is larger.
     stress
         Rate-and-state faults (limits of the plant linearised about slow sliding): bound of the shear stress
         disturbance, such as '25 kPa'; by default about the largest with a guarantee.

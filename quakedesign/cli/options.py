@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Values of options: numbers with units, exact numbers, whole numbers, gains.
 
-# Negative decimals are values in any case; allowing leading hyphens would make values of the following options.
+# Negative decimals are accepted anyway. With leading hyphens allowed, later options would be read as values.
 Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
 
@@ -246,9 +246,9 @@ class LawOptions:
     feedforward
         none, nominal or centred: feed-forward of a sliding mode from the known plant; not with designed gains.
     certificate
-        Certificate file of guarantee --out instead of the options above. The law runs with the T_s, pressure limit at
-        rest, noise, delay, lag and diffusion path of the file. In slow sliding the shear stress is a sine of the
-        certified amplitude unless --stress is given.
+        Certificate file that guarantee --out wrote; it replaces the options above. The law runs with the T_s, pressure
+        limit at rest, noise, delay, lag and diffusion path of the file. In slow sliding the shear stress is a sine of
+        the certified amplitude, unless simulate --stress gives another.
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
     """
@@ -320,7 +320,8 @@ class RunOptions:
         default), dop853, cvodes or idas without control; cvodes (by default) or idas with control.
     plant
         stick-slip (by default; friction holds the fault at rest) or printed (the paper's plant, without
-        stick). Rate-and-state faults never rest: smooth (by default) or quasi-dynamic (without inertia).
+        stick). Rate-and-state faults never rest: smooth or quasi-dynamic (without inertia), by default
+        smooth for one block and quasi-dynamic for several.
     step
         Length of one step; the fault's sampling time by default.
     duration
@@ -472,7 +473,7 @@ def _annotation(option: Option) -> Any:
 @Parameter(name="*", group=_ACTUATOR)
 @_with_stage_options
 class ActuatorOptions:
-    """Stages between law and fault, for schemes that sample: what each declares where it is defined."""
+    """Options of the stages between law and fault, for schemes that sample; each stage declares its own."""
 
     def values(self) -> dict[str, Any]:
         """Values in SI units, by the names of the options."""
@@ -526,8 +527,8 @@ class EstimateOptions:
     differentiator_bound
         λ_d in m/s^(n_d + 1): the law uses estimates of a differentiator.
     differentiator_order
-        n_d, the number of derivatives; for 2, as printed in the paper, no λ_d satisfies the premise `differentiator`
-        with a zero-order hold.
+        n_d, the number of derivatives; for 2, as in the paper, the premise `differentiator` fails for every λ_d with a
+        zero-order hold (guarantee --measured differentiator proves such a loop without it).
     filter_order
         n_f, the filter order.
     differentiator_steps

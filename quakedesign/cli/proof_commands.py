@@ -197,7 +197,7 @@ def sos(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Decide whether a polynomial is a sum of squares, with a proof in either case. Exit code 0 only if it is.
+    """Prove that a polynomial is a sum of squares, or that it is not, or report neither. Exit code 0 only if it is.
 
     Parameters
     ----------

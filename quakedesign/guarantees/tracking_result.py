@@ -52,9 +52,9 @@ class TrackingGuarantee(Guarantee):
     unproved_step : Fraction or None
         T_s [s] that has no guarantee where `shorter` has one.
     nearest : (str, TrackingProof) or None
-        For a loop without a guarantee: a quantity of its setup, and the proof of a design with the nearest value of
-        this quantity alone. `GAINS` is a design in place of given gains, `FACTOR` the law with its pressure times
-        `factor`.
+        For a loop without a guarantee: a quantity of its setup, and the proof of a design that differs from the request
+        in this quantity only, by as little as was found. `GAINS` is a design in place of given gains, `FACTOR` the law
+        with its pressure times `factor`.
     factor : Fraction or None
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode in the scheme ``compensated``.
@@ -165,7 +165,8 @@ class TrackingGuarantee(Guarantee):
             return []
         return [
             "slip rate by the implicit differentiator of the slip error, n_d = 2 with any n_f, from rest: for lambda_d "
-            f"of {bound:.3g} m/s^3 or more it is (3x - 4x_1 + x_2)/(2 T_s) of the last three readings, for all t >= 0"
+            f"of {bound:.3g} m/s^3 or more this estimate is (3 x - 4 x_1 + x_2)/(2 T_s) for all t >= 0, with the last "
+            "reading x and the two before it, x_1 and x_2"
         ]
 
     def _at_rest(self) -> list[str]:
@@ -182,7 +183,7 @@ class TrackingGuarantee(Guarantee):
             return []
         held = self.proof.held
         step = f"{float(max(held.step, held.longest_step)):.6g} s"
-        step += " with that noise" if held.noise else ""
+        step += " with the noise of the guarantee" if held.noise else ""
         both = "" if limit.slip_error is None else f" while the slip error stays below {limit.slip_error.quantity('m')}"
         rate = limit.slip_rate_error.quantity("m/s")
         return [
@@ -191,11 +192,11 @@ class TrackingGuarantee(Guarantee):
         ]
 
     def task_lines(self) -> list[str]:
-        """Lines about the task alone, for every law."""
+        """Lines that do not depend on the law: performance limits, and a note on the class of the disturbance."""
         return self.limit_lines() + self._narrower_class()
 
     def _narrower_class(self) -> list[str]:
-        """Note that the fault's own disturbance is also of the class ``rate``."""
+        """Line of text which says that the fault's own disturbance is of the class ``rate``; none otherwise."""
         disturbance = self.fault.disturbance
         own = self.proof.found and self.proof.task.change is None
         if not own or disturbance.constant or not disturbance.largest_rate:
@@ -301,7 +302,8 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
     if name == BOX:
         pairs = zip(proof.task.spreads, ("k", "eta", "N"), strict=True)
         widths = (f"{LowerBound(100 * width):.3g} % of {of}" for width, of in pairs if width)
-        return f"with the box of +-{', '.join(widths)}" if any(proof.task.spreads) else "with the box paper"
+        wide = f"of +-{', '.join(widths)}" if any(proof.task.spreads) else "'paper' (uncertain friction alone)"
+        return f"with the box {wide}"
     if name == AMPLITUDE:
         return f"with a disturbance of at most {LowerBound(proof.task.amplitude):.3g} m/s^2"
     pump = proof.held.pump
@@ -332,8 +334,8 @@ def _nearest(name: str, proof: TrackingProof, factor: Fraction | None) -> dict[s
 def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGuarantee:
     """A guarantee with the worst case found on its loop; about a second.
 
-    If a trajectory with stick exceeds a claim with a slowly varying input gain, the guarantee with an arbitrary gain
-    replaces it, provided that its claims contain the trajectory.
+    If a trajectory with stick exceeds claims that were proved with a slowly varying input gain, those for an arbitrary
+    input gain replace them, provided that they contain the trajectory.
     """
     if not proof.found:
         return TrackingGuarantee(fault=fault, proof=proof)
@@ -346,7 +348,7 @@ def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGua
 def given_law_with_worst_case(
     fault: Fault, proof: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
 ) -> TrackingGuarantee:
-    """The guarantee of a given law with the worst case found, for a law of the errors alone."""
+    """The guarantee of a given law; for a law of the errors alone also the worst case found."""
     worst = worst_tracking(proof) if proof.found and not proof.held.law.of_reference else None
     return TrackingGuarantee(fault=fault, proof=proof, worst=worst, notes=notes, given=True)
 

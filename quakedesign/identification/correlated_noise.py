@@ -42,7 +42,7 @@ class CorrelatedNoise:
 
     @property
     def pieces(self) -> float:
-        """Degrees of freedom of the estimated slow noise: one every four lengths of the span.
+        """Degrees of freedom of the estimated slow noise: one for every four `length` within the span.
 
         By Satterthwaite, 2 over the relative variance of the spectral density at frequency zero, 2·share·length. For
         the likeliest process over a span T this variance is 8·length/T: share/length is sharp, and 1/length has the
@@ -91,7 +91,7 @@ def restricted_likelihood(
     """Logarithm of the restricted likelihood of residuals, up to a constant.
 
     By the tridiagonal inverse of the process, at the likeliest size of the noise. `steps` are the distances between
-    neighbouring samples, `slopes` those of the fitted coordinates; a share of 0 means no process.
+    neighbouring samples, `slopes` the derivatives by the fitted coordinates; a share of 0 means no process.
     """
     number, size = slopes.shape
     together = np.column_stack([residuals, slopes])

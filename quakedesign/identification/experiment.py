@@ -107,7 +107,7 @@ TREND, TREND_IN_TIME = "trend", "trend_in_time"
 
 @dataclass(frozen=True, kw_only=True)
 class _Transformed(Experiment):
-    """An experiment in other coordinates than those of its `whole`."""
+    """An experiment in other coordinates than those of the experiment that it wraps, `whole`."""
 
     whole: Any
 
@@ -138,8 +138,9 @@ class _Transformed(Experiment):
 class Widened(_Transformed):
     """An experiment, `whole`, with further coordinates, which come last and change friction in proportion to `columns`.
 
-    Trends add to friction; their columns are displacement [m] or time [s]. Delays of changes of rate [s] act through
-    the negative growth of friction, to first order; their columns mark the samples from each change to the next.
+    Trends add to friction; their columns are displacement [m] or time [s]. A delay of a change of rate [s] changes
+    friction, to first order, by minus the delay times the time derivative of friction; its column is not 0 from this
+    change to the next.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -176,7 +177,7 @@ def delayed(whole: Any, after: ndarray, most: ndarray) -> Experiment:
 
 
 def trended(whole: Experiment, along: ndarray, size: float, name: str = TREND) -> Widened:
-    """An experiment with a trend along displacement [m] or time [s], of at most ten frictions over the whole span."""
+    """An experiment with a trend along displacement [m] or time [s], at most ten times the friction over the span."""
     trend = _about_zero(name, "1/m" if name == TREND else "1/s", 10 * size / float(np.ptp(along)))
     return Widened(whole=whole, coordinates=(*whole.coordinates, trend), columns=along[:, None])
 
@@ -187,7 +188,7 @@ def _about_zero(name: str, unit: str, most: float) -> Coordinate:
 
 @dataclass(frozen=True, kw_only=True)
 class Difference(_Transformed):
-    """An experiment whose first coordinate is replaced by its difference from others, all by index."""
+    """An experiment in which coordinate `first` is reduced by the sum of coordinates `seconds` (indices)."""
 
     first: int
     seconds: tuple[int, ...]

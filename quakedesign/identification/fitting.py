@@ -51,7 +51,7 @@ class Fit:
 
     @property
     def scaled(self) -> ndarray:
-        """Residuals [-] scaled to one measurement; with correlated noise minus the prediction from neighbours.
+        """Residuals [-] scaled to one measurement; if the noise is correlated, less their prediction from neighbours.
 
         The noise of a mean of n falls with the square root of n.
         """

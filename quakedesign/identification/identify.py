@@ -160,7 +160,7 @@ _setup = by_equilibrium(rest=_of_slip, sliding=_sliding)
 
 
 def _stiffness(record: Record, path: float, given: float | None) -> list[Coordinate]:
-    """Coordinate of the stiffness unless it is given, scaled by the largest shear load over the path."""
+    """Coordinate of the stiffness unless it is given, scaled by the largest shear load divided by the path."""
     if given is not None:
         return []
     whole = float(np.max(record.normal) * np.max(np.abs(record.friction))) / path
@@ -336,7 +336,7 @@ class _Choice:
         for kind in kinds:
             try:
                 near = fits[0].best if fits else None
-                if len(kind.state_names) > 1:  # with a trend, two states can replace each other
+                if len(kind.state_names) > 1:  # with a trend the states are hard to tell apart: first without
                     near = self._fitted(kind, (), None).best
                 fits.append(self._fitted(kind, first, near))
             except RecordError:  # no spring prevents a jump with this law

@@ -118,7 +118,7 @@ def identify_steps(
     records : sequence of Record
         One a step, at least two, without common samples.
     law, stiffness, rates, states, trend, seed
-        As for `identify`; `rates` are those of every step.
+        As for `identify`; the same `rates` hold for every step.
 
     Raises
     ------

@@ -61,14 +61,14 @@ def cut_off(
     *,
     within: tuple[sp.Expr, ...] | None = None,
 ) -> tuple[sp.Expr, ...]:
-    """Applied pressure [Pa] within the limit at rest, and `RestLimit.STATES` after it.
+    """Applied pressure [Pa] within the limit at rest, and the values of `RestLimit.STATES` after this sample.
 
     Parameters
     ----------
     commanded : Expr
         [Pa].
     states : tuple of Expr
-        `RestLimit.STATES` before it.
+        Their values before it.
     slip, reference : Expr
         [m].
     width, per_slip, resolution : Expr
@@ -95,7 +95,7 @@ def growth_at_rest(law: LinearLaw, step: Fraction) -> float | None:
     """Time [s] in which the states grow e-fold while the fault is at rest, sampled every T_s [s]; None if stable."""
     sizes = np.abs(np.linalg.eigvals(np.array(law.update, dtype=float).reshape((len(law.states),) * 2)))
     growth = float(np.max(sizes, initial=0.0))
-    return float(step) / log(growth) if growth > 1 + 1e-6 else None  # rounding changes double eigenvalues of 1 by less
+    return float(step) / log(growth) if growth > 1 + 1e-6 else None  # rounding moves a repeated eigenvalue 1 by less
 
 
 def winds_up(law: LinearLaw) -> bool:
@@ -108,7 +108,10 @@ def winds_up(law: LinearLaw) -> bool:
 
 
 def warning_at_rest(law: LinearLaw, step: Fraction, *, limited: bool = False) -> str:
-    """Warning about a law whose pressure grows while the fault is at rest, limited there or not; empty for others."""
+    """Warning about a law whose pressure grows while the fault is at rest, or empty.
+
+    It is empty for other laws, and for one that only ramps if a limit at rest bounds its pressure (`limited`).
+    """
     time = growth_at_rest(law, step)
     if time:
         return (
@@ -126,7 +129,7 @@ def warning_at_rest(law: LinearLaw, step: Fraction, *, limited: bool = False) ->
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SampledController(Controller):
-    """p = Cz + Dy, whose states z ← Fz + Gy are those of the scheme ``explicit`` with the step T_s: ξ ← ξ + T_s·ξ′.
+    """p = Cz + Dy with z ← Fz + Gy; the scheme ``explicit`` makes this update as its step ξ ← ξ + T_s·ξ′, where ξ = z.
 
     Attributes
     ----------
@@ -136,7 +139,8 @@ class SampledController(Controller):
     delay, lag, diffusion, longest : Fraction
         As in `Sampling` [s].
     rest_limit : RestLimit, optional
-        Limit of its pressure; the law then receives the applied pressure, and the states of the limit follow its own.
+        Limit of its pressure; the law then receives the applied pressure, and the states of the limit are listed after
+        its own.
     gains : mapping of str to Fraction
         Derived from the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
     """

@@ -133,7 +133,7 @@ class SampledLaw(SampledController):
         ----------
         gains : sequence or array
             One to four gains [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)]: P, PD, PID, double integral; (k1, 0, k3) is a PI. The
-            K of ``control.dlqr`` for these states, with its sign.
+            K of ``control.dlqr`` for these states (u = −Kx) can be given unchanged.
         step : str, float or Fraction
             T_s, [s] or with a unit.
         inputs : (str, str)
@@ -188,7 +188,7 @@ class SampledLaw(SampledController):
         if rate <= 0:
             raise ParameterError(f"N of a PID must be positive. Received {shortly(rate)} 1/s.")
         share, zero, one = 1 / (1 + rate * time), Fraction(0), Fraction(1)
-        states = [  # own, of the error, output: the sum, and the filter state N·w with D = N(e − w)
+        states = [  # rows of A, entries of B and C: the sum of T_s·e, and the filter state w with D = N(e − w⁺)
             ([one, zero], time, -i),
             ([zero, share], 1 - share, d * rate * share),
         ]
@@ -257,15 +257,15 @@ class SampledLaw(SampledController):
         }
 
     def save(self, path: str | Path) -> None:
-        """Write the law as a JSON file, whole."""
+        """Write the law as a JSON file: whole, or not at all."""
         write_whole(Path(path), json.dumps(self.to_dict(), indent=1) + "\n")
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a law from a ``.json`` or ``.npz`` file; no code of the file is run.
 
-        The keys are those of `to_dict`, with numbers or texts (``"184 ms"``), or ``gains`` or ``pid`` (kp, ki, kd, N)
-        with ``step`` in place of the matrices. In ``.npz`` ``dt`` may stand for ``step``.
+        The keys are those of `to_dict`, with numbers or texts (``"184 ms"``). In place of the matrices a file may have
+        ``gains`` or ``pid`` (kp, ki, kd, N); ``step`` is always required. In ``.npz`` ``dt`` may stand for ``step``.
 
         Raises
         ------
@@ -330,10 +330,10 @@ def _require_shapes(wanted: Mapping[str, tuple[Matrix, int, int]]) -> None:
             )
 
 
-# ----------------------------------------------------------------------
-# An integrator perturbed by rounding. A guarantee needs z with Az = z and Cz = 1, exactly: at rest the law then
-# commands any constant pressure without an error. If no such z exists, but a pole within 1e-6 of 1, let v be its vector
-# with Cv = 1 and qv = 1. A − (Av − v)q has Av = v exactly and differs from A by rounding alone.
+# ---------------------------------------------------------------------- An integrator perturbed by rounding. A
+# guarantee needs z with Az = z and Cz = 1, exactly: at rest the law then commands any constant pressure without an
+# error. If no such z exists, but A has a pole within 1e-6 of 1, let v and q be its right and left eigenvectors with Cv
+# = 1 and qv = 1. Then A′ = A − (Av − v)q has A′v = v exactly, and differs from A by rounding alone.
 
 _NEAR = 1e-6
 _DEPENDENT = 1e-6
@@ -374,8 +374,8 @@ def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
     moved = max(abs(d * s) for d in off for s in share)
     pole = f"{poles[place].real:.12g}"
     return changed, (
-        f"a pole at {pole} is taken for an integrator that rounding has moved and made exactly 1: entries of A change "
-        f"by at most {float(moved):.1g}",
+        f"the pole at {pole} is taken for an integrator moved by rounding, and is set to exactly 1: entries of A "
+        f"change by at most {float(moved):.1g}",
     )
 
 

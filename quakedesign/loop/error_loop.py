@@ -63,15 +63,16 @@ def held_loop(
     path ``asked``, b·(p − p*) at the valve [m/s²]. ``push`` excludes the truncation error of the diffusion modes. The
     output ``left_out`` [m/s²] bounds this error, and without a lag an input of the same name acts on e2'.
 
-    With an implicit step w = −γe1/T_s, γ the middle of its slopes, and w + γe1/T_s [m/s] is the sampled input ``root``.
-    The measurement errors in `noisy` are the sampled inputs ``slip_noise`` [m] and ``rate_noise`` [m/s]; they enter the
-    law, and w, as e1 and e2 do. For a law that uses r and r′ as well, r′ [m/s] is an input twice: ``reference`` moves
-    the law's states away from those that command p* at r; the sampled ``reference_rate`` is the law's term in r′.
+    With an implicit step the nominal loop has w = −γe1/T_s, γ the midpoint of the slopes; the deviation w + γe1/T_s
+    [m/s] is the sampled input ``root``. The measurement errors in `noisy` are the sampled inputs ``slip_noise`` [m] and
+    ``rate_noise`` [m/s]; they enter the law, and w, as e1 and e2 do. For a law that uses r and r′ as well, r′ [m/s] is
+    an input twice: ``reference`` moves the law's states away from those that command p* at r; the sampled
+    ``reference_rate`` is the law's term in r′.
 
     With timing errors the last step of the valve pressure is a further state, and the output ``stepped`` [m/s²]. The
     input ``late`` is b times the deviation of the valve pressure from its schedule. It is at most the last or the next
-    step, and acts near the arrivals only. Meanwhile p* drifts: ``push`` (or ``asked``, where the fault pressure is not
-    the valve pressure) changes by ``drift`` times this time.
+    step, and acts near the arrivals only. In the timing error plus the ramp p* drifts: ``push`` (or ``asked``, where
+    the fault pressure is not the valve pressure) changes by ``drift`` times this duration.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ def held_loop(
     noisy : collection of str
         Which of ``slip_noise`` and ``rate_noise`` are inputs.
     instants : Instants, optional
-        Timing errors; None for exact timing if the last step is not needed. Not with a diffusion path.
+        Timing errors; None for exact timing without the output ``stepped``. Not with a diffusion path.
 
     Raises
     ------
@@ -274,7 +275,7 @@ class ContinuousLaw:
     feedback : (Fraction, Fraction)
         D [Pa/m, Pa·s/m].
     of_reference : (Fraction, Fraction)
-        R [Pa/m, Pa·s/m], D for feedback of the state in place of the errors.
+        R [Pa/m, Pa·s/m]: D for a law that feeds back slip and slip rate, 0 for one that feeds back their errors.
 
     Raises
     ------
@@ -301,7 +302,7 @@ def exact_integrals(gains: tuple[Fraction, ...], *, of_state: bool = False) -> C
     gains : tuple of Fraction
         k1 … k4 [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)].
     of_state : bool
-        k1 and k2 act on slip and slip rate, as printed, instead of their errors.
+        Whether k1 and k2 act on slip and slip rate, as printed in the paper, instead of on their errors.
 
     Raises
     ------
@@ -378,8 +379,9 @@ StateLaw = Literal["ageing", "slip"]
 class SlidingModel:
     """Nominal model about sliding at V: v = Ve^y, θ = (D/V)e^z, slip error x, q = p − p*.
 
-    strength·y + weakening·z = −stiffness·x + coefficient·q + e, x′ = V·c·y, z′ = −ρ(c_y·y + c_z·z), ρ = V/D. With all
-    slopes 1 this is the linearisation about sliding at V, the same for both laws of the state.
+    strength·y + weakening·z = −stiffness·x + coefficient·q + e with the stress input e of `sliding_loop` [Pa], x′ =
+    V·c·y, z′ = −ρ(c_y·y + c_z·z), ρ = V/D. With all slopes 1 this is the linearisation about sliding at V, the same for
+    both laws of the state.
 
     Attributes
     ----------

@@ -55,7 +55,7 @@ class FaultPlant:
     ----------
     name : str
     density, shear_modulus, length, damping, normal_stress : Fraction
-        ρ, G, L, η, σ′; for a patch of several squares, those of one square.
+        ρ, G, L, η, σ′. A rectangular patch is modelled as a row of equal squares; these are the values of one square.
     spreads : (Fraction, Fraction, Fraction)
         Relative half-widths of k̂, η̂ and N̂ [-].
     friction : Friction
@@ -321,7 +321,7 @@ def _other(proved: FaultPlant, asked: FaultPlant) -> list[str]:
     for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, asked.growths, strict=True):
         pairs[f"disturbance per {name} [{unit}]"] = both[0], both[1]
     found = [
-        f"{name} {six_digits(one)} there, {six_digits(other)} here"
+        f"{name} {six_digits(one)} in the certificate, {six_digits(other)} in the fault"
         for name, (one, other) in pairs.items()
         if one != other
     ]
@@ -335,12 +335,12 @@ def _wider_than_needed(proved: FaultPlant, asked: FaultPlant) -> list[str]:
     if proved.change is not None and asked.change is not None:
         pairs["change of the disturbance [m/s^3]"] = [proved.change, asked.change]
     found = [
-        f"{name} up to {six_digits(one)} there, {six_digits(other)} here"
+        f"{name} up to {six_digits(one)} in the certificate, {six_digits(other)} in the fault"
         for name, (one, other) in pairs.items()
         if other > one
     ]
     jumps = proved.change is not None and asked.change is None
-    return found + (["a disturbance of the class rate there, one that may jump here"] if jumps else [])
+    return found + (["class of the disturbance: rate in the certificate, amplitude in the fault"] if jumps else [])
 
 
 def _rougher(proved: Friction, asked: Friction) -> list[str]:
@@ -348,7 +348,5 @@ def _rougher(proved: Friction, asked: Friction) -> list[str]:
     beyond = {part.name: getattr(asked, part.name) > getattr(proved, part.name) for part in fields(Friction)}
     beyond |= {"static": False, "least": asked.least < proved.least}
     names = [name for name, wider in beyond.items() if wider]
-    return [
-        f"friction: {name} {six_digits(getattr(proved, name))} there, {six_digits(getattr(asked, name))} here"
-        for name in names
-    ]
+    both = [(name, *(six_digits(getattr(one, name)) for one in (proved, asked))) for name in names]
+    return [f"friction: {name} {theirs} in the certificate, {own} in the fault" for name, theirs, own in both]

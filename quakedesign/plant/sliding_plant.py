@@ -108,20 +108,26 @@ class SlidingPlant:
         Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
         swing and stress must lie within those of the proof. The name is not compared.
         """
+
+        def both(own: str, others: str) -> str:
+            return f"{own} in the certificate, {others} in the fault"
+
+        def values(name: str) -> str:
+            return both(_in_words(getattr(self, name)), _in_words(getattr(other, name)))
+
         texts = [
-            f"{name} [{unit}] {_in_words(getattr(self, name))} there, {_in_words(getattr(other, name))} here"
+            f"{name} [{unit}] {values(name)}"
             for name, unit in _SAME.items()
             if getattr(self, name) != getattr(other, name)
         ]
         texts += [
-            f"{name} [{unit}] up to {_in_words(getattr(self, name))} there, {_in_words(getattr(other, name))} here"
+            f"{name} [{unit}] up to {values(name)}"
             for name, unit in _WITHIN.items()
             if getattr(self, name) < getattr(other, name)
         ]
         return texts + [
-            f"{name_in_words} from {' to '.join(map(_in_words, self.ranges[axis]))} there, "
-            f"{' to '.join(dict.fromkeys(map(_in_words, other.ranges[axis])))} here"
-            for axis, name_in_words in _CONSTANTS.items()
+            f"{words} from {both(*(' to '.join(dict.fromkeys(map(_in_words, x.ranges[axis]))) for x in (self, other)))}"
+            for axis, words in _CONSTANTS.items()
             if other.ranges[axis][0] < self.ranges[axis][0] or other.ranges[axis][1] > self.ranges[axis][1]
         ]
 

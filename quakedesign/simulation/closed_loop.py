@@ -373,7 +373,9 @@ def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 
 
 def acceleration_expression(fault: Fault, varied: bool = False) -> sp.Expr:
-    """x2' [m/s²] of eq. shift in x1, x2, p and the disturbance φ, with friction continued to slip < 0 (ERRATA 12).
+    """x2' [m/s²] of the paper's equation ``shift``, in x1, x2, p and the disturbance φ.
+
+    Friction is continued to slip < 0 (ERRATA 12).
 
     With `varied`, here and below, the expression also contains the factors of `symbols`.
     """
@@ -386,7 +388,7 @@ def friction_expression(fault: Fault, varied: bool = False) -> sp.Expr:
 
 
 def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = False) -> sp.Expr:
-    """h of eq. esystem3 [unit of ν] along a run, in x1, x2, φ, r, r' and r''."""
+    """h of the paper's equation ``esystem3`` [unit of ν] along a run, in x1, x2, φ, r, r' and r''."""
     moving, derived = plant.reference(plant.t), plant.error_dynamics()
     position = {plant.e1: plant.x1 - moving, plant.e2: plant.x2 - moving.diff(plant.t)}
     named = ((moving.diff(plant.t, 2), r_acceleration), (moving.diff(plant.t), r_rate), (moving, r))
@@ -520,7 +522,7 @@ class ClosedLoop(Metered):
 
     @cached_property
     def printed(self) -> Motion:
-        """`plant` as printed in the paper, eq. shift, which is valid for slip rates that are not negative."""
+        """`plant` as printed in the paper (equation ``shift``), which is valid for slip rates that are not negative."""
         rates = [plant.x2, acceleration_expression(self.fault, bool(self.factors))]
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]}
         return self.function("plant", inputs, {"dx": rates})
@@ -541,7 +543,7 @@ class ClosedLoop(Metered):
 
     @property
     def known(self) -> sp.Expr:
-        """Feed-forward of the known plant terms, which the law adds to ν, and thus to h [unit of ν]."""
+        """Feed-forward of the known plant terms [unit of ν]; the law adds it to ν, so it counts in h."""
         known = self.controller.feedforward if self.controller is not None else NONE
         return known.acceleration(plant.x1, plant.x2, r_acceleration)
 

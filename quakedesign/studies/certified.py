@@ -68,7 +68,7 @@ def certified(
     maximize: str | None = None,
     gain_range: tuple[Number, Number] = (1, 1),
 ) -> Certified:
-    """Verdict on given gains for a bound L̄, or the largest certified value of a quantity.
+    """Verdict on given gains for |h'| ≤ L̄, h the matched perturbation, or the largest certified value of a quantity.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
 
 
 def _excluded(loop: Loop) -> list[int]:
-    """Degrees whose sums of even signed monomials an exact dual excludes, from the lowest on and without gaps.
+    """Degrees for which an exact dual excludes every V that is a sum of even signed monomials; without gaps.
 
     Only families that take a few seconds.
     """

@@ -88,7 +88,7 @@ def sampling_report(
     duration: float | None = None,
     progress: Tell | None = None,
 ) -> SamplingReport:
-    """Run a law under every scheme and published laws without stick, and measure orders and sensitivities.
+    """Run a law under every scheme, and published laws, on the plant without stick; measure orders and sensitivities.
 
     Parameters
     ----------

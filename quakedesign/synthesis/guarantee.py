@@ -126,7 +126,8 @@ def guarantee(
         User-defined law, as with `controller`. A ``StateSpace`` in discrete time is for an `UncertainPlant`, from its
         measurements to its controls.
     objective : str
-        Of a design: ``tracking``, or ``peak`` for the smallest proved slip-rate error.
+        Of a design. ``peak``: the smallest proved slip-rate error. ``tracking``: the smallest slip error under a
+        drifting disturbance, with a slip-rate error of at most 1.6 times the smallest.
     gains : sequence or array of str, float or Fraction, optional
         k1 to k4 of an e-LQR whose integrals are summed once per sample, run by the scheme ``explicit``; base gains of a
         sliding mode. A matrix of one row, as the K of ``control.dlqr``, is accepted.
@@ -222,7 +223,8 @@ def guarantee(
         if any(wrong.values()):
             raise ParameterError(
                 "a given law has guarantees on the plant without stick, for friction without a state. Received "
-                f"{', '.join(name for name, is_wrong in wrong.items() if is_wrong)}. Omit this."
+                f"{', '.join(name for name, is_wrong in wrong.items() if is_wrong)}. Omit these, "
+                "or use a fault whose friction has no state."
             )
         require_known(disturbance_class, CLASSES, "class")
         task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")

@@ -114,7 +114,8 @@ class GainProblem(Generic[Designed]):
         if self.continuous and self.setup != IDEAL:
             raise ParameterError(
                 "a design in continuous time needs exact measurements of slip and slip rate, and no delay, lag or "
-                "diffusion path. Received a loop with one of these. Omit continuous, or noise, measured and path."
+                "diffusion path. Received noise, an unmeasured slip rate, a delay, a lag or a diffusion path. "
+                "Omit continuous, or these."
             )
 
     def by_method(self, law: type[Controller]) -> Designed:
@@ -208,7 +209,7 @@ class DesignMethod(Generic[L]):
     designs : bool
         Whether the method computes gains for a fault.
     without_state : str
-        Reason why there are none for friction with a state; empty if there are.
+        Reason why the method designs no gains for friction with a state; empty if it does.
     takes_base_gains : bool
         Whether the method scales base gains, as for a sliding mode.
     """
@@ -378,7 +379,7 @@ class Samples(DesignMethod[SampledController]):
     def given(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingGuarantee:
-        """Guarantee with the worst case found, for a law of the errors alone."""
+        """Guarantee; for a law of the errors alone also the worst case found."""
         proof = self.guarantee(fault, task, controller, setup)
         result = given_law_with_worst_case(fault, proof, controller.notes)
         if proof.found or proof.pressed or proof.reason == _STANDING or setup.longest_step:

@@ -57,7 +57,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
     )
 
     def design(self, problem: GainProblem[Designed], law: type[SlidingMode]) -> Designed:
-        """λ for the scheme ``stick-slip`` or ``compensated``, or for L̄ in continuous time."""
+        """λ for the scheme ``stick-slip`` or ``compensated``; in continuous time λ for the bound L̄ of |h'|."""
         if problem.setup.measured != MEASURED[0]:
             raise ParameterError(
                 f"a sliding mode needs slip and slip rate. Received {problem.setup.measured!r} for {law.name}. "
@@ -99,7 +99,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
     def premises(
         self, fault: Fault, controller: SlidingMode, certificate: Certificate | None
     ) -> tuple[tuple[Premise, ...], Domain | None]:
-        """|h'| against L̄, along the reference and on a level set."""
+        """|h'| against its certified bound L̄, along the reference and on a level set."""
         premises, domain = sliding_mode_premises(fault, controller, certificate)
         return tuple(premises), domain
 

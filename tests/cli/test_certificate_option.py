@@ -170,8 +170,8 @@ def test_a_campaign_runs_it_as_it_is_proved(file, capsys, tmp_path):
 @pytest.mark.parametrize(
     ("fault", "more", "said"),
     [
-        ("lab-fault", (), "shear_modulus [Pa] 3.00000e+10 there"),
-        ("real-fault", ("--target-slip", "0.5 m"), "target_slip [m] 0.785 there, 0.5 here"),
+        ("lab-fault", (), "shear_modulus [Pa] 3.00000e+10 in the certificate"),
+        ("real-fault", ("--target-slip", "0.5 m"), "target_slip [m] 0.785 in the certificate, 0.5 in the fault"),
         ("real-fault", ("--gains", "designed"), "--certificate contains the law"),
         ("real-fault", ("--controller", "cta"), "--certificate contains the law"),
         ("real-fault", ("--step", "0.1 s"), "a sampled law runs with the scheme explicit and the step 0.15 s"),

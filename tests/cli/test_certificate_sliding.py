@@ -78,7 +78,7 @@ def test_a_run_that_is_not_what_is_proved_says_so(capsys, more, outside):
 @pytest.mark.parametrize(
     ("fault", "more", "said"),
     [
-        ("creeping-patch", (), "rate [m/s] 0.000001 there"),
+        ("creeping-patch", (), "rate [m/s] 0.000001 in the certificate"),
         ("real-fault", (), "about friction with a state where that of the fault has one"),
         ("crustal-patch", ("--lag", "2 s"), "lag cannot be used with"),
         ("crustal-patch", ("--controller", "cta"), "--certificate contains the law"),
@@ -177,7 +177,9 @@ def test_a_fault_within_the_box_of_a_proof_runs_with_the_plan_of_the_proof(capsy
     with pytest.raises(ParameterError, match="varies the fault that the certificate is about"):
         SpreadOptions().choose(true, LawOptions(certificate=file), None, {})
     far = replace(CRUSTAL, friction=replace(CRUSTAL.friction, critical_slip=1.02 * CRUSTAL.friction.critical_slip))
-    with pytest.raises(CertificateError, match=r": D_c \[m\] from 0\.\d+ to 0\.\d+ there, 0\.\d+ here\. Give"):
+    with pytest.raises(
+        CertificateError, match=r": D_c \[m\] from 0\.\d+ to 0\.\d+ in the certificate, 0\.\d+ in the f"
+    ):
         LawOptions(certificate=file).choose(far)
 
 

@@ -90,7 +90,7 @@ def test_an_integrator_that_rounding_has_moved_is_made_exact_and_this_is_said(po
     law = qd.SampledLaw.from_statespace(control.ss(A, np.ones((3, 2)), C, np.zeros((1, 2)), STEP), inputs=ERRORS)
     assert asks_for_any_pressure(law.law)
     assert len(law.notes) == 1
-    assert law.notes[0].startswith(f"a pole at {pole:.12g} is taken for an integrator")
+    assert law.notes[0].startswith(f"the pole at {pole:.12g} is taken for an integrator")
     moved = np.array([[float(v) for v in row] for row in law.law.update]) - A
     assert np.abs(moved).max() <= 20 * max(abs(pole - 1), 1e-15)
     assert sorted(np.abs(np.linalg.eigvals(A + moved))) == pytest.approx([0.2, 0.4, 1], abs=1e-6)

@@ -345,7 +345,7 @@ def test_the_disturbance_must_outweigh_the_range_of_the_input_gain(path, share, 
         return
     with pytest.raises(CHECK.Refused, match="outweigh the range of the input gain"):
         period.verify()
-    with pytest.raises(ParameterError, match="too small against what the range of the input gain makes"):
+    with pytest.raises(ParameterError, match="too small for this range of the input gain"):
         package.stick_slip_bounds(claim.task, claim.held, claim.reach)
 
 

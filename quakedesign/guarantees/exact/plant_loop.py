@@ -204,16 +204,16 @@ def solved(rows: Sequence[Sequence[Fraction]], unknowns: int) -> Row:
     return tuple(solution)
 
 
-# ----------------------------------------------------------------------
-# L1 norms of all rows for all inputs at once. The statements and their proofs are those of `norms`, except that sums
-# for unit columns, computed once, bound the remainders of all inputs, and rows are followed over the periods: the sums
-# of |P_k·columns| over k < K are computed, P_k = rows·Ψᵏ, and the rest is bounded by x with y + |Ψᴷ|x ≤ x, y those sums
-# for unit rows.
+# ---------------------------------------------------------------------- L1 norms of all rows for all inputs at once.
+# Statements and proofs are those of `norms`, with two differences. Sums for unit columns, computed once, bound the
+# remainders of all inputs. And rows are multiplied by the map Ψ of one period: P_k = rows·Ψᵏ. The sum of |P_k·columns|
+# over k < K is computed. The sum over k ≥ K is at most |P_K|x for any x with y + |Ψᴷ|x ≤ x, y the computed sum for unit
+# rows.
 
 _BITS = (128, 256)  # precision of balls; the larger if the smaller does not show decay
 _AT_ONCE = 8  # periods
 _MOST_WORK = 12 * 10**8
-_BEYOND = 64  # times the limit of periods, within which the map of a stable loop must get small
+_BEYOND = 64  # multiple of the work limit; a power of the map must be small before it is reached
 _LEFT = Fraction(1, 1024)
 _ROOM = Fraction((1 << 20) + 1, 1 << 20)
 _FAINT = Fraction(1, 1 << 60)
@@ -271,7 +271,7 @@ class _AllResponses:
         *earlier, period = accumulate(wholes, lambda now, whole: whole * now, initial=identity(self.size))
         later = list(accumulate(wholes[:0:-1], mul, initial=identity(self.size)))[::-1]
         blocks, rests = zip(*(self._own(s, later[s]) for s in range(len(wholes))), strict=True)
-        # all earlier periods: groups of columns for every input, units for the remainders
+        # all earlier periods: the columns of every input, and unit columns that bound the remainders
         own = [beside([block[i] for block in blocks]) for i in range(self.kinds)]
         own += [later[0] * self.powers[0][-1] * column(entry) for entry in self.loop.sampled]
         left = [reduce(add, (rest[i] for rest in rests)) for i in range(self.kinds)]
@@ -294,7 +294,7 @@ class _AllResponses:
         )
 
     def _own(self, s: int, later: Any) -> tuple[list[Any], list[Any]]:
-        """Columns and remainder of every flowing input over one segment, at the end of the period."""
+        """Columns and remainder of every input of the flow over one segment, at the end of the period."""
         h, columns, rests = self.lengths[s], [], []
         for entry in self.entries:
             ends = [power * entry for power in self.powers[s]]
@@ -346,7 +346,9 @@ class _AllResponses:
         return totals, free
 
     def _peaks(self, s: int, i: int, before: Any) -> Row:
-        """Bounds of all rows in a segment for an input or, last, the initial states, given earlier inputs.
+        """Bounds of all rows in a segment for input `i`, of which the last stands for the initial states.
+
+        `before` is the contribution of all earlier times.
 
         The largest of all pieces: the larger end plus the remainder of the chord.
         """
@@ -371,7 +373,7 @@ class _AllResponses:
 
 
 def _total(sums: Any, i: int, count: int, rest: Any) -> Any:
-    """Sums for an input with its remainders, by those for unit columns."""
+    """Sums for an input plus its remainders, which the sums for unit columns bound."""
     used = [(count + j, v) for j, v in enumerate(rest.entries()) if not v.is_zero()]
     return arb_mat([[line[i] + sum((line[j] * v for j, v in used), arb(0))] for line in sums.tolist()])
 

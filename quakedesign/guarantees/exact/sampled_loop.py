@@ -109,8 +109,8 @@ class SampledLoop(ExactSetup):
     Raises
     ------
     ParameterError
-        For a negative bound, noise of a slip rate that the law does not measure, or aperiodic sampling with a loop
-        setup of more than noise.
+        For a negative bound, noise of a slip rate that the law does not measure, or aperiodic sampling with initial
+        errors, delay, lag, diffusion path, jitter, averaging or a rate limit of the pump.
     """
 
     law: LinearLaw
@@ -142,7 +142,7 @@ class SampledLoop(ExactSetup):
             raise ParameterError(
                 "a law that uses the slip, the slip rate or the reference itself has no guarantee with a diffusion "
                 "path, aperiodic sampling or an implicit step. Received one of these. Use slip_error and "
-                "slip_rate_error, or omit it."
+                "slip_rate_error, or omit these."
             )
         if self.longest_step:
             self._require_aperiodic()
@@ -175,7 +175,7 @@ class SampledLoop(ExactSetup):
 
     @property
     def noise(self) -> dict[str, Fraction]:
-        """Bounds of the measurement noise by input of the loop; not empty with jitter."""
+        """Bounds of the measurement noise by name of the input; with a timing error also those that are 0."""
         measured = (NOISES[0], *NOISES[1:] * (not self.law.of_slip_alone)) if self.off else ()
         return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
 
@@ -229,7 +229,7 @@ class SampledLoop(ExactSetup):
         return laws.SampledController(law=self.law, step=self.step, **self.path, longest=self.longest_step)
 
     def loop(self, task: FaultPlant, model: NominalModel | None = None) -> PeriodicLoop:
-        """Nominal error loop of a task, with the model of the task or another one."""
+        """Nominal error loop of a fault on its reference, with the model of the fault or another one."""
         loop = held_loop(
             self.law,
             model or task.model,
@@ -305,7 +305,7 @@ def channels_of(
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> tuple[Channel, ...]:
-    """Inputs of the nominal loop of a task, with their bounds.
+    """Inputs of the nominal loop of a fault on its reference, with their bounds.
 
     `noise` bounds the noise inputs of the loop; `jitter` [s] is the timing error of the measurements.
     """
@@ -358,7 +358,11 @@ def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
 
 
 def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
-    """Inputs of a loop with a diffusion path; its truncation error fades after each step."""
+    """Inputs of a loop with a diffusion path.
+
+    Without a lag the truncation error fades after each step, and is an input of its own; with a lag it is part of the
+    acceleration.
+    """
     fades = ("left_out", "left_out") in gains
     for channel in channels:
         share = {"left_out": channel.shares["push"]} if "push" in channel.shares else {}

@@ -1,8 +1,9 @@
 """Robust small-gain theorem for sampled loops: bounds for all t ≥ 0 in exact arithmetic.
 
 Chapters: the theorem with the bounds of all inputs; slowly varying input gain, where friction depends on slip alone;
-sector bounds of the implicit step. Symbols are those of `plant.fault_plant`. A loop without noise, jitter, diffusion
-path or implicit step needs the paragraphs *Theorem* and *Inputs* alone.
+sector bounds of the implicit step. Symbols are those of `plant.fault_plant`. The paragraphs *Theorem* and *Inputs*
+suffice for a loop that starts at rest, under the class amplitude, without noise, jitter, diffusion path, implicit step
+and slowly varying input gain.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -39,8 +40,8 @@ from quakedesign.plant.fault_plant import FaultPlant
 # sampled input, over the samples up to t). Let the outputs in turn bound every input, |w_i| ≤ F_i + Σ_y c_iy·|y| at
 # every time, c ≥ 0, and let M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 −
 # M)⁻¹F for every t, and the outputs stay below max_j Σ_i g_yi,j·W_i for all t. *Proof.* W(t) ≤ F + M·W(t). W(t) is
-# finite, because the solution of such a loop is bounded on [0, t]. (1 − M)⁻¹ = 1 + M + M² … has no negative entry.
-# Stability is not assumed. ∎
+# finite, because the solution of such a loop is bounded on [0, t]. (1 − M)⁻¹ = 1 + M + M² … has no negative entry. The
+# nominal loop is stable, as its gains are finite; stability of the uncertain loop is not assumed. ∎
 #
 # **Inputs.** Let v = b·(p − p*) [m/s²], and let the nominal loop have the midpoints of the ranges of s, w and β. Then
 # e2′ = s0·e1 − w0·e2 + β0·v + a with the input ``acceleration``
@@ -51,30 +52,32 @@ from quakedesign.plant.fault_plant import FaultPlant
 #
 # **Class rate.** Let |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and let friction depend on the slip alone. Shift p* by
 # φ/(β·b), with the β of the plant: a no longer contains φ, v becomes b(p − p*) + φ/β, and (φ/β)′ is added to d. As N̂
-# is constant, |β′| ≤ μ′·N̂|x2|/b with the largest slope μ′. So |d| ≤ D + Ḣ + κ(|e2| + r′), κ = H·μ′·N̂/b, because β ≥
-# 1. If friction depends on the slip rate as well, β may jump. Then p* is shifted by φ/(β0·b), (1 − β/β0)φ remains in a,
-# and φ′/β0 is added to d. As class amplitude includes class rate, the smaller of both bounds holds for every output.
+# is constant, |β′| ≤ μ′·N̂|x2|/b with the largest slope μ′. So |d| ≤ D + Ḣ + κH(|e2| + r′), D the bound of |d| without
+# φ, κ = μ′·N̂/b, because β ≥ 1. If friction depends on the slip rate as well, β may jump. Then p* is shifted by
+# φ/(β0·b), (1 − β/β0)φ remains in a, and φ′/β0 is added to d. As class amplitude includes class rate, the smaller of
+# both bounds holds for every output.
 #
 # **Initial state.** Let the loop start at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of at rest. By superposition |y(τ)| ≤
 # h_y,j + Σ_i g_yi,j·W_i(t), where h_y,j bounds |y| of the free response in part j from every such initial state
 # (`free_peaks`). So the initial state is one more input, ``start``, with F = 1, no c and the gains h. Its row of M is
 # zero, so the spectral radius does not change. The s_i contain the bounds of e1(0) and e2(0), and the response of the
 # law's states to its first measurement. All other initial values remain 0: p = 0, and p* = 0 at r = 0, as r(0) = r′(0)
-# = 0. In class rate φ(0) = 0, so the shift of p* is also 0. With a slowly varying gain, the loops of all β_i have the
-# same initial state. As t = 0 is included, the bounds of e1 and e2 are at least those of the initial errors, so E and R
-# also exceed these.
+# = 0. In class rate φ(0) = 0, so the shift of p* is also 0. With a slowly varying gain (below), the loops of all parts
+# of the range of β have the same initial state. As t = 0 is included, the bounds of e1 and e2, and with them the claims
+# E and R (below), are at least the bounds of the initial errors.
 #
 # **Noise.** Let a law measure e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples. Then the loop has two
 # more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c. They are any sequences within
 # these bounds. Measurements quantised in steps of q have errors of at most q/2.
 #
-# **Implicit step.** A law with the solution w of an implicit step is linear except for the sampled input ``root``, w_k
-# + γe1/T_s at the samples, γ the midpoint of the slopes: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε wherever |e1| ≤ E and |e2| ≤
-# R (`holds`). E and R are the claims themselves. Suppose that the claims follow from these bounds of the inputs. If all
-# samples of e before kT_s are within the claims, the inputs up to kT_s obey their bounds, as these samples alone
-# determine them. So e is within the claims up to kT_s and, as e is continuous, so is the sample at kT_s. By induction
-# all samples are. If there is noise, the step is solved for e1 + n1 and e2 + n2: E + N1 and R + N2 replace E and R, and
-# δγN1/T_s is added to ε. ∎
+# **Implicit step.** In this paragraph w is the solution of the implicit step, not the damping. By the sector bounds of
+# the last chapter −T_s·w/e1 lies between the slopes γ0 and γ1 up to ε; γ is their midpoint, δγ half their difference.
+# The law is linear except for the sampled input ``root``, w_k + γe1/T_s at the samples: |w_k + γe1/T_s| ≤ δγ|e1|/T_s +
+# ε wherever |e1| ≤ E and |e2| ≤ R (`holds`). E and R are the claims themselves. Suppose that the claims follow from
+# these bounds of the inputs. If all samples of e before kT_s are within the claims, the input ``root`` obeys its bound
+# up to kT_s, as it depends on these samples alone. So e is within the claims up to kT_s and, as e is continuous, so is
+# the sample at kT_s. By induction all samples are. If there is noise, the step is solved for e1 + n1 and e2 + n2: E +
+# N1 and R + N2 replace E and R, and δγN1/T_s is added to ε. ∎
 #
 # **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve pressure leave p_{k−1} within A
 # of the due time of p_k and move to p_k monotonically, within at most Θ and at a rate of at least |p_k − p_{k−1}|/Θ.
@@ -84,36 +87,36 @@ from quakedesign.plant.fault_plant import FaultPlant
 # valve pressure minus that of the nominal loop, and u_k = b(p_k − p_{k−1}), the output ``stepped``. Then b·|j| ≤ |u_k|,
 # and j is nonzero only from A before to A + Θ after the due time of p_k: the valve has p_k early, or p_{k−1} late. The
 # input ``late`` is b·j. It acts as the valve pressure does, with F = 0 and c = 1 for u_k. Let f be the share of the
-# step that is made at the due time of p_k. The areas of b|j| before and after that time are B and L times |u_k|: if the
-# step begins late, B = 0 and L ≤ A + Θ/2; if it begins early, B ≤ f·A and L ≤ (1 − f)²·Θ/2. So B/A + L/(A + Θ/2) ≤ 1
-# always, and ``late`` is a `Pulse`. v = b(p − p*) is that of the nominal loop, with p at the same time or at most A + Θ
-# before or after. In a time τ, b·p* changes by at most |d|τ; the bound of the output ``push`` (with a lag ``asked``)
-# includes this change for τ = A + Θ.
+# step that is completed by the due time of p_k. The areas of b|j| before and after that time are B and L times |u_k|:
+# if the step begins late, B = 0 and L ≤ A + Θ/2; if it begins early, B ≤ f·A and L ≤ (1 − f)²·Θ/2. So B/A + L/(A + Θ/2)
+# ≤ 1 always, and ``late`` is a `Pulse`. The true p is between values of the nominal p at times at most A + Θ before or
+# after. So v = b(p − p*) is bounded by that of the nominal loop plus the change of b·p* in this time, at most |d|(A +
+# Θ); the bound of the output ``push`` (with a lag ``asked``) includes it.
 #
 # An input at t may thus be bounded by outputs up to t + T_s. The theorem still holds: fix t, and let the nominal loop
 # continue after t without inputs, except those that stand for the timing error of a measurement or a pressure from
 # before t. They obey the same bounds, and there is none after t + T_s. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is
-# not larger. An implicit step uses a measured error, that is, e at a time up to which the bounds hold: E grows only by
-# N1 + J·r′, R by N2 + J·|r″|, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a weighted mean of e, with any
-# weights, over times within J of kT_s: the mean is as near to e(kT_s) as each value, and within the bounds if e is. ∎
+# not larger. An implicit step uses e at the time of the measurement, up to which the bounds hold. So E grows only by N1
+# + J·r′, R by N2 + J·|r″|, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a mean of e with non-negative weights
+# of sum 1 over times within J of kT_s: it obeys every bound that all these values obey. ∎
 #
 # **Slowly varying input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤
-# κ(2E + r′σ), σ = t − τ, while |e1| ≤ E, κ = μ′·N̂/b. Divide the range of β into parts with midpoints β_i and
+# κ(2E + r′σ), σ = t − τ, κ = μ′·N̂/b, while |e1| ≤ E. Divide the range of β into parts with midpoints β_i and
 # half-widths δ. Fix t, let β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ
 # + 2κE + κr′σ, and σ ≤ e^{ασ}/(eα) for every α > 0. So (β − β_i)v is bounded by two terms: (δ + 2κE)|v|, as before with
 # a smaller c, and ``aged``, an input that enters as a does, with c = κr′/(eα) for v. The gains of ``aged`` are those of
-# the loop with A + α in place of A, whose responses are e^{ασ} times as large. All gains are the largest over the
-# parts. E is the claim on the slip error, which must exceed the resulting bound: e1 is continuous and initially below
-# E, so it never reaches E. ∎
+# the loop with α added to the diagonal of its flow matrix, whose responses are e^{ασ} times as large. All gains are the
+# largest over the parts. E is the claim on the slip error, which must exceed the resulting bound: e1 is continuous and
+# initially below E, so it never reaches E. ∎
 #
-# **Diffusion path.** The pressure in the fault is that of the modes, v, plus their truncation error R, |R| ≤ sup|y|
-# with the output y = ``left_out`` (`loop.diffusion_layer`). Of β(v + R) the loop contains β0·v and, with x2 = e2 − β0Y
-# in place of e2 (`loop.diffusion_layer`), the known part of β0·R. So (β − β0)R enters x2′ as a does; its c for y is
-# that of a for v. If the well pressure is continuous, this is part of a. If it has steps, R decays after every step and
-# is a separate input. With a slowly varying gain, past values of R are treated as those of v, with the same c. There
-# are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0Y in e1′ and x2′, and ``awaited_told``, its effect on
-# the measurement at the samples, which acts as noise does, as e2 is measured, not x2. The bound of e2 is that of x2
-# plus that of β0Y: the gain of ``awaited`` and its direct feedthrough. ∎
+# **Diffusion path.** In this paragraph R is b times the truncation error of the modes [m/s²], |R| ≤ sup|y| with the
+# output y = ``left_out``, and bY is its integral as in `loop.diffusion_layer`. Of β(v + R) the loop contains β0·v and,
+# with the state e2 − β0·bY in place of e2, the known part of β0·R. So (β − β0)R enters as a does; its c for y is that
+# of a for v. If the well pressure is continuous, this is part of a. If it has steps, R decays after every step and is a
+# separate input. With a slowly varying gain, past values of R are treated as those of v, with the same c. There are two
+# more inputs, with F = 0 and c = 1 for y: ``awaited``, β0·bY in the derivatives of e1 and of that state, and
+# ``awaited_told``, its effect on the measurement at the samples. It acts as noise does, because e2 is measured, not
+# that state. The bound of e2 is that of the state plus that of β0·bY, the direct feedthrough of ``awaited``. ∎
 
 _ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
@@ -124,7 +127,7 @@ _WORDS = {
     ("aged", "push"): "change of the input gain",
     ("drift", "slip_rate_error"): "drift of the disturbance due to the input gain",
     ("root", "slip_error"): "range of the implicit step's slope",
-    ("late", "stepped"): "jitter or rise of the pressure",
+    ("late", "stepped"): "jitter, or the duration of a pressure change",
     **{("rate_noise", output): "jitter of the measurement" for output in OUTPUTS},
     ("slip_noise", "slip_rate_error"): "jitter of the measurement",
 }
@@ -170,7 +173,7 @@ def certified_bounds(
     noise: Mapping[str, Fraction] = NOISELESS,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
-    """Bounds of the theorem for the nominal loop of a task.
+    """Bounds of the theorem for the nominal loop of a fault on its reference.
 
     `noise` gives the bounds of the noise inputs in SI units, `jitter` the bound J of measurement times [s].
 
@@ -382,7 +385,7 @@ def slow_gains(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
     Raises
     ------
     ParameterError
-        When one of the loops, with A or with A + α, is not proved to be stable.
+        When one of the loops, with its flow matrix or with α added to the diagonal, is not proved to be stable.
     """
     of_parts = [norms(loop) | norms(grown(loop, growth)) for loop in loops]
     return {key: tuple(chain.from_iterable(gains[key] for gains in of_parts)) for key in of_parts[0]}
@@ -402,10 +405,10 @@ def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
 # −γ1·u − ε ≤ w ≤ −γ0·u + ε. The mirrored bounds hold where e1 ≤ 0.
 #
 # **Proof.** F(w) = w − e2 + q is strongly monotone, so w ≤ ω wherever F(ω) contains a non-negative number. For e2 ≤ R
-# and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the lower bound is the upper
-# bound for −e1: ω = ε + γ1·u, e1 + T_s·ω = T_s(ε − (1 − γ1)u). On a part of the range of u both arguments of q are at
-# least the smaller of their values at its ends, and q is non-decreasing, with ⌈0⌋⁰ taken as 1. Parts are halved until
-# this shows ω − R + q ≥ 0 on each, or until they are too small. ∎
+# and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the lower bound for e1 is
+# minus the upper bound for −e1, where ω = ε + γ1·u and −e1 + T_s·ω = T_s(ε − (1 − γ1)u). On a part of the range of u
+# both arguments of q are at least the smaller of their values at its ends, and q is non-decreasing, with ⌈0⌋⁰ taken as
+# 1. Parts are halved until this shows ω − R + q ≥ 0 on each, or until they are too small. ∎
 
 Range = tuple[Fraction, Fraction]
 

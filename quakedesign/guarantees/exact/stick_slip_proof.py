@@ -90,8 +90,8 @@ class StickSlipProof(Proof[StickSlipClaims]):
         """
         if self.held.law.pull:
             raise UnsupportedError(
-                "a certificate of a sliding mode states its implicit step, got no gains of a law: use the controller "
-                "of the design, or recovered of the certificate"
+                "a certificate of a sliding mode states its implicit step, not the gains. Use the controller of the "
+                "design, or run the file with simulate --certificate."
             )
         return laws.StickSlipController(law=self.held.law, step=self.held.step, longest=self.held.longest_step)
 

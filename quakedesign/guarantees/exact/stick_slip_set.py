@@ -18,51 +18,56 @@ and ξ ≥ 0 at its end, or the *rest* map with a slip δ until the last stop.
 linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
 bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
-**Rest map.** With f(t) = (1 − e^{−w(m−t)})/w, m = θT, integration by parts gives δ = f(0)y + ∫f·(G + φ)dt up to the
-stop. Before it G ≤ −H + |S⁻|(δ − ξ), and the difference of both decreases with the slip. So
+**Rest map.** Let m = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(m−t)})/w. As y
+= 0 at the stop, integration by parts gives δ = f(0)y + ∫f·(G + φ)dt up to the stop. Before the stop G ≤ −H + |S⁻|(δ −
+ξ), and this bound minus G decreases with the slip. So
 
     δ·(1 − |S⁻|T²/2 − ε) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
 
-for every θ with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping and ε the width of its range times (e^{wx} − 1)/w. Moreover,
-G(δ) ≤ −H gives the condition of rest, b·β_max·U ≥ H − |S⁻|δ.
+with ε the width of the range of the damping times (e^{wx} − 1)/w. Moreover, G(δ) ≤ −H gives the condition of rest,
+b·β_max·U ≥ H − |S⁻|δ.
 
-The possible δ and U depend on r′ at the sample. This condition uses the U of the least r′, so that the ends of r′
-suffice.
+The possible δ and U depend on r′ at the sample. The condition of rest is taken at the least r′, where it is weakest; so
+both ends of the range of r′ suffice.
 
-**Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. Where a facet function decreases
-with this difference and is evaluated at r′ = 0, the difference may be 0 for r′ up to max|r″|T/2.
+**Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. It may be 0 for r′ up to max|r″|T/2. So
+where a facet function n_l·z after the period decreases with it, the end r′ = 0 stands for all these r′.
 
-**Input gain.** For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ + (|n3·s|ψ/b)·ξ,
-with M the chord of m1 and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1 the chord of β·m1
-may stand for β·M if the term −bβU·X1 of the last ξ is omitted; the same holds for J. Where U < 0 replace m1 by the
-chord of β·m1, over β: all terms with U are convex in β. So |n3·s|ψ/b counts with y and H alone.
+**Input gain.** Let m1 be the factor of ξ in a facet function after a slide, M·ξ the bound used for m1·ξ, X1 the slip
+due to a constant unit force, and J the addition of the ranges to the factor of H − bβU (FORMAT.md, *Sliding map*). For
+β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ + (|n3·s|ψ/b)·ξ, with M the chord of m1
+and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1 the chord of β·m1 may stand for β·M if
+the term −bβU·X1 of the last ξ is omitted; the same holds for J. Where U < 0 replace m1 by the chord of β·m1, over β:
+all terms with U are convex in β. So |n3·s|ψ/b counts with y and H alone.
 
 **Sliding mode.** The target rate is r′ + w, w the solution of the implicit step. That step is shown to be deadbeat, w =
 −e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
 1/T, whose states stay in the polytope.
 
-**Law.** `StickSlipLaw`; d = D_level + p*(x1) also changes by −σξ [Pa], σ = S_chord/(bβ). State at the samples: z = (e1,
-y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0} is invariant if no facet function exceeds 1 after either map. Its largest value
-is that of a linear function on a polytope, bounded by multipliers of three or four constraints, which a file names.
+**Law.** The law is `StickSlipLaw`, D its level. In a period d = D + p*(x1) changes by the law's update of D and, as p*
+changes with the slip, by −σξ [Pa], σ = S_chord/(bβ). State at the samples: z = (e1, y, d). A polytope {z: n_l·z ≤ 1, y
+≥ 0} is invariant if no facet function exceeds 1 after either map. Its largest value is that of a linear function on a
+polytope, bounded by multipliers of three or four constraints, which a file names.
 
 **Noise.** The measured slip is x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is measured exactly, including whether it
 is 0. Let e1 be the slip minus the reference plus N, and let d exclude m·n of its own sample, m and c the slip and
-return gains. Then this noise acts in one period alone: v is that of a reference at the rate r′ + c(N − n), in [0, max
-r′ + 2cN], which moves up to 2cNT less than that, and U is m·n larger. Where the innovation is limited, it adds between
-−mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, never less than without limit; otherwise d contains no noise. Initially e1
-= N, and d = 0 as x⁻ = 0 and the first innovation, n, is not limited; d from 0 to m·N is checked.
+return gains. Then this noise acts in one period alone: v is the target rate for r′ + c(N − n) in place of r′, a value
+in [0, max r′ + 2cN]; the reference moves up to 2cNT less than T times this value; U is m·n larger. Where the innovation
+is limited, it adds between −mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, never less than without limit; otherwise d
+contains no noise. Initially e1 = N and d = 0, as x⁻ = 0 and the first innovation, n, is not limited. All d from 0 to
+m·N are required to lie in the polytope.
 
 **Aperiodic sampling.** Each interval between samples is any h from T to T_m; T is a constant of the law. The bound of a
 facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|m(h − s)ds over [0, h]. Here g is its
 response to an impulse, and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. m ≥ 0 is
-required up to T_m, so that V is one function for all h, not only for the state's own h. g is Lipschitz, so V″ ≥ −B
-almost everywhere, and V is below its chord over Δ plus Δ²B/8: bounds at five intervals suffice, with B from |l″|,
-|g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so both ends suffice. A shorter
+required up to T_m, also beyond the interval that follows the state, so that one formula of V holds for all h. g is
+Lipschitz, so V″ ≥ −B almost everywhere, and V is below its chord over Δ plus Δ²B/8: bounds at five intervals suffice,
+with B from |l″|, |g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so both ends suffice. A shorter
 period that ends at rest can be extended to T_m, as nothing releases the block in the added time; so the bound of T_m on
 the slip until a stop covers it.
 
-**Peaks.** Between samples y stays below the larger of its values at both ends, the latter under the largest force, as
-y″ = −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
+**Peaks.** Between samples y stays below the larger of its values at both ends, the later one under the largest force,
+as y″ = −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -94,8 +99,8 @@ _FLAT = 1e-12  # volume below which the normals of a vertex count as dependent
 _NEAR = 1e-6  # relative distance of a proposed vertex from its polytope
 _ZERO = Fraction(0)
 
-# Slices of e1 at 0 and at max r′/c, and for each combination the slice, whether the target rate v is
-# positive, and r′ = q1·c·e1 + q0·max r′.
+# e1 is cut into slices at 0 and at max r′/c, c the return rate. A combination is (slice, whether the target rate v is
+# positive, q1, q0), with r′ = q1·c·e1 + q0·max r′.
 SLICES = 3
 COMBINATIONS = (
     (0, True, 0, 0),
@@ -121,9 +126,10 @@ class StickSlipPolytope:
     facets : tuple of rows
         n_l, three entries each [1/m, s/m, 1/Pa]; each of the first five bounds one of +e1, y, +d, −e1, −d.
     multipliers : tuple of rows
-        For each facet: multiplier of y ≥ 0 at the end of a period [s/m], 0 or more; whether negative factors of ξ and
-        of y there are set to 0, as ξ ≥ 0 and y ≥ 0 (0 or 1); the same two for a limited innovation, with y = 0 and a
-        multiplier of either sign; weight of the innovation at rest, from 0 to 1.
+        Five numbers for each facet. First: multiplier of y ≥ 0 at the end of a period [s/m], 0 or more. Second: 1 to
+        set negative factors of ξ and y there to 0, as ξ ≥ 0 and y ≥ 0; else 0. Third and fourth: the same two for a
+        limited innovation, where y = 0 and the multiplier may have either sign. Fifth: weight of the innovation at
+        rest, from 0 to 1.
     sliding : tuple of tuple of Basis
         For each of the 3 slices its vertices, each by the indices of three constraints: facets, then y ≥ 0, then the
         ends of the slice.
@@ -627,7 +633,7 @@ class _Carried:
     standstill: np.ndarray  # largest r′ at which r may stand still, where r′ counts as 0 and n1 > 0
 
     def moved(self, pushed: np.ndarray | int, which: np.ndarray) -> np.ndarray:
-        """Contribution of r′ while the reference stands still; the plant adds a factor of −r′."""
+        """Contribution of r′ where the reference may stand still; `pushed` is the plant's factor of −r′."""
         rising = self.rising[which] - pushed
         return np.asarray(self.standstill[which] * (rising + abs(rising)) / 2)
 
@@ -740,7 +746,7 @@ def resting_rows(
                 a1, a3 = n1[which], n3[which]
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
                 constants = part.constant[which] + part.moved(0, which)
-                if share is None:  # n3 <= 0: the limit may reduce the innovation by this
+                if share is None:  # n3 <= 0: a limited innovation is at least -T·v⁺/2 minus this
                     constants = constants + (cut_off - a3 * slip) * number(held.law.rest_slip + 2 * held.slip_noise)
                 factors = np.column_stack([part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off])
                 yield Rows(SLICES + part.place, which, factors, constants)
@@ -915,7 +921,7 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
                 kind = "slides" if rows.place < SLICES else "ends at rest"
                 raise ParameterError(f"the state may leave the polytope through facet {facet} in a period that {kind}")
     if _bracket(task, held, plant, push[1]) > task.amplitude:
-        raise ParameterError("the disturbance is too small against what the range of the input gain makes of U")
+        raise ParameterError("the amplitude of the disturbance is too small for this range of the input gain")
     return StickSlipClaims(
         slip_behind=UpperBound(behind),
         slip_ahead=UpperBound(before),
@@ -926,9 +932,9 @@ def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) 
 
 
 def _bracket(task: FaultPlant, held: SampledStickSlip, plant: Ranges, push: Fraction) -> Fraction:
-    """Largest loss [m/s²] in |a| ≤ H + δS·ξ + δw·y if ξ, y and U belong to different β.
+    """Largest decrease [m/s²] of the bound H + δS·ξ + δw·y of |a| if ξ, y and U belong to different β.
 
-    If this loss is below H, the bound of |a| is not negative at either end of β, also where the response of a facet
+    If this decrease is below H, the bound of |a| is not negative at either end of β, also where the response of a facet
     changes sign between them. For aperiodic sampling all of U counts, over the longest interval.
     """
     step, growth = held.longest, 1 / (1 - plant.slope[1] * held.longest**2 / 2)

@@ -39,10 +39,11 @@ from quakedesign.sos.exact.work_budget import limited
 # ----------------------------------------------------------------------
 # Regions of attraction by a Lyapunov function: the claim about a polynomial field, and the check of its proof.
 #
-# V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite. If the bases of the squares of V
-# contain a pure power of every state, V is positive except at the origin and radially unbounded. If the bases of σ_0
-# and σ_1 contain one of every state, V̇ < 0 where V < level, except at the origin. Then {V < level} is bounded and
-# invariant, and every solution in it tends to zero.
+# V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite and a polynomial μ whose
+# coefficients show that it is positive. If the bases of the squares of V contain a pure power of every state, V is
+# positive except at the origin and radially unbounded. If the bases of σ_0 and σ_1 contain one of every state, V̇ < 0
+# where V < level, except at the origin. Then {V < level} is bounded and invariant, and every solution in it tends to
+# zero.
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -277,7 +277,7 @@ def scaled(statement: Statement) -> Scaled:
 
 
 def decimal_units(scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Scales over the nearest powers of ten: the decimal units in which simple numbers are sought."""
+    """Scales divided by the nearest powers of ten: units in which points with few decimal digits are sought."""
     return tuple(s / Fraction(10) ** round(_log2(s) / math.log2(10)) for s in scale)
 
 

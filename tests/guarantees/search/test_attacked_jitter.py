@@ -160,6 +160,6 @@ def test_a_pump_is_as_slow_as_it_may_be_where_it_has_a_ramp_that_closes():
     slower = replace(claim.held, pump=Pump(rate=F(1_000_000)), ramp=F(0))
     none = guarantee(claim.task, slower, claim.slow_gain)
     assert isinstance(none, NoProof)
-    assert "jitter or rise of the pressure contributes" in none.reason
+    assert "jitter, or the duration of a pressure change contributes" in none.reason
     narrow = replace(claim, held=replace(claim.held, pump=Pump(rate=claim.held.pump.rate * F(9, 10))))
     assert narrow.check() is Verdict.UNDECIDED
