@@ -90,7 +90,7 @@ def test_the_answer_tells_the_least_bound_of_the_differentiator():
     assert F(found.to_dict()["differentiator_bound"]) == bound
     assert found.to_dict()["measured"] == "differentiator"
     (said,) = [line for line in found.lines() if "differentiator" in line]
-    assert f"for lambda_d of {UpperBound(bound):.3g} m/s^3 or more it is (3x - 4x_1 + x_2)/(2 T_s)" in said
+    assert f"for lambda_d of {UpperBound(bound):.3g} m/s^3 or more this estimate is (3 x - 4 x_1 + x_2)/(2 T_s)" in said
 
 
 @pytest.mark.slow
