@@ -29,9 +29,11 @@ PLANTS = [p for p in FILES if p.stem.startswith("uncertain_plant")]
 LOOPS = [p for p in FILES if p not in (*POLYNOMIALS, *GUARANTEES, *SLIDING, *STICKING, *PLANTS)]
 each = pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
 # a proof of each kind is checked by both elsewhere
-LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01", "uncertain_plant_pendulum"}
+LONG = {"sliding_crustal-patch", "cta3_1_2_2_0.05_0.02_0.01", "dia_1_20_1_0", "uncertain_plant_pendulum"}
 LONG |= {f"stick_slip_{loop}real-fault" for loop in ("", "cta_", "aperiodic_")}
-each_loop = pytest.mark.parametrize("path", LOOPS, ids=lambda p: p.stem)
+each_loop = pytest.mark.parametrize(
+    "path", [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in LONG)) for p in LOOPS]
+)
 
 # L̄ and [b_m, b_M] of every file; four 2-CTA sets are those of Torres-González et al. (2017) for L̄ = 1, the fifth and
 # the 2-DIA set of the same bound are the smallest that a synthesis found

@@ -163,7 +163,7 @@ def test_no_plant_that_ends_at_rest_is_beyond_its_bound(facet, noisy):
         assert (rows @ points - limits[:, None])[-7:, mine].max() <= SLACK  # condition of rest, slip until the stop
 
 
-@pytest.mark.parametrize("apart", [6, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("apart", [8, pytest.param(2, marks=pytest.mark.slow)])
 def test_bounds_at_the_intervals_that_decide_hold_for_all_between(apart):
     """Beside a grid of intervals, where the bounds of some facets are larger than at the intervals that decide."""
     p, (before, place, *_) = period("aperiodic"), courses(1, "aperiodic")

@@ -39,7 +39,7 @@ def comparison(kept):
         patch.setattr("quakedesign.studies.comparison.assess", undecided)  # verdicts on them are another test's
         for name in ("longest_step", "longest_delay"):  # and so is how far other designs go
             patch.setattr(f"quakedesign.guarantees.search.default_designs.{name}", lambda *_, **__: None)
-        yield qd.compare(fault, [qd.design(fault, "elqr")])
+        yield qd.compare(fault, [qd.design(fault, "elqr", plant="printed")])
 
 
 def test_all_controllers_of_the_paper_and_all_designs_are_compared(comparison):
