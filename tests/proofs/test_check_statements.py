@@ -396,7 +396,7 @@ def test_the_limits_are_those_of_the_format():
     for limit in (
         f"file {exact_numbers.MAX_BYTES // 2**20} MiB; nesting {exact_numbers.MAX_NESTING}; {loops.MAX_STATES} states",
         f"{loops.MAX_UNCERTAIN} uncertain parameters; {loops.MAX_NUMBERS} gains and constants",
-        f"{loops.MAX_TERMS} terms a state",
+        f"{loops.MAX_TERMS} terms for each state",
         f"exponents at most {loops.MAX_EXPONENT}; {stability.MAX_OBLIGATIONS} obligations",
         f"basis of {squares.MAX_BASIS};",
         f"{loops.MAX_PARAMETERS} parameters in a term; {loops.MAX_ROOTS} roots; {loops.MAX_LIFTS} lifts",

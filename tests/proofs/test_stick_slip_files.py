@@ -343,7 +343,7 @@ def test_the_disturbance_must_outweigh_the_range_of_the_input_gain(path, share, 
         period.verify()
         package.stick_slip_bounds(claim.task, claim.held, claim.reach)
         return
-    with pytest.raises(CHECK.Refused, match="outweigh the range of the input gain"):
+    with pytest.raises(CHECK.Refused, match="be at least the effect of the range of beta"):
         period.verify()
     with pytest.raises(ParameterError, match="too small for this range of the input gain"):
         package.stick_slip_bounds(claim.task, claim.held, claim.reach)

@@ -1,7 +1,8 @@
 """Verify certificate files of the kind ``slow_sliding`` (FORMAT.md) with the Python standard library alone.
 
 From a fault with rate-and-state friction, ranges of its constants, and a controller's matrices to a bound on the slip
-rate. The pressure's path, the impulse responses and the small gain are those of the kind ``guarantee``.
+rate. The pressure's path, the impulse responses and the small gain are those of the kind ``guarantee``. Symbols are
+those of FORMAT.md: y and z are the logarithms of slip rate and state, x is the slip error, q = p - p*.
 """
 
 from dataclasses import dataclass, replace
@@ -52,7 +53,7 @@ class Fault:
         return self.stiffness * self.rate
 
     def drift(self) -> Fraction:
-        """Bound of the rate of the required pressure minus the planned one."""
+        """Bound of the rate of change of p* minus that of the planned pressure, `ramp`."""
         return (1 + self.swing) * max(abs(self.load() / mu - self.ramp) for mu in self.box["coefficient"])
 
     def normal(self, push: Fraction) -> Range:
@@ -100,7 +101,7 @@ def read_fault(document: dict[str, Any]) -> Fault:
 
 
 def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
-    """Cut the box: a cut, then all of its lower part, then all of its upper part; an empty list for no cut."""
+    """Cells of the box. After a cut come the entries of its lower part, then those of its upper; [] is a cell."""
     need(type(value) is list and len(value) < 2 * MAX_CELLS, f"there must be 1 to {MAX_CELLS} cells")
     open_boxes, cells = [box], []
     for entry in value:
@@ -275,7 +276,7 @@ def around(loop: Loop, cell: Cell) -> Loop:
 
 
 def since_step(loop: Loop) -> Row:
-    """Times since a step reached the well at the beginning of every piece; all 0 where none does."""
+    """Time since the last step reached the well, at the beginning of every piece; 0 if the well has no steps."""
     starts = list(accumulate((length for _, length in loop.events), initial=Fraction(0)))
     if not loop.fade:
         return [Fraction(0)] * (len(loop.events) * (len(loop.cuts) - 1))
@@ -288,7 +289,10 @@ def since_step(loop: Loop) -> Row:
 
 
 def found_gains(loop: Loop, cell: Cell, times: Row, late: Fraction) -> list[list[Row]]:
-    """Gains by input, output and piece, with direct terms; soon after a step, those before it."""
+    """Gains by input, output and piece, with direct terms.
+
+    A piece that begins less than `late` after a step of the well has the gains of the piece before the step.
+    """
     noisy = len(loop.inputs) - 1 - bool(loop.fade) if cell.path.noise else None
     fades = len(loop.inputs) - 1 if loop.fade else None
     last = times.index(max(times))
@@ -380,9 +384,8 @@ def statement(
     when = f"every {loop['step']} s, {loop['delay']} s late, lag {loop['lag']} s"
     when += f", diffusion path of distance^2/diffusivity = {loop['diffusion']} s"
     off = f", measured slip within {loop['slip_noise']} m of the true one" if loop["slip_noise"] != "0" else ""
-    along = (
-        f", along any reference whose rate stays within (1 +- {lower(fault.swing)}) times that" if fault.swing else ""
-    )
+    along = f", along any reference whose rate stays within (1 +- {lower(fault.swing)}) times this slip rate"
+    along = along if fault.swing else ""
     peak = fault.rate * power_of_e(claims["log_rate"])
     needed = fault.stiffness * fault.distance / fault.box["coefficient"][0]
     at = {"in the fault": claims["push"], "at the valve": claims["asked"]}

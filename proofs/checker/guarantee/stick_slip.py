@@ -1,7 +1,8 @@
 """Verify certificate files of the kind ``stick_slip`` (FORMAT.md) with the Python standard library alone.
 
 From a stick-slip fault, a sampled law and a polytope of its states to bounds on slip, slip rate and pressure for all t.
-Whether the fault slides through a period or ends it at rest, no facet may exceed 1 at its end.
+Whether the fault slides through a period or ends it at rest, no facet may exceed 1 at its end. Symbols are those of
+FORMAT.md.
 """
 
 from collections.abc import Iterator
@@ -29,7 +30,7 @@ Range = tuple[Fraction, Fraction]
 
 @dataclass(frozen=True)
 class End:
-    """In a slice of e1 an end of the reference's rate r' = of_error·e1 + constant, the target rate's sign being one."""
+    """An end r' = of_error·e1 + constant of the range of the reference's rate, for a slice of e1 and a target sign."""
 
     place: int
     positive: bool
@@ -120,7 +121,7 @@ def read_reach(value: Any) -> Reach:
         need(alone, "the first five facets must bound +e1, +y, +d, -e1 and -d alone")
     for row in multipliers:
         sound = row[0] >= 0 and row[1] in (0, 1) and row[3] in (0, 1) and 0 <= row[4] <= 1
-        need(sound, "the five multipliers must be >= 0, 0 or 1, any number, 0 or 1, and in [0, 1]")
+        need(sound, "the five multipliers must be, in order: >= 0; 0 or 1; any number; 0 or 1; in [0, 1]")
     sliding = read_bases(given["sliding"], "sliding", 3, (many + 2, many + 3, many + 2))
     tall = [many + more for more in (10, 10, 11, 11, 11, 10, 10)]
     resting = read_bases(given["resting"], "resting", 4, tuple(tall))
@@ -130,7 +131,7 @@ def read_reach(value: Any) -> Reach:
 
 
 def read_bases(value: Any, where: str, size: int, counts: tuple[int, ...]) -> list[list[list[int]]]:
-    """For every polytope bases of so many constraints, each the number of one."""
+    """Read the bases of every polytope: lists of `size` numbers of constraints, of which it has `counts`."""
     need(type(value) is list and len(value) == len(counts), f"{where} must have {len(counts)} lists of bases")
     for line, count in zip(value, counts, strict=True):
         need(type(line) is list and bool(line), f"{where} must have bases of every polytope")
@@ -150,7 +151,7 @@ class Period:
         self.task, self.law, self.reach = task, law, reach
         self.bend, self.force = task.reference_acceleration, task.amplitude
         self.rate = task.reference_rate + law.excess  # as the law measures it
-        self.still = self.bend * law.longest_interval / 2 + law.excess  # largest r' of a constant reference
+        self.still = self.bend * law.longest_interval / 2 + law.excess  # largest r' with which it may stand still
         ahead, self.peak, up, behind, down = (1 / abs(sum(row)) for row in reach.facets[:5])
         self.ahead, self.behind, self.level = ahead, behind, max(up, down)
         zero, one = Fraction(0), Fraction(1)
@@ -176,7 +177,7 @@ class Period:
         self.find_curvature()
 
     def pushes(self) -> Range:
-        """Least and largest U of the set."""
+        """Least and largest U = p* - p at a sample, over the set."""
         law = self.law
         row = [law.target * law.back, law.rate, Fraction(1)]
         high = max(p.largest(Function(row, Fraction(0), [NOTHING] * 3)) for p in self.flat)
@@ -277,7 +278,7 @@ class Period:
         return [law.target * (law.back - end.of_error), law.rate, Fraction(1)], -law.target * end.constant
 
     def carried(self, facet: Row, end: End, interval: Fraction) -> tuple[Fraction, Fraction, Fraction]:
-        """A facet after law and reference: factor of e1, constant, and factor of r' where the end takes r' as 0."""
+        """Effect of law and reference on a facet: factor of e1, constant, factor of r' if it may stand still."""
         law, (n1, _, n3) = self.law, facet
         predicted = n3 * (law.level + law.slip * law.step / 2)
         sign = int(end.positive)
@@ -344,7 +345,8 @@ class Period:
     def resting(self) -> list[tuple[Polytope, list[End]]]:
         """For each slice and sign of the target rate the states and slips that may end at rest, and the ends of r'.
 
-        The condition of rest is that of the least r': the slip before a stop may be there for some r' alone.
+        The condition of rest is taken at the least r', where it is weakest, as a given slip may end at
+        rest for some r' only.
         """
         stops, zero = self.stops(), Fraction(0)
         most, found = self.task.beta[1] * self.task.b, []
@@ -388,17 +390,17 @@ class Period:
                 for cut in (False, True) if facet[2] > 0 else (False,):
                     for place, function in self.sliding(facet, multipliers, cut):
                         within = self.flat[place].largest(function, which) <= ONE
-                        need(within, f"facet {which} must hold after a sliding period. It may not")
+                        need(within, f"facet {which} must hold after a sliding period. It is not shown to")
         for polytope, ends in self.resting():
             for which, (facet, multipliers) in given:
                 for end in ends:
                     for function in self.stopped(facet, multipliers, end):
                         within = polytope.largest(function, which) <= ONE
-                        need(within, f"facet {which} must hold after a period that ends at rest. It may not")
+                        need(within, f"facet {which} must hold after a period that ends at rest. It is not shown to")
         step, least = self.law.longest_interval, Fraction(0 if self.law.longest else 1)
         share = self.per_slip * step**2 / 2 + self.per_rate * step * (1 + self.slope[1] * self.growth * step**2)
         spread = self.task.b * (self.task.beta[1] - least) * max(self.push[1], Fraction(0))
-        need(share * spread <= self.force, "the disturbance must outweigh the range of the input gain")
+        need(share * spread <= self.force, "the disturbance must be at least the effect of the range of beta")
 
     def bounds(self) -> dict[str, Fraction]:
         """Bounds that follow from the set, by claims."""
@@ -451,7 +453,8 @@ def verify(document: dict[str, Any]) -> list[str]:
         slip = max(found["slip_behind"], found["slip_ahead"]) + law.slip_noise
         rate = max(found["peak_slip_rate"], task.reference_rate)
         deadbeat = Root(law.pull, [Fraction(1), Fraction(1)], Fraction(0))
-        need(root_within(deadbeat, law.step, slip, rate), "the implicit step must be deadbeat in the set. It may not")
+        shown = root_within(deadbeat, law.step, slip, rate)
+        need(shown, "the implicit step must be deadbeat in the set. It is not shown to be")
     period.verify()
     return [*statement(document, period, claims), *entries(document)]
 
