@@ -299,7 +299,7 @@ def test_both_build_the_same_loop_in_continuous_time():
 FORWARD = ("reference_acceleration", "reference_jerk")
 HEARD = (NOISES, NOISES[:1], NOISES[1:], ("root", *NOISES), ("root", "slip_noise"))
 REFERENCE = ("reference", "reference_rate")  # never with an implicit step
-OFF = ((*NOISES, "late"), ("slip_noise", "late"), ("root", *NOISES, "late"), ("late",))
+OFF = ((*NOISES, "late"), ("root", *NOISES, "late"), ("slip_noise", "late"), ("late",))
 OFF += (REFERENCE, (*REFERENCE, *NOISES, "late"))
 AT_SAMPLES = ("root", "reference_rate", *NOISES)
 

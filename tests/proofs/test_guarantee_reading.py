@@ -589,5 +589,18 @@ def test_points_and_what_is_narrower_than_fifteen_digits_are_shown_exactly():
         assert F(checker.inside(value, value).removeprefix("= ")) == value == F(shown)
     assert checker.inside(F(1, 125), F(1, 125)) == "= 0.008"
     assert checker.inside(F(1, 3), F(1, 3)) == "= 1/3"
-    low, high = F(1, 3), F(1, 3) + F(1, 10**20)
-    assert checker.inside(low, high) == f"in [{low}, {high}]"
+    for digits in (15, 16):
+        long = F(int("1234567890123456"[:digits]), 10**20)
+        assert checker.exact(long) == (f"{float(long):.15g}" if digits == 15 else str(long))
+    for width in (F(1, 10**20), F(4, 10**16)):
+        low, high = F(1, 3), F(1, 3) + width
+        assert checker.inside(low, high) == f"in [{low}, {high}]"
+    assert checker.inside(F(1, 3), F(1, 3) + F(25, 10**16)) == "in [0.333333333333334, 0.333333333333335]"
+    assert checker.inside(F(1, 3), F(2, 3)) == "in [0.3334, 0.6666]"
+
+
+@pytest.mark.parametrize("bounds", [("0", "0"), ("-1", "0"), ("-1", "2"), ("2", "-1")])
+def test_bounds_of_a_start_are_not_negative_and_one_is_above_zero(bounds):
+    with pytest.raises(checker.Refused, match="bounds of the start must be >= 0"):
+        checker.read_start(dict(zip(("slip", "rate"), bounds, strict=True)))
+    assert checker.read_start({"slip": "0", "rate": "2"}) == [0, 2]

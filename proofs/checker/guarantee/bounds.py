@@ -144,7 +144,10 @@ def peaks_of(found: list[list[list[Fraction]]], own: Row, shares: list[Row]) -> 
 
 def solve(table: list[Row], own: Row) -> Row:
     """(1 − M)^-1 F by elimination: M >= 0 has all pivots positive if, and only if, its spectral radius is below 1."""
-    lines = [[(i == j) - v for j, v in enumerate(line)] + [own[i]] for i, line in enumerate(table)]
+    lines = [
+        [*((i == j) - v for j, v in enumerate(line)), bound]
+        for i, (line, bound) in enumerate(zip(table, own, strict=True))
+    ]
     for i, line in enumerate(lines):
         need(line[i] > 0, "the small gain must be below 1")
         line[:] = [v / line[i] for v in line]

@@ -63,7 +63,7 @@ def upper(value: Fraction, digits: int = 4) -> str:
     while abs(shown := -(-value // Fraction(10) ** exponent)) >= 10**digits:
         exponent += 1
     if abs(exponent) > 300:  # beyond what a float holds
-        return f"{shown}e{exponent}" if shown else "0"
+        return f"{shown}e{exponent}"
     return f"{float(f'{shown}e{exponent}'):.{digits}g}"
 
 

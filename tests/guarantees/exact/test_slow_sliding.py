@@ -343,9 +343,9 @@ def test_regularised_friction_differs_from_its_logarithm_by_no_more_than_is_adde
 
 
 def test_regularised_friction_that_may_come_near_zero_is_refused_by_both():
-    """2m/a is 1 at an effect of 1/2 for Y = Z = 1/10 where mu* = 0.3015."""
+    """2m/a is 1 at the largest effect, 1/2, for Y = Z = 1/10 where mu* = 0.3015."""
     for coefficient, refused in (("0.3015", False), ("0.3014", True)):
-        ranges = {**UNSURE, "direct_effect": (F(1, 2),) * 2, "evolution_effect": (F("0.015"),) * 2}
+        ranges = {**UNSURE, "direct_effect": (F(2, 5), F(1, 2)), "evolution_effect": (F("0.015"),) * 2}
         ranges["coefficient"] = (F(coefficient),) * 2
         one, given = task(ranges=ranges, regularised=True), claims("1/10", "1/10")
         assert (small_gain.model_of(one, given) is None) is refused
@@ -534,8 +534,9 @@ def test_no_more_than_64_cells_are_read():
     assert len(cells(many, (*cuts[:126], None))) == len(standalone.read_cells([*entries[:126], []], many.ranges)) == 64
     with pytest.raises(ParameterError):
         cells(many, (*cuts, None))
-    with pytest.raises(checker.Refused):
-        standalone.read_cells(entries, dict(many.ranges))
+    for beyond in (entries, [[]] * 128):
+        with pytest.raises(checker.Refused, match="there must be 1 to 64 cells"):
+            standalone.read_cells(beyond, dict(many.ranges))
 
 
 SWINGING = replace(
@@ -751,6 +752,9 @@ def test_logarithms_above_3_are_refused_by_both_for_that_reason(name):
         checker.check(text)
     with pytest.raises(CertificateError, match="log_rate and log_state at most 3"):
         parse_guarantee(text)
+    with pytest.raises(checker.Refused) as refused:
+        checker.check(changed(("claims", name), "3"))
+    assert "at most 3" not in str(refused.value)
 
 
 @pytest.mark.parametrize("push", [49_900_000, 60_000_000])
@@ -759,6 +763,32 @@ def test_a_pressure_that_may_open_the_fault_is_the_reason_for_both(push):
     with pytest.raises(checker.Refused, match="must not open the fault"):
         checker.check(changed(("claims", "push"), str(push)))
     assert cell_bounds(task(), LAGGED, claims(push=push)).reason == "the pressure may open the fault"
+
+
+def test_half_a_pascal_of_normal_stress_does_not_open_the_fault():
+    with pytest.raises(checker.Refused, match="small gain"):
+        checker.check(changed(("claims", "push"), "99799999/2"))
+    assert "open the fault" not in cell_bounds(task(), LAGGED, claims(push="99799999/2")).reason
+
+
+@pytest.mark.parametrize(
+    ("changes", "noise"), [({"state_law": "slip", "swing": F(1, 20)}, "1/10000000"), ({"distance": F("0.02")}, "0")]
+)
+def test_the_statement_has_the_conditions_inward_and_the_bounds_outward(changes, noise, monkeypatch):
+    wide = task(name="a patch", **changes)
+    wide = replace(wide, ranges=wide.ranges | {"coefficient": (F(3, 10), F(3, 5))})
+    claim = replace(CLAIM, task=wide, held=replace(LAGGED, slip_noise=F(noise)))
+    bounds = dict.fromkeys(standalone.CLAIMS, F(0)), F(1, 3)
+    monkeypatch.setattr(standalone, "bounds", lambda *_: bounds)
+    first, law, disturbance, _, _, fault, valve, *_ = standalone.verify(json.loads(guarantee_text(claim)))
+    assert first.startswith('fault "a patch" (a label; ')
+    assert ("with the slip law" in first, "with the ageing law" in first) == (wide.swing > 0, wide.swing == 0)
+    assert law.endswith(" of the true one") is (noise != "0")
+    assert (f"within {noise} m" in law) is (noise != "0")
+    assert ("along any reference whose rate stays within (1 +- 0.05)" in disturbance) is (wide.swing > 0)
+    needed = 6_000_000 * wide.distance / F(3, 10)  # K·distance/μ*, which the plan reaches at its end
+    assert fault == f"pressure in the fault from -3.8e+05 Pa to {float(380_000 + needed):.4g} Pa"
+    assert valve == f"pressure at the valve from -3.8e+05 Pa to {float(380_000 + needed):.4g} Pa"
 
 
 @pytest.mark.parametrize("name", [None, "log_rate", "log_state", "slip_error", "push", "asked"])
