@@ -3,7 +3,7 @@
 A fault file has ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between two
 wells, constant beyond the outermost ones, taken at the middle of each block. With a diffusivity D the pressure diffuses
 between neighbouring points, which are the middles x_i of blocks of lengths L_i and the wells: q_i' =
-D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends). If x_i is a well, its pressure is q_i.
+D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends). If a well is at x_i, q_i is its pressure.
 """
 
 from collections.abc import Iterable, Mapping
@@ -75,7 +75,7 @@ class BlockChain:
         blocks, wells = len(self.blocks), len(self.wells)
         if not 2 <= blocks <= MOST_BLOCKS or not 1 <= wells <= blocks:
             raise ParameterError(
-                f"a fault of several blocks must have 2 to {MOST_BLOCKS} blocks, and 1 well to one well a block. "
+                f"a fault of several blocks must have 2 to {MOST_BLOCKS} blocks, and 1 to as many wells as blocks. "
                 f"Received {counted(blocks, 'block')} and {counted(wells, 'well')}. Add or omit tables; a fault of one "
                 "block has neither."
             )
@@ -180,7 +180,7 @@ class BlockChain:
 
     @cached_property
     def faults(self) -> tuple[Fault, ...]:
-        """The fault with the friction and stress of each block; its values per area are those of the block."""
+        """The fault with friction and stress of each block; of its other values those per area hold for the block."""
         return tuple(
             replace(self.fault, friction=b.friction, effective_normal_stress=b.effective_normal_stress)
             for b in self.blocks

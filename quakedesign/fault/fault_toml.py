@@ -77,7 +77,7 @@ PERIODS = 4.6e5
 SAMPLES = 10.0
 """Samples per e-folding time of an error, or per radian of the free oscillation if that is faster."""
 AGEINGS = 20.0
-"""Samples per D_c/V in slow sliding at V: few enough for the sums of a proof, enough to control the fault."""
+"""Samples per D_c/V in slow sliding at V: few enough that a proof can sum the response, enough for control."""
 _STEP = "sampling time"
 _SHARE = 1000  # least operation time over sampling time
 
@@ -185,8 +185,8 @@ def completed(parts: Json, task: Mapping[str, float], remarks: tuple[str, ...] =
 def _why_stable(fault: Fault) -> str:
     weakens = fault.authority * fault.effective_normal_stress * fault.friction.slip_slope
     return (
-        f"a stable fault has none (per m of slip its spring unloads by {fault.specific_stiffness:.3g} m/s^2, friction "
-        f"by at most {weakens:.3g} m/s^2 under {fault.effective_normal_stress:.4g} Pa; check units)"
+        f"a stable fault has none (per m of slip its spring unloads by {fault.specific_stiffness:.3g} m/s^2, while "
+        f"friction weakens by at most {weakens:.3g} m/s^2 under {fault.effective_normal_stress:.4g} Pa; check units)"
     )
 
 
@@ -222,7 +222,7 @@ _step = by_equilibrium(rest=_step_at_rest, sliding=_step_of_sliding)
 
 
 def _growth(fault: Fault) -> float:
-    """Largest real pole [1/s] without pressure at the steepest friction; complex poles turn faster than they grow."""
+    """Largest real part [1/s] of the poles without pressure, where friction falls most steeply."""
     load, law = fault.authority * fault.effective_normal_stress, fault.friction
     damping = fault.specific_damping - load * law.rate_slope
     stiffness = fault.specific_stiffness - load * law.slip_slope
@@ -245,8 +245,8 @@ WIDTHS = entries_of(UncertaintyBox)
 del WIDTHS["name"]
 _UNDISTURBED = "no disturbance; for guarantees that cover one, give amplitude in [disturbance], such as '2 kPa'"
 _STILL = (
-    "frequency 0 of the disturbance: its sine is 0 in every run, while guarantees cover any course of its amplitude. "
-    "Give a frequency to simulate one"
+    "frequency 0 of the disturbance: its sine is 0 in every run, while guarantees cover every disturbance within the "
+    "amplitude. Give a frequency to simulate a sine"
 )
 
 
@@ -436,7 +436,7 @@ def _values(part: object, entries: Mapping[str, FileEntry]) -> Json:
 
 
 def _stresses(fault: Fault) -> dict[str, str]:
-    """Parts of the disturbance that were given as a stress: least float [Pa] whose acceleration is not smaller."""
+    """Stresses [Pa] that were given for the disturbance: least floats that yield at least its accelerations."""
     stresses = {}
     for name in fault.disturbance.stresses:
         size = abs(getattr(fault.disturbance, name))

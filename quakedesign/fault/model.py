@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 class UncertaintyBox:
     """Relative half-widths of the plant's parameters; friction is uncertain in every box.
 
-    In every box μ_res ≤ μ ≤ μ_max, the chord slope of μ in slip is at most that of the law, and slip ≥ 0.
+    In every box slip ≥ 0, μ_res ≤ μ ≤ μ_max, and no chord of μ over slip is steeper than the steepest one of the law.
 
     Attributes
     ----------
@@ -422,8 +422,8 @@ class Disturbance:
     rate_growth : float
         Slope of the disturbance in slip rate [1/s]: a known term, not counted in the disturbance bound of a guarantee.
     stresses : tuple of str
-        Which of ``constant`` and ``amplitude`` were given as a shear stress: proofs cover it for every area per mass of
-        the fault's box, while the number itself is for the nominal one.
+        Which of ``constant`` and ``amplitude`` were given as a shear stress. Their stored accelerations are for the
+        nominal area per mass; proofs cover the stress for every area per mass of the fault's box.
     """
 
     constant: float = field(default=0.0, metadata=quantity("m/s^2", "0 m/s^2"))
@@ -457,11 +457,11 @@ class Disturbance:
 
     @property
     def largest_rate(self) -> float:
-        """Bound on the time derivative of that part [m/s³]."""
+        """Bound on the time derivative of the part of φ̂_e that depends on time alone [m/s³]."""
         return self.amplitude * self.frequency
 
     def exact_bounds(self, width: Fraction = Fraction(0)) -> tuple[Fraction, Fraction]:
-        """Exact bounds [m/s²], [m/s³] from the given decimals, for proofs; those in floats may be rounded inward.
+        """Exact `largest_explicit` [m/s²] and `largest_rate` [m/s³] for proofs; these floats may be rounded inward.
 
         `width` [-] is the half-width of the area per mass: a stress accelerates by up to 1 + `width` times as much.
         """
@@ -659,7 +659,7 @@ class Fault:
         return magnitude(self.seismic_moment)
 
     def moment_of(self, slip: float) -> float:
-        """M0 = GAD [N·m] of an event that slips by D [m]: L³Δτ, with Δτ the stress drop of the spring."""
+        """M0 = GAD [N·m] of an event that slips by D [m]; equal to nh³Δτ, with Δτ the stress drop of the spring."""
         return self.shear_modulus * self.area * slip
 
     @cached_property

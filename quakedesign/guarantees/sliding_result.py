@@ -174,7 +174,7 @@ def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
     return (
         f"no controller whose pressure stays within {LowerBound(most).quantity('Pa')} of what the reference needs can "
         f"hold the fault through a diffusion path of L^2/D above {far.quantity('s')} (nominal parameters, linearised, "
-        "against this stress from one time on)"
+        "against this stress, applied from some time on)"
     )
 
 

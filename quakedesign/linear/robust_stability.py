@@ -119,7 +119,7 @@ def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None
 def finished(loop: Loop, proposal: QuadraticProposal) -> Certificate | None:
     """Certificate for a proposed V, in exact arithmetic, with the largest provable share of its decay rate."""
     form = proposal.form
-    size = float(abs(form).max())  # entries over the largest one are taken as the decimals that Python prints
+    size = float(abs(form).max())  # entries divided by this are read as the decimals that Python prints
     both = form + form.T - np.diag(np.diag(form))
     lyapunov = quadratic_terms(tuple(loop.states), lambda i, j: rational(float(both[i, j] / size)))
     positive = quadratic_margin(loop, lyapunov) / 2
@@ -132,7 +132,7 @@ def finished(loop: Loop, proposal: QuadraticProposal) -> Certificate | None:
 
 
 def finished_exactly(loop: Loop, theta: Sequence[Sequence[Fraction]]) -> Certificate | None:
-    """Certificate for V = xᵀΘx with the largest decay rate a·10⁻ⁿ, a the slowest pole, that exact forms allow, or None.
+    """Certificate for V = xᵀΘx, or None; its rate is the largest provable a·10⁻ⁿ, a the rate of the slowest pole.
 
     For a V so ill-conditioned that floating point cannot decide its decrease: witnesses are derived directly.
     """
@@ -188,14 +188,17 @@ _LARGEST_BETA = 1024
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlopeMargin:
-    """Friction-slope margin: h = s(t)·x1 with 0 ≤ s ≤ margin·s_max at any time, for all β of the box ``paper``."""
+    """Friction-slope margin for all β of the box ``paper``.
+
+    Friction adds s(t)·x1 to x2' with 0 ≤ s ≤ margin·s_max at any time. Unlike s of `Sectors`, this s is without spring.
+    """
 
     certified: LowerBound  # The common quadratic V proves it up to here; 0 when nothing was proved
     # A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact)
     limit: UpperBound
     limit_beta: Fraction
     circle: float  # What the circle criterion allows for time-varying s at `limit_beta`, measured
-    slope: Fraction  # s_max = N̂σ'_n·|Δμ|/d_c [1/s²]
+    slope: Fraction  # s_max [1/s²], see `nominal_slope`
     # The same with the largest effective stress on the way to the target slip (ERRATA 8) [1/s²]
     working_slope: Fraction
     certificate: Certificate | None
@@ -286,8 +289,8 @@ def _decimal(value: Fraction) -> Fraction:
 class GainRange:
     """Range of β = μN̂/b over which one V proves stability with all other parameters anywhere in the box."""
 
-    # low, high: Printed values stay inside the proved range. Each is proved with the other end of the box. `high` is at
-    # most 1024 times that of the box: larger values are not tried.
+    # low, high: Printed values stay inside the proved range. `low` is proved together with the largest β of the box,
+    # `high` with the smallest. `high` is at most 1024 times the largest β of the box: larger values are not tried.
     low: UpperBound
     high: LowerBound
     # This constant β is not asymptotically stable at a constant vertex of the other parameters (exact)
@@ -336,7 +339,7 @@ def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
 
 
 def _least_stable(loop: FeedbackLoop) -> Fraction:
-    """Largest β below the range, to 2⁻²⁰ of its end, at which a constant vertex of s and w is not stable, or 0."""
+    """Largest β below the range at which a constant vertex (s, w) is not stable, or 0; to 2⁻²⁰ of the lower end."""
     low, high = Fraction(0), loop.sectors.beta[0]
     for _ in range(20):
         middle = (low + high) / 2

@@ -56,7 +56,7 @@ from quakedesign.sos.solve.conic import collecting, record
 
 FOUR_OVER_PI_SQUARED = Fraction(40529, 100000)  # not below (2/π)² = 0.4052847…
 BITS = (30, 45, 60)
-"""Binary digits to which what a solver proposes is rounded, tried in turn."""
+"""Binary digits to which proposals of a solver are rounded, tried in turn."""
 LEAST_MARGIN = 1e-9
 """Of a proposal in its own units; a smaller one is noise of the solver."""
 _ZERO, _ONE = Fraction(0), Fraction(1)
@@ -136,7 +136,7 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
 
 
 def proposed(programme: Callable[..., list[Rows]], *question: object) -> list[Rows]:
-    """Solution proposed by a programme, cached; it is solved only where the caller waits for it."""
+    """Solution proposed by a programme, from the cache if possible; within `stated_problems` it is solved anew."""
     if collecting():
         return programme(*question)
     return list(search_once(lambda: programme(*question), programme.__module__, *question))
@@ -195,7 +195,7 @@ def balanced_units(K: Sequence[Fraction]) -> tuple[Fraction, ...]:
 
 
 def law_unit(K: Sequence[Fraction], units: Sequence[Fraction]) -> Fraction:
-    """Unit of p = −Kx in those of its states."""
+    """Unit of p = −Kx that follows from the units of the states."""
     return max(abs(k * u) for k, u in zip(K, units, strict=True))
 
 
@@ -247,7 +247,7 @@ class ClockProof:
 
 
 def _changes(P: Sequence[Any]) -> Iterator[Any]:
-    """Bernstein coefficients of P', of the degree of P; also of cvxpy's expressions."""
+    """Bernstein coefficients of P', raised to the degree of P; entries of P may be cvxpy expressions."""
     last = len(P) - 1
     for i in range(last + 1):
         before = [(P[i], i), (P[i - 1], -i)] if i else []
@@ -400,7 +400,7 @@ class HeldPoles:
         return next((corner for corner, poles in self.at(step).items() if any(abs(z) > 1 for z in poles)), None)
 
     def radius(self, step: Fraction) -> float:
-        """Spectral radius of a period [s], largest over the corners, measured."""
+        """Spectral radius of the map over a period [s], largest over the corners; floating point, not proved."""
         return max(float(abs(z).mid()) for poles in self.at(step).values() for z in poles)
 
     def limit(self) -> tuple[Fraction, Fraction | None] | None:
@@ -409,8 +409,8 @@ class HeldPoles:
         Returns
         -------
         (Fraction, Fraction or None) or None
-            The second is None if none was refuted, up to four million times the fastest pole's time; None when all
-            periods are refuted.
+            The second is None if no longer period was refuted, up to eight million times 1/|λ| of the fastest pole λ.
+            The whole result is None if all periods tried are refuted.
         """
         loops = (floats(self.problem.loop(vertex, self.gains)) for vertex in self.problem.vertices())
         first = low = rational(f"{0.5 / max(float(np.abs(np.linalg.eigvals(loop)).max()) for loop in loops):.3e}")
@@ -438,9 +438,9 @@ class HeldPoles:
 # in their ranges over the box, also inside a period.
 
 _SHARES = tuple(Fraction(n, 100) for n in (99, 98, 96, 93, 88, 80))
-"""Of the limit at the corners, where a V that depends on the clock is tried; degree 8 reaches 98 or 99 %."""
+"""Shares of the limit at the corners up to which a clock-dependent V is tried; degree 8 reaches 98 or 99 %."""
 _DEGREES = (DEGREE, 2 * DEGREE)
-"""Tried for one period: where the plant alone doubles within it, 8 is too few."""
+"""Degrees tried for one period: 8 is too low if the state without control doubles within the period."""
 _VARYING_TOLERANCE = Fraction(1, 50)
 """Relative width at which the bisection for one V stops."""
 HoldProof = DelayProof | ClockProof

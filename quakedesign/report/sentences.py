@@ -74,7 +74,7 @@ def _bounded(entry: "Entry", premise: Premise) -> bool:
 def _failing(premise: Premise) -> str:
     if premise.ratio is None or not premise.proved:
         return f"{premise.name} fails (nothing is certified)"
-    return f"{premise.name} fails {premise.ratio:.3g}-fold"
+    return f"{premise.name} fails: {premise.ratio:.3g} times what is certified"
 
 
 def _hold_gaps(entry: "Entry") -> list[str]:
@@ -131,7 +131,7 @@ def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
     text = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
     if event.onset is None:
         return f"{text}: no forward disturbance acts; without --duration the run adds one"
-    return f"{text}: growing by {event.growth:.3g} 1/s it would at about {event.onset:.3g} s"
+    return f"{text}: growing by {event.growth:.3g} 1/s it would begin at about {event.onset:.3g} s"
 
 
 def pressure_sentence(least: float, largest: float) -> str:
@@ -183,7 +183,7 @@ def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
     """Largest slip rate in continuous time, for every requested class of disturbances."""
     lines = [
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
-        + {"amplitude": "any disturbance of its amplitude", "rate": "one of its amplitude and rate"}[name]
+        + {"amplitude": "any disturbance of the fault's amplitude", "rate": "any of its amplitude and rate"}[name]
         for name, proved in peaks.items()
         if proved.found
     ]
@@ -219,7 +219,7 @@ def margin_lines(analysis: Analysis) -> list[str]:
     if slope is not None and slope.certified:
         lines.append(f"friction-slope margin {slope.certified:.5g} certified; unstable from {slope.limit:.5g} on")
     if span is not None:
-        end = f"unstable from {span.low_limit:.4g} on"
+        end = f"unstable at {span.low_limit:.4g}"
         lines.append(f"beta down to {span.low:.4g} ({end}) or up to {span.high:.4g} is certified")
     return lines
 
@@ -335,7 +335,7 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
             other = "stick-slip plant" if proved == STICK_SLIP else "plant without stick"
             plant = f"for this sampled loop on the {other}"
         return [f"proved {plant}, {lasts}" if _sampled(design) else "proved in continuous time"]
-    unsaid = {Verdict.REFUTED: "a counterexample checks in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
+    unsaid = {Verdict.REFUTED: "a counterexample, checked in exact arithmetic", Verdict.UNDECIDED: "no certificate"}
     return _because(design.verdict, design.details.get("reason", unsaid[design.verdict]))
 
 
@@ -394,9 +394,9 @@ def domain_sentence(domain: Domain) -> str:
     if domain.level == 0:
         return f"{which}: empty, because of {domain.limited_by or 'the control itself'} (ERRATA 16)"
     return (
-        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; it admits any one of "
-        f"|e1| <= {domain.start_slip_error:.2g} m, |e2| <= {domain.start_slip_rate_error:.2g} m/s, "
-        f"|h(0)| <= {domain.start_perturbation:.2g} m/s² at the start; limited by {domain.limited_by}"
+        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; it admits a start with "
+        f"|e1| <= {domain.start_slip_error:.2g} m, |e2| <= {domain.start_slip_rate_error:.2g} m/s or "
+        f"|h(0)| <= {domain.start_perturbation:.2g} m/s², the other two zero; limited by {domain.limited_by}"
     )
 
 
@@ -437,7 +437,7 @@ _SAID = {
     "along_reference": "reference and disturbance alone make |h'| {:.3g} times as large as the proof allows",
     "level_set": "not covered: a start at an unknown phase of the disturbance (|h'| {:.3g} times too large)",
     "on_trajectory": "in this run |h'| is {:.3g} times as large as the proof allows",
-    "control_coefficient": "β is {:.3g} times as large as the proof allows",
+    "control_coefficient": "β leaves the proved range by a factor of {:.3g}",
     "friction_slope": "the friction slope is {:.3g} times as large as the proof allows",
     "sampling_time": (
         "T_s of the fault is {:.3g} times the longest for which a guarantee was found, and this design samples faster"
@@ -572,7 +572,7 @@ def sliding_run_lines(result: dict[str, Any]) -> list[str]:
         f"{result['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
         f"zero-order hold over {result['step']:.4g} s{path}{shaken}, for {lasting(result['duration'])}; without "
         f"control errors grow by {result['growth_rate']:.3g} 1/s",
-        f"|ln(V/V_r)| at most {metrics['max_log_rate']:.3g}, slip error at most {metrics['max_slip_error']:.3g} m",
+        f"|ln(v/r')| at most {metrics['max_log_rate']:.3g}, slip error at most {metrics['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; feedback adds at most "
         f"{metrics['max_asked'] / 1e6:.3g} MPa, of either sign, to what the reference needs",
         proved_line((result["guarantee"] or {}).get("sentence"), result["outside"])

@@ -226,7 +226,7 @@ class BlockEvent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlidersRun:
-    """A run of coupled blocks. Arrays are instants × blocks, for the pressure instants × cells or wells.
+    """A run of coupled blocks. Arrays are instants × blocks, but the pressure is instants × cells or wells.
 
     Attributes
     ----------
@@ -385,7 +385,7 @@ def natural_cycles(
     chain : BlockChain
         With rate-and-state friction.
     duration : float, optional
-        [s]; unless given, until three events are over or the load reaches 1000 times aσ' of block 1.
+        [s]; by default until three events have begun, or the load reaches 640 times aσ' of block 1.
     loading_rate : float, optional
         v_∞ [m/s]; the reference rate of the friction of the first block unless given.
     inertia : bool
@@ -453,7 +453,7 @@ def simulate_held_blocks(
     Returns
     -------
     SlidersRun
-        Four instants a period; its pressures are those of the wells without the planned pressure.
+        Four instants per sample; its pressures are those of the wells without the planned pressure.
     """
     length, step = chain.fault.reference.operation_time if duration is None else duration, float(law.step)
     require_positive(duration=length, stress_period=period, lag=lag)

@@ -75,12 +75,13 @@ def simulate(
         Length of one step [s]; by default T_s of a sampled law, else of the fault.
     scheme : str or Scheme, optional
         Discretisation of the law, by name or as an instance, see `quakedesign.loop.schemes`. All but ``"continuous"``
-        sample once per step, with a zero-order hold of the pressure. By default that of a sampled law, which has no
-        other, else ``"continuous"``.
+        sample once per step, with a zero-order hold of the pressure. A sampled law has its own scheme and takes no
+        other; for other laws the default is ``"continuous"``.
     method : str
-        Integrator with a fixed step, or, for the printed plant, ``"cvodes"`` or ``"idas"`` with an adaptive step;
-        see `quakedesign.simulation.integrators`. The latter return the state at every multiple of `step`, where the
-        run is recorded. Friction with a state is stiff between samples: ``"cvodes"`` (default) or ``"idas"``.
+        Integrator with a fixed step, or, for the printed plant, ``"cvodes"`` or ``"idas"`` with an adaptive step; see
+        `quakedesign.simulation.integrators`. The latter return the state at every multiple of `step`, where the run is
+        recorded. Friction with a state is stiff: under a controller ``"cvodes"`` (default) or ``"idas"``; without one
+        ``"radau"`` is the default.
     duration : float, optional
         [s]; the operation time unless given, rounded down to whole steps.
     samples : int
@@ -188,7 +189,7 @@ def simulate(
     def stepped(fault: Fault) -> Trajectory:
         if tide is not None or isinstance(variation, SlidingVariation) or isinstance(measurement, Transducer):
             raise ParameterError(
-                "a tide, a sliding variation and a transducer alone need friction with a state. Received "
+                "a tide, a SlidingVariation or a Transducer needs friction with a state. Received "
                 f"{fault.friction.name}. Give a load, a variation or a measurement."
             )
         require_tolerance(rtol)

@@ -20,9 +20,9 @@ class StickSlipLoop(ClosedLoop):
 
     While the fault slips it obeys eq. shift, and results equal those of `ClosedLoop` bitwise as long as p < σ'. It
     stops when the slip rate falls to zero. It rests as long as friction can carry the load, with a slip rate of exactly
-    zero. A step locates one stop or one release, to the order of the integrator. Backward slip is not modelled:
-    `reversing` tells when friction would be exceeded backward. Friction with healing carries `rest_excess` of the law
-    in addition at rest, which is lost at the release.
+    zero. A step locates at most one release and one stop, to the order of the integrator. Backward slip is not
+    modelled: `reversing` tells when friction would be exceeded backward. Friction with healing carries `rest_excess` of
+    the law in addition at rest, which is lost at the release.
 
     Attributes
     ----------
@@ -40,7 +40,8 @@ class StickSlipLoop(ClosedLoop):
         _, normal, _, stress = self.hats()
 
         def rates(time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
-            pulling = normal * self.friction(x) * ca.fmin(stress - pressure, 0)  # friction printed for p > σ'
+            # cancels the friction of the printed plant where p > σ'
+            pulling = normal * self.friction(x) * ca.fmin(stress - pressure, 0)
             rate = self.printed(time, x, pressure)
             return rate + ca.vertcat(0, pulling)
 
@@ -74,7 +75,7 @@ class StickSlipLoop(ClosedLoop):
         return ca.if_else(state[1] == 0, ca.fmin(load, held), strength)
 
     def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float, works: int = 0) -> ca.SX:
-        """State after one step, with at most one release and one stop; the last entries of the state are works."""
+        """State after one step, with at most one release and one stop; its last `works` entries are works of forces."""
         moved = _SplitStep(self.plant, self.held, method, motion, step, works)
         rests, starting = state[1] == 0, moved.starting_acceleration(0.0, state)
         release = _crossing(starting, moved.starting_acceleration(1.0, moved.rested(0.0, 1.0, state)))
@@ -105,7 +106,7 @@ class _SplitStep:
         return self.motion(self.held, passed, ca.vertcat(state[0], 0, state[2:]))[1]
 
     def slid(self, passed: Number, share: Number, state: ca.SX) -> ca.SX:
-        """State after a share of the step in slip."""
+        """State after the fault slips for a share of the step."""
         return self.method.advance(lambda part, now: self.rates(passed + share * part, now), state, share * self.step)
 
     def rested(self, passed: Number, share: Number, state: ca.SX) -> ca.SX:
@@ -126,7 +127,7 @@ class _SplitStep:
         """Share of the step at which the slip rate falls to zero, and the state at this time.
 
         The slip rate is the quartic in time with the values and slopes of both ends and the slip between them. States
-        of the law and of the pressure path are integrated to this time; without these, works are cubics.
+        of the law and of the pressure path are integrated to this time; without these, works are cubic in time.
         """
         length = (1 - begin) * self.step
         first, last = self.rates(begin, start), self.rates(1.0, ahead)

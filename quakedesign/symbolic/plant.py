@@ -40,7 +40,7 @@ _Result = TypeVar("_Result")
 
 
 def stored(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
-    """Decorator that reads the results of a derivation if stored. Its one argument, if any, is the names of states."""
+    """Decorator: read results of a derivation if stored. The derivation has one argument, names of states, or none."""
     home = derivation.__module__.rpartition(".")[2]
 
     @cache

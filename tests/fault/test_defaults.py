@@ -117,7 +117,7 @@ def test_a_sampling_time_is_not_longer_than_the_task_allows():
 
 def test_a_stable_fault_has_no_slip_of_its_own():
     stable = PLAIN.replace('"2 cm"', '"2 m"')
-    with pytest.raises(ScenarioError, match=r"a stable fault has none .* friction by at most .*check units"):
+    with pytest.raises(ScenarioError, match=r"a stable fault has none .* friction weakens by at most .*check units"):
         parse_fault(stable, "own.toml")
     assert parse_fault(f'{stable}[task]\ntarget_slip = "5 cm"\n', "own.toml").reference.target_slip == 0.05
 

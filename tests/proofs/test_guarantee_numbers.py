@@ -244,6 +244,7 @@ def test_products_enclose_what_the_factors_enclose(one, other):
 
 def test_sums_scales_and_sizes_enclose_what_their_parts_enclose():
     a, b = checker.Fixed([[2, -7]], 2), checker.Fixed([[5, 1]], 3)
+    assert checker.Fixed([[2]]).error == 0
     assert (a + b) == checker.Fixed([[7, -6]], 5)
     assert a.scaled(F(1, 3)) == checker.Fixed([[0, -3]], 2)  # 4/3 and −3 at the ends
     assert a.scaled(F(2)) == checker.Fixed([[4, -14]], 6)

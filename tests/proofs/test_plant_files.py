@@ -171,7 +171,7 @@ WIDE = {"A": [["0"] * 49] * 49, "B": [["0"] * 2] * 49, "C": [["0"] * 49]}
         (("plant", "A", 1), ["1"], "rows and columns of a plant must fit"),
         (("plant", "sectors", 0, "within"), "0", "a bound of a sector must be positive"),
         (("plant", "sectors", 0, "slopes"), ["1", "0"], "slopes must be in order"),
-        (("plant", "sectors", 0, "row"), ["1", "0", "1"], "a sector with a bound must be of the states alone"),
+        (("plant", "sectors", 0, "row"), ["1", "0", "1"], "a sector with a bound must depend on the states alone"),
         *(
             (("plant", name), STORED["plant"][name][:1] * 41, f"{name} must have at most 40 entries")
             for name in ("C", "disturbances", "loads", "sectors", "outputs")

@@ -46,7 +46,7 @@ def test_peaks_of_one_or_no_class():
     peaks = ContinuousProof(task=task, law=law, claims=claims)
     none = NoProof(reason="small gain 2: too much", small_gain=UpperBound(2))
     said = peaks_sentence({"rate": peaks, "amplitude": none})
-    assert said.endswith("slip rate below 8.34e-05 m/s (slip error 0.501 m) for one of its amplitude and rate")
+    assert said.endswith("slip rate below 8.34e-05 m/s (slip error 0.501 m) for any of its amplitude and rate")
     assert peaks_sentence({"rate": none}) == "no bound on the slip rate is certified; small gain 2: too much"
 
 
@@ -60,4 +60,4 @@ def test_margins_are_rounded_towards_what_is_proved_and_limits_away_from_it():
     decay, slope, span = margin_lines(found)
     assert "0.5555 1/s certified" in decay
     assert slope == "friction-slope margin 1.2345 certified; unstable from 1.2346 on"
-    assert span == "beta down to 0.7001 (unstable from 0.6999 on) or up to 5.699 is certified"
+    assert span == "beta down to 0.7001 (unstable at 0.6999) or up to 5.699 is certified"

@@ -244,7 +244,7 @@ def test_a_guarantee_for_aperiodic_sampling_is_searched_on_the_stick_slip_plant(
 def test_a_sliding_mode_has_no_aperiodic_proof_on_the_stick_slip_plant():
     task, longest = uncertain_plant(REAL), F("0.184")
     found = design_stick_slip(task, F("0.092"), longest_step=longest, implicit=True)
-    assert found.reason == "a sliding mode that sticks is proved for periodic sampling alone"
+    assert found.reason == "a sliding mode on the stick-slip plant is proved for periodic sampling alone"
 
 
 def test_an_aperiodic_guarantee_states_its_range_and_the_limit_at_its_longest_interval():

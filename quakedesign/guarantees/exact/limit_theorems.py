@@ -79,7 +79,7 @@ class SlidingPush:
 
     @property
     def grows(self) -> bool:
-        """Whether a real λ > 0 exists: the roots of s² + (1 + κ − β)s + κ times ρ."""
+        """Whether a real λ > 0 exists; the values of λ/ρ are the roots of s² + (1 + κ − β)s + κ."""
         kappa, beta = self._ratios
         return beta > 1 + kappa and (beta - 1 - kappa) ** 2 >= 4 * kappa
 
@@ -91,7 +91,7 @@ class SlidingPush:
         return ball(self.model.state_rate) * (ball(trace) + ball(trace**2 - 4 * kappa).sqrt()) / 2
 
     def smallest_rate_error(self, step: Fraction) -> LowerBound:
-        """V·D·h [m/s] of theorem 1 for samples a step [s] apart: the larger end of a period."""
+        """V·D·h [m/s] of theorem 1 for samples a step [s] apart, h at the end of a period where it is larger."""
         kappa, beta = self._ratios
         flow = ((-kappa, -beta, _ONE), (kappa, beta - 1, -_ONE), (_ZERO, _ZERO, _ZERO))
         with ctx.workprec(_BITS):
@@ -106,11 +106,11 @@ class SlidingPush:
 # Performance limits of every controller for a fault: three theorems, evaluated in ball arithmetic.
 #
 # A claim about all frictions and parameters of the box fails if it fails for one of them, so each theorem takes the
-# worst of a few plants. A plant has κ = k̂ − φ1 and w = η̂ − φ2, and φ is any measurable function of time with |φ| ≤ H.
-# The controller is arbitrary: linear or not, with memory, with exact knowledge of plant, slip, slip rate and
-# disturbance up to the sample. With noise in theorem 1 it knows the plant, and measures slip and slip rate at all times
-# up to the sample within n and n′ of the true ones; either may be missing (n = ∞). X and P below are the largest
-# slip-rate error and the largest withdrawal.
+# worst of a few plants. A plant has κ = k̂ − φ1 and w = η̂ − φ2, φ1 and φ2 the slopes of the disturbance in slip and
+# slip rate, and φ is any measurable function of time with |φ| ≤ H. The controller is arbitrary: linear or not, with
+# memory, with exact knowledge of plant, slip, slip rate and disturbance up to the sample. With noise in theorem 1 it
+# knows the plant, and measures slip and slip rate at all times up to the sample within n and n′ of the true ones;
+# either may be missing (n = ∞). X and P below are the largest slip-rate error and the largest withdrawal.
 #
 # **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
 # without stick no controller keeps the slip error within E and the slip-rate error below X for
@@ -136,8 +136,8 @@ class SlidingPush:
 # to t at most 2n and 2n′. Let the measurements always be n and n′ too low in the first solution, and their errors
 # higher by d in the second. These are within n and n′ too, and up to t the measurements of both agree, which determines
 # p until t + θ + T. By then d2 ≥ 2H·h(τ + θ + T) ≥ X, and the second solution has e2 < δ − X, for every δ > 0. ∎ A hold
-# over T is also one over T/n, and a controller with delay θ could act earlier, so T and θ may be shortened, and τ as
-# well.
+# over T is also a hold over T/j for every integer j, and a controller with a shorter delay can imitate one with the
+# delay θ; so T and θ may be shortened, and τ as well.
 #
 # **Theorem 2 (withdrawal).** Let a fault rest at p = 0 when a disturbance φ = H begins. Let the well pressure be 0
 # until T later, then at least −P; let G be the transfer function from well to fault of a path whose impulse response is
@@ -155,16 +155,16 @@ class SlidingPush:
 # (λ + w)x1 with z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 remains true, and x1 exceeds E. ∎
 #
 # **Theorem 3 (stick–slip plant).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward. Let
-# the pressure be decided at samples T apart and stay for T. No controller that moves the fault keeps its slip rate
-# below 2H·h(T), h as in theorem 1 with σ = −κ, κT² ≤ 1, for every φ, with constant friction. *Proof.* Let φ = −H
+# the pressure be decided at samples T apart and stay for T. With constant friction and κT² ≤ 1, no controller that
+# moves the fault keeps its slip rate below 2H·h(T) for every φ, with the h of theorem 1 for σ = −κ. *Proof.* Let φ = −H
 # always. While the fault rests, the force on it changes with the pressure alone, so it first moves in a period of some
 # pressure p with N̂μ*p ≥ H. Change φ to H when that pressure begins to act. Until then both solutions agree, so p is
 # the same, and it stays for T. The fault starts from rest with the force N̂μ*p + H ≥ 2H, and y = x2 has y′ = N̂μ*p + H
-# − κx1 − wy, whose solution is this force times h and positive up to T. ∎ So theorem 3 replaces theorem 1 without
-# negative slip rates: a moving reference requires that the controller moves the fault. While the reference rests there
-# is no such limit: at low enough pressure friction holds the fault at rest.
+# − κx1 − wy, whose solution is this force times h and positive up to T. ∎ So theorem 3 takes the place of theorem 1
+# where slip rates cannot be negative: on a moving reference every controller has to move the fault. While the reference
+# rests there is no such limit: at low enough pressure friction holds the fault at rest.
 
-_SHARE = Fraction(1, 20)  # E of theorem 1, as a share of the slip of weakening or of the target, if smaller
+_SHARE = Fraction(1, 20)  # E of theorem 1 over the smaller of weakening slip and target slip
 _BISECTIONS = 14
 _SHARES = [Fraction(3, 4) ** n for n in range(16)]  # shares of τ, tried until X decreases
 _GROWN, _TURNED = 32, 1  # largest T·√|s| used in theorem 1, for s above and below 0
@@ -393,8 +393,8 @@ def infeasibility(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffu
 
 
 _ASSUMED = (
-    " (for some friction of the box, against the largest disturbance from one time on, even if the controller knows "
-    "both)"
+    " (for some friction of the box, against the largest disturbance, applied from some time on, even if the "
+    "controller knows both)"
 )
 
 

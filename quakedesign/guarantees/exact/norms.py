@@ -119,7 +119,7 @@ class Arithmetic:
     """Number and matrix types of an algorithm: by default balls, for proofs; others for estimates.
 
     In both, `*` is the product of matrices, and matrices have the methods `exp`, `nrows` and `ncols` of `arb_mat`. An
-    estimate omits remainders and uses a given slowest mode of Ψ.
+    estimate omits remainders and uses a given slowest mode of the map Ψ of one period.
     """
 
     slowest: Callable[[Any], SlowestMode] | None = None
@@ -317,7 +317,7 @@ class _Response(ABC):
 
     @abstractmethod
     def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Sums of output rows since the jump at both ends of every piece, and the remainder of the larger."""
+        """Sums of output rows since the jump at both ends of every piece, and the remainder to add to the larger."""
 
 
 class _Flowing(_Response):
@@ -396,7 +396,7 @@ class _Faded(_Response):
 
 @dataclass(frozen=True)
 class _Pulsed(_Response):
-    """Response to a pulse near a jump: `here` that of the segment itself, `ahead` that of the next one.
+    """Response to a pulse near a jump, which begins this segment (`here`) or the next one (`ahead`).
 
     e^{A(τ − σ)}b is within σ·|A·…| of e^{Aτ}b. The larger of the parts before and after the jump counts: max(|x|, |y|)
     = |x + y|/2 + |x − y|/2.
@@ -510,8 +510,8 @@ MOST_DOUBLINGS = 12
 def slowest(flows: list[_SegmentFlow]) -> list[Any]:
     """Row that isolates the slowest mode, if there is one: a row of the map of 2^12 periods.
 
-    It has the largest diagonal entry, which does not depend on the units of the states: a checker that uses it needs as
-    many periods, and obtains the same bounds.
+    It is the row with the largest diagonal entry. These entries do not depend on the units of the states, so a checker
+    that takes the same row needs the same number of periods and obtains the same bounds.
 
     Raises
     ------
@@ -692,11 +692,11 @@ def _but(column: Any, place: int) -> Any:
 # hE(λα)·min(1/λ, ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 #
 # **Pulses.** Let w be nonzero from `early` before a jump J to `late` after it. After the jump, an impulse of w at −σ or
-# σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area before the jump,
-# divided by `before`, and the area after it, divided by `after`, are W in all. So both together give at most the larger
-# of the responses to `before`·Jb and `after`·b, and of these remainders. With x and y for the two that is |x + y|/2 +
-# |x − y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is
-# added to the outputs of the pieces within `early`.
+# σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area before the jump
+# over `before` plus the area after it over `after` is at most W. So both together give at most the larger of the
+# responses to `before`·Jb and `after`·b, and of these remainders. With x and y for the two that is |x + y|/2 + |x −
+# y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added
+# to the outputs of the pieces within `early`.
 #
 # **Direct feedthrough.** The direct effect of an input of size 1 on an output is added to the gain, for every weight.
 
@@ -744,7 +744,10 @@ class LoopResponses:
 
     @cached_property
     def _seen(self) -> list[tuple[list[Any], list[Any]]]:
-        """Output rows mapped to before each segment and all earlier ones; in a proof, bounds of second derivatives."""
+        """Output rows mapped back to the start of each segment and of all earlier ones.
+
+        In a proof, also bounds of their second derivatives.
+        """
         by, all_rows = self.by, []
         for number, flow in enumerate(self.flows):
             phases, bends = flow.phases(self.rows), list[Any]()
@@ -831,7 +834,7 @@ class _Past:
     def of_rows(self, rows: list[Any], segment: int) -> Any:
         """N of rows just before a segment: inputs earlier in this period, and those of all earlier periods.
 
-        `rows` are these rows, mapped back to before this and all earlier segments, the last first.
+        `rows` are these rows, mapped back to the start of this segment, then of each earlier one in turn.
         """
         by = self.parts[0].of.by
         sums = by.sums(rows[-1] * self.columns) + by.absolute(rows[-1] * self.far) * self.bound

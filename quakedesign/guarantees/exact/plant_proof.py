@@ -1,10 +1,11 @@
 """Guarantee of a sampled loop with an uncertain plant: vector small gain, claims, files.
 
 **Theorem.** Consider a loop relative to the equilibrium under its loads, with every sector at its midpoint. For numbers
-W_s ≥ 0 that bound the deviations of the sectors from their midpoints, let P_r = start_r + Σ g_ri·size_i + Σ g_rs·W_s.
-This bounds row r by the sizes of the disturbances, the rates of the loads, the noise, the box of initial states and W.
-Let h_s be half the width of sector s. If h_s·P_s < W_s for the argument of every sector with h_s > 0, and P_s <
-`within` for every sector valid up to a bound, then every row stays below P_r for all t ≥ 0.
+W_s ≥ 0 that bound the deviations of the sectors from their midpoints, let P_r = start_r + Σ g_ri·size_i + Σ g_rs·W_s
+for every row r: an output, the argument of a sector, or a control. g_ri is the L1 gain from input i to row r; the
+inputs are disturbances, rates of the loads and noise, and start_r bounds the response to the box of initial states. Let
+h_s be half the width of sector s. If h_s·P_s < W_s for the argument of every sector with h_s > 0, and P_s < `within`
+for every sector valid up to a bound, then every row stays below P_r for all t ≥ 0.
 
 **Proof.** Let all sectors be valid up to t. The deviation of a sector from its midpoint is at most h_s|y_s|, so the
 suprema W(t) up to t obey W(t) ≤ F + M·W(t) with M_sk = h_s·g_sk and F + M·W < W for the numbers W, so that M·W < W: the
@@ -86,7 +87,7 @@ class PlantProof(Proof[Row]):
         return f"PlantProof({self.name}: {', '.join(self._peaks())})"
 
     def _peaks(self) -> list[str]:
-        named = [*self.outputs, *(f"{name} less its load" for name in self.controls)]
+        named = [*self.outputs, *(f"{name} minus its equilibrium value" for name in self.controls)]
         bounds = (*self.claims.outputs, *self.claims.controls)
         named = named if len(named) == len(bounds) else [f"row {i}" for i in range(1, len(bounds) + 1)]
         units = self.units[: len(bounds)] or [""] * len(bounds)
@@ -103,7 +104,8 @@ class PlantProof(Proof[Row]):
             largest = peaks(self.part, response_bounds(self.part.loop(self.law), self.pieces), self.inputs)
         except ParameterError as error:
             return NoProof(reason=str(error))
-        return NoProof(reason="the bounds of the sectors exceed their inputs") if largest is None else largest
+        failed = "a sector deviates by more than its number W_s, or its argument exceeds its bound"
+        return NoProof(reason=failed) if largest is None else largest
 
     def supported(self, bounds: Row) -> bool:
         """Whether no peak exceeds its claim."""
@@ -228,7 +230,7 @@ class PlantEntries(Entries):
         for one in self.sectors:
             need(one.slopes[0] <= one.slopes[1], "slopes must be in order")
             need(one.within is None or one.within > 0, "a bound of a sector must be positive")
-            need(one.within is None or not any(one.row[n:]), "a sector with a bound must be of the states alone")
+            need(one.within is None or not any(one.row[n:]), "a sector with a bound must depend on the states alone")
         return made(LinearPart, self, disturbances=tuple((one.entry, one.size) for one in self.disturbances))
 
 

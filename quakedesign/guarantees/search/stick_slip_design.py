@@ -45,11 +45,12 @@ TUNINGS = {
     "tracking": ((0.95, 0.85, 0.165, 1.27), (0.5, 0.5, 0.3, 1.3), (0.7, 0.5, 0.3, 1.3), (0.5, 0.5, 0.5, 1.3)),
     "peak": ((0.3, 0.5, 0.1, 1.3), (0.5, 0.5, 0.1, 1.3), (0.5, 0.5, 0.3, 1.3)),
 }
-"""Shares of the innovations that the estimate takes, of the slip error that a period takes back, and the input gain."""
+"""Shares of the slip-rate and of the slip innovation that the estimate takes, share of the slip error that a period
+corrects, and assumed input gain over its least value."""
 DEADBEAT = tuple(
     (*shares, 1.0, gain) for *shares, gain in ((0.3, 0.5, 1.4), (0.4, 0.6, 1.4), (0.5, 0.7, 1.4), (0.3, 0.5, 1.3))
 )
-"""The same of a deadbeat step, which takes all of it back, for both objectives."""
+"""The same for a deadbeat implicit step, which corrects all of the slip error; for both objectives."""
 _UNCLOCKED = (0.3, 0.3, 0.2, 1.2), (0.3, 0.4, 0.2, 1.2), (0.5, 0.5, 0.3, 1.3), (0.2, 0.2, 0.1, 1.6)
 APERIODIC = {"tracking": _UNCLOCKED, "peak": ((0.3, 0.3, 0.1, 1.425), *_UNCLOCKED)}
 """The same for aperiodic sampling; the gain is larger still by the ratio of the longest interval to T_s."""
@@ -60,13 +61,13 @@ _TRIED_EACH = 3  # turns after which all multipliers are tried again
 _PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)  # periods per policy; turns; turns that add facets
 _TINY = 1e-12  # rounding, relative to a height
 _LITTLE = 1.01  # largest growth of a height in a step to the fixed point of a policy
-_NEARLY = 0.93  # share of the factor of y that leaves a facet unchanged in a slow slide
+_NEARLY = 0.93  # larger shares of the factor of y that leaves a facet unchanged in a slow slide are raised to 1
 _ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
 _ALIKE, _WIDER = 1 - 1e-8, 1e-5  # cosine of equal normals; margin of a facet that rest leaves unchanged
 _KEPT, _FOLLOWED = 0.6, 14  # growth retained when facets are added; later turns until heights only grow
 _MARGINS = 2e-6, 2e-5  # margins of the last polytope over its images
 _FAR = 30  # times the first extents: a larger set counts as unbounded
-_RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried, over a size and over present ones
+_RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried, relative to a size and to present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
 _LOWER, _GUESSES = Fraction(1, 50), 3  # largest deficit of a pressure below its guess, over σ'; number of guesses
 _SHRUNK, _LITTLE_LESS = 60, 2e-5  # replacements of a set by its image; decrease of its extents that ends these
@@ -98,7 +99,7 @@ def tuned(
     *,
     implicit: bool = False,
 ) -> SampledStickSlip:
-    """Deadbeat feedback for the midpoint of the damping, with the shares of a tuning.
+    """Feedback that is deadbeat in the slip rate, at the midpoint of the damping, with the shares of a tuning.
 
     Parameters
     ----------
@@ -143,7 +144,7 @@ def _noises(held: SampledStickSlip) -> list[float]:
 class _Start:
     """States at a sample (rows), for choices of reference, input gain and slope (columns).
 
-    The state's slip error is that of `stick_slip_set`, larger by the bound of the slip noise.
+    The slip error of a state is e1 of `stick_slip_set`: slip minus reference plus the bound of the slip noise.
     """
 
     task: FaultPlant
@@ -304,7 +305,7 @@ class _Reach:
 
 
 def _at_first(held: SampledStickSlip) -> np.ndarray:
-    """Initial state at rest, with either sign of the first error."""
+    """Initial states at rest, for the two extreme measurement errors of the first sample."""
     noise = float(held.slip_noise)
     return np.array([[noise, 0, 0], [noise, 0, noise * float(held.law.slip_gain)]])
 
@@ -492,7 +493,7 @@ class _Growing:
         return np.array(tried)
 
     def _tops(self, periods: list[Period], corners: list[Any], tried: np.ndarray) -> np.ndarray:
-        """Largest values by multipliers: sliding, with a limited innovation, at rest."""
+        """Largest value of each facet by choice of multipliers, in three maps: sliding, limited innovation, rest."""
         choices, count = tried.shape[:2]
         largest = np.full((3, choices * count), -np.inf)
         for rows in _rows(periods, np.tile(self.normals, (choices, 1)), tried.reshape(-1, 5)):
@@ -524,7 +525,7 @@ class _Growing:
             new = ~self._unchanged(rows, larger, steps, sizes)
             which, factors, bases, tops, shares = which[new], factors[new], bases[new], tops[new], shares[new]
             images.factors[which] = factors[:, :3]
-            if factors.shape[1] > 3:  # D is at most g·y + h
+            if factors.shape[1] > 3:  # δ is at most g·y + h
                 images.factors[which, 1] += (
                     np.maximum(factors[:, 3], 0)
                     * steps[(steps[:, 0] * at[0][vertex[larger][new], 1][:, None] + steps[:, 1]).argmin(axis=1), 0]
@@ -536,7 +537,7 @@ class _Growing:
         return images
 
     def _unchanged(self, rows: Rows, chosen: np.ndarray, steps: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-        """Mask of functions that the signs of e1, y and D place below their facets."""
+        """Mask of functions that stay below their facets because of the signs of e1, y and δ alone."""
         left = rows.factors[chosen, :3] - self.normals[rows.which[chosen]]
         if rows.factors.shape[1] > 3:
             left[:, 1] += np.maximum(rows.factors[chosen, 3], 0) * steps[-1, 0]
@@ -580,7 +581,7 @@ class _Growing:
     def _shrink(self, after: _Images, margin: np.ndarray) -> None:
         """Replace the set by its image while the image is much smaller."""
         for _ in range(_SHRUNK):
-            self.turn += 1  # of multipliers
+            self.turn += 1  # determines which multipliers are tried
             before, self.heights = self.heights, np.minimum(self.heights, np.maximum(self.least, after.tops + margin))
             images = self.images()
             if images is None or not np.all(images.tops <= self.heights - margin / 4):  # rounding
@@ -608,7 +609,7 @@ class _Growing:
         """Normals for which a resting fault does not raise the height.
 
         Images tend to a normal whose largest factor of ξ is 0. Rounding or another range of slopes makes it positive.
-        Then the bound of the chord of 1/β minus 1/β enters, and the heights would grow without bound.
+        Then ψ of `stick_slip_set`, the bound of (chord of 1/β) − 1/β, enters, and the heights would grow without bound.
         """
         law, half = self.held.law, float(self.held.step) / 2
         slip, level = float(law.slip_gain), float(law.level_gain)
@@ -624,7 +625,7 @@ class _Growing:
         return np.column_stack([n1, np.where(slow, np.maximum(n2, needed), n2), n3])
 
     def refine(self, last: _Images) -> None:
-        """Add pull-backs of the fastest-growing facets as normals; heights restart at the hull."""
+        """Add pull-backs of the fastest-growing facets as normals; heights keep a share of their growth."""
         growth, factors = last.growth[self.touching], last.factors[self.touching]
         for name in ("normals", "heights", "least", "multipliers"):
             setattr(self, name, getattr(self, name)[self.touching])
@@ -776,7 +777,7 @@ def design_stick_slip(
         reason = "the stick-slip theorem needs a disturbance above 0 m/s^2: give amplitude in [disturbance]"
         return NoProof(reason=reason)
     if longest_step and implicit:
-        return NoProof(reason="a sliding mode that sticks is proved for periodic sampling alone")
+        return NoProof(reason="a sliding mode on the stick-slip plant is proved for periodic sampling alone")
     none = list[StickSlipProof | NoProof]()
     longer = float(longest_step / step) if longest_step else 1.0
     for *shares, gain in DEADBEAT if implicit else (APERIODIC if longest_step else TUNINGS)[objective]:
@@ -784,7 +785,7 @@ def design_stick_slip(
             held = tuned(task, step, (*shares, gain * longer), slip_noise, implicit=implicit)
             held = replace(held, longest_step=longest_step)
         except (ParameterError, ArithmeticError, ValueError):
-            return NoProof(reason="no gains of this size are floats")
+            return NoProof(reason="the gains are outside the range of floats")
         proof = _healed(task, held, healing, tell)
         if proof.found:
             return proof
@@ -823,7 +824,7 @@ def worst_stick_slip(proof: StickSlipProof, *, periods: int = 60) -> WorstCase:
     facets, extremes = np.array(proof.reach.facets, dtype=float), np.zeros(3)
     for high in (False, True):  # which end of β
         first = _at_first(proof.held)
-        states = {noise: first[[int(noise < 0)]] for noise in noises}  # by the measurement errors of their sample
+        states = {noise: first[[int(noise < 0)]] for noise in noises}  # keys: measurement error of the sample
         for _ in range(periods):
             before = dict(states)
             for later in noises:

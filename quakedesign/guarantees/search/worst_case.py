@@ -58,7 +58,7 @@ class WorstCase:
     slip_error : float
         [m].
     slip_rate_error, peak_slip_rate : float or None
-        [m/s]; the first on a moving reference without stick, the second for others.
+        [m/s]; the first from `worst_tracking`, the second from `worst_stick_slip` and `worst_sliding`.
     log_rate : float or None
         Of ln(v/V) in slow sliding [-].
     slip_behind, slip_ahead : float or None
@@ -141,8 +141,8 @@ def _resting(claim: TrackingProof, like: "_CourseSearch") -> "_CourseSearch":
 class _Event:
     """A jump and the time after it.
 
-    `soon`: the jump may move to the next event; `late`: the jump is a repetition from the event before. `samples`: the
-    law measures at the jump. `free`: the duration is anything from 0 to `duration`.
+    `soon`: the jump may wait for the next event; `late`: the jump occurs here unless it did at the event before.
+    `samples`: the law measures at the jump. `free`: the duration is anything from 0 to `duration`.
     """
 
     jump: Matrix
@@ -353,7 +353,7 @@ class _CourseSearch:
         for left in reversed(range(sweeps)):
             chosen, fixed, jumped = self._forward(last := costates, slopes)
             costates = self._backward(chosen, fixed, jumped)
-            if self.limit is not None and left <= sweeps // 2:  # in earlier sweeps, by the sign of its costate
+            if self.limit is not None and left <= sweeps // 2:  # before: by the sign of its costate
                 slopes = self._slopes(costates, chosen, self.limit)
         return last
 
@@ -416,7 +416,7 @@ class _CourseSearch:
                 tried = best + random.integers(-_NEAR, _NEAR + 1, best.shape) * [[0], [0], [1]]
 
     def _slopes(self, costates: np.ndarray, chosen: list[np.ndarray], limit: float) -> np.ndarray:
-        """Slopes of a rate-limited disturbance relative to the largest, best along the vertices."""
+        """Slopes of a rate-limited disturbance, relative to the largest, that are optimal for the chosen vertices."""
         rates, moved = np.empty(costates.shape[:2]), np.empty(costates.shape[:2])
         for number, (costate, vertices) in enumerate(zip(costates[:, :, :-1], chosen, strict=True)):
             part = self.parts[number // _PIECES % len(self.parts)]
@@ -666,9 +666,10 @@ def worst_sliding(claim: SlidingProof) -> WorstCase:
 
     For every corner and every final piece, the stress and the reference rate take their extremes by the sign of the
     impulse response of the linearised loop: the worst case of the linear loop. The errors are those of the nonlinear
-    plant, with four Runge–Kutta steps a part of the period. Inputs may jump between pieces; where the rate is largest,
-    pieces are shorter in a last search. The normal stress is that at the start, or that at the end of the task, where
-    the rate responds more to stress. Measurements are exact. |ln(v/V)| counts rates below V as rates above it.
+    plant, with four Runge–Kutta steps in each part of the period. Inputs may jump between pieces. A last search has
+    shorter pieces, at the corner and the normal stress with the largest rate. The normal stress is that at the start,
+    or that at the end of the task, where the rate responds more to stress. Measurements are exact. Rates below V count
+    like rates above it: |ln(v/V)|.
     """
     rate, slip = search_once(lambda: _searched_sliding(claim), "worst sliding", claim)
     return WorstCase(log_rate=rate, slip_error=slip, peak_slip_rate=float(claim.task.rate) * exp(rate))

@@ -178,7 +178,7 @@ class RefutationEntries(Entries):
 
 
 class ProofFile(LoopEntries):
-    """Entries of a file with a proof, without the format."""
+    """Entries of a file with a proof, without its entry ``format``."""
 
     V: Terms
     claims: Annotated[Numbers, Meta(max_length=3 + LIMITS["states"])]
@@ -186,7 +186,7 @@ class ProofFile(LoopEntries):
 
 
 class RefutationFile(LoopEntries):
-    """Entries of a file with a refutation, without the format."""
+    """Entries of a file with a refutation, without its entry ``format``."""
 
     refutation: RefutationEntries
 
@@ -293,7 +293,7 @@ POLYNOMIAL, LOOP = "polynomial", "loop"
 
 
 def kind_of(raw: object) -> str:
-    """Stated kind of a parsed file; without one, by its keys, about a polynomial or a closed loop."""
+    """Kind that a parsed file states; if it states none, ``polynomial`` or ``loop``, by its keys."""
     if not isinstance(raw, dict):
         return LOOP
     named = next((kind for kind in _KINDS if raw.get("kind") == kind), None)
@@ -301,7 +301,7 @@ def kind_of(raw: object) -> str:
 
 
 # ----------------------------------------------------------------------
-# Lines with all entries on which a guarantee of a running loop depends, below its sentence; equal to proofs/check.py.
+# Lines printed below the sentence of a guarantee: every entry on which it depends. proofs/check.py prints the same.
 
 _HEADED = {"format", "kind", "claims"}
 _NAMED = {"name", "states"}  # claims do not depend on them
@@ -311,7 +311,7 @@ _DIGITS = 6
 
 
 def entry_lines(document: Json) -> list[str]:
-    """Entries of a file of `guarantee_text` without names: one line per part, then the claims and the SHA-256.
+    """Lines with the entries of a guarantee file except names: one per part, then the claims and the SHA-256.
 
     Parameters
     ----------
@@ -341,7 +341,7 @@ def _part(part: object) -> str:
 
 
 def _phrases(part: Json, path: tuple[str, ...]) -> list[str]:
-    """Path and entries that are no objects, then recursively those of every object."""
+    """Phrase of the path and all plain entries of a part, then the phrases of its nested objects."""
     inner = {key: entry for key, entry in sorted(part.items()) if isinstance(entry, dict)}
     own = ", ".join(f"{key} {_entry(entry)}" for key, entry in sorted(part.items()) if key not in inner)
     phrases = [" ".join((*path, own))] if own else []

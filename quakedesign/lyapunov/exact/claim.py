@@ -30,7 +30,7 @@ class Verdict(Enum):
     """Outcome of a proof about a closed loop: proved, refuted or undecided."""
 
     PROVED = "the witness checks in exact arithmetic"
-    REFUTED = "a counterexample checks in exact arithmetic"
+    REFUTED = "a counterexample, checked in exact arithmetic"
     UNDECIDED = "neither was found"
 
     def __str__(self) -> str:

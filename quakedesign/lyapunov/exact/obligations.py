@@ -112,8 +112,8 @@ class Obligations:
     def _require_null_zeros(self, arguments: Mapping[str, Polynomial]) -> None:
         """Reject a lift whose argument could vanish on more than a null set, on one cell.
 
-        As a polynomial in the states on which none of its inner lifts depends, the argument must have a coefficient
-        without lifts, which is a nonzero polynomial in the other states. Otherwise the variable of the lift could be
+        Collect the argument by powers of the states on which no lift inside it depends: one of the coefficients must
+        contain no lift, and so is a nonzero polynomial in the other states. Otherwise the variable of the lift could be
         zero on an open set, where a multiplier that contains it proves nothing.
         """
         states = tuple(self.loop.states)
@@ -178,7 +178,7 @@ class Obligations:
 
     @cached_property
     def _ends(self) -> tuple[dict[str, Fraction], ...]:
-        """Values of all parameters with one value, with the lower and with the upper ends of roots."""
+        """Values of all fixed parameters, once with the lower and once with the upper ends of the roots."""
         points = {name: ends for name, ends in self.loop.uncertain.items() if ends[0] == ends[1]}
         ranges = points | {name: ends for name, (_, ends) in self.loop.roots.items()}
         return tuple({**self.loop.parameters, **{name: ends[i] for name, ends in ranges.items()}} for i in (0, 1))

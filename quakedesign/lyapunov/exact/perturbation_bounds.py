@@ -144,12 +144,12 @@ def largest_matched_rate(
     """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
 
     Friction may be any function within its bounds and slope bounds, and weakens with slip if its law does. The
-    disturbance may be any function within the preset's bounds on value and rate of change.
+    disturbance may be any function within the fault's bounds on value and rate of change.
 
     Parameters
     ----------
     divisor : Fraction
-        μ0N̂0 [m²/kg].
+        Divisor μ0N̂0 [m²/kg] of the control law p = ν/(μ0N̂0).
     errors : Errors
         Ranges of e1 [m], e2 [m/s], e2' [m/s²].
     pieces : int
@@ -196,7 +196,9 @@ class Sectors:
     # disturbance
     slip: Range
     rate: Range  # Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance
-    row_bounds: Range  # g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| about the nominal k̂, η̂ (ERRATA 6, 7)
+    # g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| (ERRATA 6, 7), h [Pa] the share of the chords beyond nominal
+    # spring and dashpot, divided by b
+    row_bounds: Range
     # max |σ' − p*| [Pa] over the constant references up to the target slip (ERRATA 8)
     largest_effective_stress: Fraction
 

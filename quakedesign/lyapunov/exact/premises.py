@@ -155,8 +155,8 @@ def sliding_mode_premises(
 ) -> tuple[list[Premise], Domain | None]:
     """Premises that are decided without a simulation, and the certified domain.
 
-    `along_reference` assumes zero errors. `level_set` is about the level set of V that contains the initial state
-    x = 0, ξ = 0 for every disturbance of the class, with the better of the two methods for h (`Domain`).
+    `along_reference` assumes zero errors. `level_set` is about the level set of V that contains the initial state x =
+    0, ξ = 0 for every disturbance of the class. It uses the better of the methods *whole* and *split* of `domain`.
 
     Raises
     ------
@@ -211,7 +211,7 @@ def _variant(problem: DomainProblem, *, bounded: bool) -> Variant:
 
 
 def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Premise:
-    """Premise that β is in the certified range; the ratio is the larger of b_M/β_M and β_m/b_m."""
+    """Premise that β of the fault, in [b_m, b_M], is in the certified [β_m, β_M]; ratio max(b_M/β_M, β_m/b_m)."""
     low, high = coefficient_range(fault, divisor)
     worst = max(high / certified[1], certified[0] / low)
     return Premise(
@@ -226,7 +226,7 @@ def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Pr
 def matched_rate_premise(
     fault: Fault, controller: SlidingMode, name: str, errors: Errors, certified: Fraction | None, note: str
 ) -> Premise:
-    """Premise that |h'| ≤ L̄ for bounded errors; without a certificate, L̄ is the limit of the gains."""
+    """Premise that |h'| ≤ L̄ for bounded errors; without a certificate, L̄ is the law's upper limit for every V."""
     required = largest_matched_rate(fault, controller.divisor, errors, feedforward=controller.feedforward)
     against = controller.lipschitz_limit if certified is None else certified * controller.scale
     note += _with(controller)
@@ -280,7 +280,8 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
     """Premises of linear feedback: sectors inside the certified ones; constant reference; vanishing disturbance.
 
     The certificate is about constant references and disturbances that vanish at the equilibrium. The last two premises
-    quantify the deviation of a task from both (ERRATA 8, 11); the errors are then bounded by the certified peaks.
+    quantify the deviation of a task from both (ERRATA 8, 11); for such a task `certify --peaks` proves bounds of the
+    errors.
 
     Raises
     ------
@@ -313,28 +314,29 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             certified=ranges["s"][1],
             unit="1/s^2",
             proved=proved and inside,
-            note=f"net chord in slip; effective stress up to {UpperBound(needed.largest_effective_stress):.4g} Pa",
+            note="chord slope of weakening less spring; effective stress up to "
+            f"{UpperBound(needed.largest_effective_stress):.4g} Pa",
         ),
         Premise(
             name="constant_reference",
             required=peak_rate,
             certified=0.0,
             unit="m/s",
-            note="certified for constant references; for a moving reference, see the certified peaks",
+            note="certified for constant references; for a moving reference, see the bounds of the errors (--peaks)",
         ),
         Premise(
             name="vanishing_disturbance",
             required=float_above(fault.disturbance_bounds[0]),
             certified=0.0,
             unit="m/s^2",
-            note="certified for vanishing disturbances; for other disturbances, see the certified peaks",
+            note="certified for vanishing disturbances; for others, see the bounds of the errors (--peaks)",
         ),
         *_limits_premise(fault, controller),
     ]
 
 
 def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
-    """Premise that the pressure at rest is inside the limits of the law, for every constant reference and plant."""
+    """Premise that the pressure at rest is within the controller's limits, for every constant reference and plant."""
     limits = getattr(controller, "limits", None)
     if limits is None:
         return []
@@ -352,7 +354,7 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
 
 
 # ----------------------------------------------------------------------
-# The plant of a field, recognised by derivation, for any names of the states in a file.
+# Whether a loop has the plant of a fault, from its relative degree, whatever the names of its states in a file.
 
 _CONTROL = "beta"
 
@@ -380,9 +382,10 @@ def require_degree_of_slip(loop: Loop) -> None:
 
 
 def covers(certificate: Certificate, fault: Fault) -> list[str]:
-    """Reject a certificate whose constants or ranges do not cover a fault (designed gains, divisor μ_res·N̂_min).
+    """Reject a certificate that does not cover a fault with designed gains, whose divisor is μ_res·N̂_min.
 
-    The certificate of a sliding mode is about the base gains; the lines state the scale λ that the fault needs.
+    The certificate of a sliding mode is about its unscaled (base) gains; the returned lines state the least scale λ of
+    the gains on this fault.
 
     Returns
     -------

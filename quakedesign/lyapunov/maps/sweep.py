@@ -37,7 +37,8 @@ from quakedesign.symbolic.terms import Term
 class Cones:
     """Minimise μ subject to Σ L(N) = 1, Σ L(P_j) = μ·mean(V_j) for every j, and L ≥ 0 on the cone of every row.
 
-    The multipliers of the equations are the margin and the a_j.
+    Every row (`FormRow`) has a functional L, a margin form N and forms P_j, which are V_j or −V̇_j. The multipliers of
+    the equations are the margin and the coefficients a_j of V.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ class Cones:
 
 
 def means(monomials: Sequence[Term], weights: Mapping[str, int]) -> list[float]:
-    """Mean of every V_j over all cells and Σu_i = 1, relative to that of u^m; zero if signs alternate."""
+    """Mean of every V_j over all cells and Σu_i = 1, relative to that of u^m; 0 if V_j changes sign."""
     means = []
     for term in monomials:
         even = all(kind == "a" for _, _, kind in term.factors)
@@ -121,8 +122,8 @@ ACCURACY = 1e-10
 SURE = 5e-10
 """Margins above this are taken as positive; it is about the accuracy of the solver."""
 CLEAR = 1e-6
-"""Margins above this decide choices for many points, such as a degree, alike on every processor: kernels of linear
-algebra change margins near zero by up to 2e-9."""
+"""Choices for many points, such as a degree, follow margins above this, so that they are the same on every processor:
+kernels of linear algebra change margins near zero by up to 2e-9."""
 _TOO_FAR = "the magnitudes of the gains differ too much for a search in floating point."
 _MOST_SCALES = 64  # number of scales with cached coefficients
 
@@ -157,7 +158,8 @@ class Sweep:
     Parameters
     ----------
     loop : Loop
-        Any point of the sweep. All points have the same degenerate ranges and parameters inside nested powers.
+        Any point of the sweep. All points have ranges of the same kinds (point, symmetric or general), and equal
+        parameters inside nested powers.
     degree : int
         Degree of V.
 
@@ -358,7 +360,7 @@ def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
 # neighbouring point. All numbers are floating point: a path screens without proof.
 
 _FIRST = 1e-3  # first τ, far larger than margins
-_NEAR, _FAR = 0.9, 2.0  # size below which a step ends near a centre, and size above which its place is useless
+_NEAR, _FAR = 0.9, 2.0  # size below which a step ends near a centre; size above which its start is discarded
 _REACH = 1.3  # largest size of a step after a reduction of τ, estimated from above
 _APART = 0.3  # largest ratio of τ between cached centres
 _MOST = 60
@@ -379,7 +381,7 @@ class _Step:
     """Newton's step towards the centre of one τ."""
 
     tau: float
-    # moves, multipliers, bound: ΔL, the multipliers of the equations over τ, and μ
+    # moves, multipliers, bound: ΔL, the multipliers of the equations divided by τ, and μ
     moves: Sequence[np.ndarray]
     multipliers: np.ndarray
     bound: float

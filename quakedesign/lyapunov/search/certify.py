@@ -1,7 +1,7 @@
 """Verdict on given gains of a homogeneous law, and proved margins of these gains.
 
-The limits are the largest disturbance bound, the largest range of β, and the decay rate. Each is located
-by Newton's method on the margin of the conic programme, safeguarded by a bracket.
+The margins are the largest disturbance bound and the largest range of β. Each is located by Newton's method on the
+margin of the conic programme, safeguarded by a bracket.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -74,7 +74,7 @@ def proof(loop: Loop, subject: Subject) -> Certificate | None:
 
 
 def _swept(loop: Loop, subject: Subject) -> Certificate | None:
-    """Proof by the programme of a sweep, whose V has a fixed mean, which is more accurate near the limits."""
+    """Proof by the programme of `Sweep`: it normalises the mean of V, and so is more accurate near the limits."""
     for degree in candidate_degrees(loop):
         try:
             sweep = Sweep(loop, degree)
@@ -289,7 +289,7 @@ def _root(x: Fraction, answer: Screened | None, slope: float) -> Fraction | None
 
 
 def _next(bracket: Bracket, x: Fraction, root: Fraction | None, floor: Fraction, limit: Fraction | None) -> Fraction:
-    """Next number to try: near the root of the tangent, on the side of the missing end; else the middle."""
+    """Next number to try: near the tangent's root, on the side where the bracket needs an end; else the middle."""
     low, high = bracket.low, bracket.high
     astray = root is None or root <= floor or bracket.answers > _BELIEVED
     if low is None and bracket.answers > 1 and astray:
@@ -323,7 +323,7 @@ def first_below(limit: Fraction) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# Proved limits of given gains: the largest disturbance, range of β or decay, and its upper bound.
+# Proved limits of given gains: the largest disturbance or range of β, each with an upper bound.
 
 _STEPS_BACK = (Fraction(0), TOLERANCE / 4, TOLERANCE / 2, 10 * TOLERANCE, 100 * TOLERANCE)
 _FAR = Fraction(10) ** 12

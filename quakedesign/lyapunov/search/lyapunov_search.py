@@ -124,7 +124,7 @@ def balance(loop: Loop) -> tuple[Fraction, ...]:
 
 
 def _without_lifts(term: Term, loop: Loop) -> Iterator[Term]:
-    """Terms whose nested power is replaced by the power of each term of its argument, without its coefficients."""
+    """Copies of a term, one for each term of the argument of its nested power, whose power (times 1) replaces it."""
     lift = next((f for f in term.factors if f[0] in loop.lifts), None)
     if lift is None:
         yield term
@@ -155,7 +155,7 @@ def _size(term: Term, loop: Loop) -> Fraction:
 
 
 def lifted_scale(equalities: Sequence[Polynomial], scale: Sequence[Fraction]) -> tuple[Fraction, ...]:
-    """Scales of all variables from those of the first: each equality t·w^n = P determines the scale of its w."""
+    """Scales of all variables from those of the states: each equality t·w^n = P determines the scale of its w."""
     scales = list(scale)
     for equality in equalities:
         position = len(scales)
@@ -319,7 +319,7 @@ def _largest(one: Obligation, direction: Polynomial, domain: str, scale: Sequenc
 # ----------------------------------------------------------------------
 # Stored results of the searches that every comparison of the presets repeats; they are re-checked when used.
 #
-# The folder `found` has one file per search, named by a digest of the problem: a certificate, or ``null`` if none was
+# The folder `stored` has one file per search, named by a digest of the problem: a certificate, or ``null`` if none was
 # found. The results of all other searches on this machine are in `quakedesign.cache`. A certificate is used only after
 # its exact check, so a wrong file costs time but proves nothing.
 
@@ -374,7 +374,7 @@ def store(loop: Loop, degree: int, certificate: Certificate | None) -> None:
 _WORTH_A_PROOF = 1e-9
 """Margins above this are tried in exact arithmetic, which decides."""
 _DIGITS = (1 << 14, 1 << 20, 1 << 30)
-_HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # higher degrees gain less than rounding or time cost
+_HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # higher degrees gain less than they cost in rounding or time
 
 
 def candidate_degrees(loop: Loop) -> tuple[int, ...]:

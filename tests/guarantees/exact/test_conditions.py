@@ -262,7 +262,7 @@ def edited(place, change):
         (("plant", "sectors", 1), lambda v: v | {"entry": ["0"], "row": ["0", "0", "1", "0"]}, "must fit"),
         (("plant", "sectors", 1), lambda v: v | {"entry": ["0", "1", "0"], "row": ["0", "1"]}, "must fit"),
         (("plant", "loads", 0), lambda v: v | {"control": ["1", "0"], "shift": ["0"]}, "must fit"),
-        (("plant", "sectors", 0), lambda v: v | {"row": ["1", "0", "1"]}, "must be of the states alone"),
+        (("plant", "sectors", 0), lambda v: v | {"row": ["1", "0", "1"]}, "must depend on the states alone"),
         (("plant", "loads", 0), lambda v: v | {"rate": "-1/50"}, "a rate of 0 or more"),
     ],
 )
