@@ -449,7 +449,10 @@ def test_a_sentence_names_every_size_that_it_covers_rounded_inward():
     told = named(found, replace(plant, units={"y1": "m", "u1": "MPa", "d": "m/s²"})).sentence()
     assert "disturbances of at most 66.66 mm/s², loads of rates of at most 16.66 kPa/s, measurement" in told
     prefixes = {"m": Fraction(1, 1000), "": Fraction(1), "k": Fraction(1000), "M": Fraction(10**6)}
-    for name, unit, bound in (("y1", "m", found.bounds["y1"]), ("u1 minus its equilibrium value", "Pa", found.bounds["u1"] * 10**6)):
+    for name, unit, bound in (
+        ("y1", "m", found.bounds["y1"]),
+        ("u1 minus its equilibrium value", "Pa", found.bounds["u1"] * 10**6),
+    ):
         ((shown, prefix),) = re.findall(rf"\|{name}\| <= ([0-9.]+) ([mkM]?){unit}\b", told)
         assert bound <= Fraction(shown) * prefixes[prefix] < bound * Fraction(1002, 1000)
     assert "|y2| <= 0" in told
