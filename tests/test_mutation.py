@@ -5,6 +5,7 @@ import gc
 import importlib.util
 import json
 import re
+import runpy
 import sys
 from collections import Counter
 from fnmatch import fnmatch
@@ -116,6 +117,16 @@ def test_defaults_of_fields_and_methods_are_changed_in_place(tmp_path):
     (cache,) = tool.caches_in([module.half, module.half.__wrapped__, tool.fnmatch.translate, size], tmp_path)
     cache.cache_clear()
     assert module.half() == 8
+
+
+def test_a_test_that_imports_a_module_anew_reaches_no_line_of_its_classes(tmp_path):
+    path = tmp_path / "fresh.py"
+    path.write_text("class One:\n    size = 1\n\n    def own(self):\n        return self.size\n\n\nTWO = 2\n")
+    follow = tool.Reached({str(path)}, [])
+    sys.settrace(follow)
+    runpy.run_path(str(path))["One"]().own()
+    sys.settrace(None)
+    assert dict(follow.lines) == {str(path): {4, 5}}
 
 
 def test_functions_are_found_after_they_were_frozen():

@@ -114,6 +114,16 @@ def some_held(random):
     return SampledLoop(law=law, step=step, delay=delay, lag=random.choice([F(0), F(1, 3)]), **noise)
 
 
+def with_reference(held, random):
+    """The same with a law of the reference as well, for which there is a state that moves with it."""
+    rows = [list(line) for line in some_rows(random, len(held.law.states) + 1, 2)]
+    along = some_rows(random, 1, len(held.law.states))[0]
+    still = [[v - (i == j) for j, v in enumerate(line)] for i, line in enumerate(held.law.update)]
+    for row, line in zip(rows, [*still, held.law.output], strict=True):
+        row[0] = -sum(v * x for v, x in zip(line, along, strict=True))
+    return replace(held, law=replace(held.law, of_reference=tuple(map(tuple, rows))))
+
+
 def off_schedule(held, number):
     """The same with jitter of measurements, of the delay or both, or a pump of some rate, or all of that."""
     jitter, later, ramp = [(1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 0, 1), (1, 1, 1)][number % 5]
@@ -213,19 +223,21 @@ def without_awaited(loop, theirs):
 
 @pytest.mark.usefixtures("coarse")
 def test_both_build_the_same_loop_of_a_law_that_is_held():
-    random, built, layers, late = Random(2), 0, set(), set()
+    random, built, referred, layers, late = Random(2), 0, 0, set(), set()
     for i in range(60):
         (task, read), held = some_tasks()[i % 4], some_held(random)
         if i % 3 and held.delay < 3 * held.step:
             held = replace(held, diffusion=F(i, 7) * held.step)
         elif i % 3 == 0:
             held = off_schedule(held, i // 3)
+        if i % 2 and held.law.root is None and not held.diffusion:
+            held = with_reference(held, random)
         raw = document_of(TrackingProof(task=task, held=held, claims=some_claims(random)))
         ours = unless(ParameterError, held.loop, task)
         theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
         assert (ours is None) == (theirs is None)
         if ours:
-            built += 1
+            built, referred = built + 1, referred + theirs.referred
             if theirs.layer:
                 theirs, more = checker.without_area(theirs, sum(task.beta) / 2)
                 ours = without_awaited(ours, more)
@@ -240,7 +252,8 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             assert fades == ([(given.event, given.height, given.rate, given.floor)] if given else [])
             layers.add((held.diffusion > 0, held.lag > 0, given.event if given else None))
             late.add(same_pulse(task, ours, theirs, held))
-            entries = [ours.inputs["acceleration"], ours.inputs["drift"], *ours.sampled.values()]
+            entries = [ours.inputs[name] for name in ("acceleration", "drift", "reference") if name in ours.inputs]
+            entries += ours.sampled.values()
             entries += [f.entry for f in ours.fading.values()]
             assert theirs.inputs == list(map(list, entries))
             assert (theirs.step, theirs.root is None) == (ours.period, held.law.root is None)
@@ -254,6 +267,7 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             claim = TrackingProof(task=task, held=held, claims=replace(some_claims(random), **more))
             assert parse_guarantee(guarantee_text(claim)) == claim
     assert built > 25
+    assert referred > 3
     assert {(True, True, None), (True, False, 0), (True, False, 1)} <= layers
     assert {(0, True), (0, False), (1, True), (1, False), None} <= late
 
