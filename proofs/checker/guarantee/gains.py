@@ -319,7 +319,7 @@ def without_area(loop: Loop, gain: Fraction) -> tuple[Loop, Awaited]:
     kick = gain * area(loop.layer)
     flow, events = [list(line) for line in loop.flow], [([list(line) for line in jump], t) for jump, t in loop.events]
     if loop.fade:
-        share, fade = held_share(loop)
+        share, fade = held_share(loop, loop.fade.event)
         jump, rest = events[-1]
         jump[1] = [v - kick * step for v, step in zip(jump[1], jump[last], strict=True)]
         late = fade.weight(rest)
@@ -337,12 +337,12 @@ def area(time: Fraction) -> Fraction:
     return time / 2 - sum(mode_share(n) / mode_rate(n, time) for n in range(MODES))
 
 
-def held_share(loop: Loop) -> tuple[Fraction, Fade]:
+def held_share(loop: Loop, event: int) -> tuple[Fraction, Fade]:
     """Bound of b*Y over that of b*R, for a well that steps once a period; how it fades."""
     rate, floor = mode_rate(MODES, loop.layer), 6 * MODES * SHORT * (1 + loop.layer / loop.step)
     height = abs(mode_share(MODES)) * (1 + 1 / (rate * loop.step))
     most = height / rate + floor * loop.layer
-    fade = Fade(loop.fade.event if loop.fade else 0, height / rate / most, rate, floor * loop.layer / most)
+    fade = Fade(event, height / rate / most, rate, floor * loop.layer / most)
     return most / (height + floor), fade
 
 

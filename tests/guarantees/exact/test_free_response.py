@@ -105,6 +105,31 @@ def test_sums_of_the_standalone_checker_are_rounded_up():
     assert checker.sums([3, one - 1, 5, 7], [one // 2, 1]) == [3, 3]  # 5/2 less a little, and more
 
 
+def two_halves():
+    """Two states without flow that are halved at every sample, from 1 and 1/4."""
+    half = [[F(1, 2), F(0)], [F(0), F(1, 2)]]
+    return checker.Loop(
+        [[F(0)] * 2] * 2, [(half, F(1))], [[F(1), F(0)]], [], None, F(1), start=[[F(1), F(0)], [F(0), F(1, 4)]]
+    )
+
+
+def test_later_periods_are_bounded_by_what_was_seen_raised_by_a_trifle_of_the_largest():
+    loop = two_halves()
+    flows = checker.cut(loop, loop.cuts, [F(0)] * 2, False)
+    columns = checker.fixed([[F(1), F(0)], [F(0), F(1, 4)]])
+    *_, most = checker.followed(flows, columns, 1)
+    one = 1 << checker.BITS
+    for found, seen in zip(most, (one, one // 4), strict=True):
+        assert 0 <= found - seen - (one >> 60) < 2000  # errors of products, in units of 2^-192
+
+
+def test_a_start_that_takes_too_much_work_is_refused(monkeypatch):
+    assert checker.start_gains(two_halves())
+    monkeypatch.setattr(checker, "MAX_WORK", 47)  # the first of twelve doublings needs 2·4·2·(2 + 9)
+    with pytest.raises(checker.Refused, match="takes too long"):
+        checker.start_gains(two_halves())
+
+
 def test_a_box_counts_all_of_its_corners():
     """An integrator of an integrator, reset after a period: |x1| + θ|x2|, worst where their signs agree."""
     found = peaks([[0, 1], [0, 0]], [[[1, 0], [0, 1]], [[0, 0], [0, 0]]], [2, 1], [[3, 0], [0, -5]], [1, 0])

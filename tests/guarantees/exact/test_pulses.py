@@ -62,12 +62,20 @@ def worst_course(loop, pulse, grain=200, periods=40):
     return best
 
 
-@pytest.mark.parametrize("first", [0, 1])
+TURN = ((F(1), F(0), F(0)), (F(0), F(4, 5), F(0)), (F(0), F(1, 4), F(1)))
+PERIODS = {
+    1: ((SAMPLE,), (F(1),)),
+    2: ((SAMPLE, STILL), (F(2, 5), F(3, 5))),
+    3: ((SAMPLE, STILL, TURN), (F(3, 10), F(3, 10), F(2, 5))),
+}
+
+
+@pytest.mark.parametrize(("events", "first"), [(1, 0), (2, 1), (3, 1), (3, 2)])
 @pytest.mark.parametrize(("early", "late"), [("1/20", "1/20"), ("0", "1/8"), ("1/10", "0"), ("1/100", "1/50")])
-def test_both_bound_the_worst_course_and_come_near(first, early, late):
+def test_both_bound_the_worst_course_and_come_near(events, first, early, late):
     early, late = F(early), F(late)
     pulse = Pulse(entry=ENTRY, first=first, early=early, late=late, before=early, after=late * F(3, 4))
-    loop = loop_of(pulse, (SAMPLE, STILL), (F(2, 5), F(3, 5))) if first else loop_of(pulse, (SAMPLE,), (F(1),))
+    loop = loop_of(pulse, *PERIODS[events])
     ours = np.array([norms(loop)[y, "w"] for y in ROWS], float)
     theirs = np.array([[float(v) for v in row] for row in theirs_of(loop, pulse)])
     assert np.allclose(ours, theirs, rtol=1e-6)
