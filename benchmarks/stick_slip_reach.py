@@ -29,8 +29,8 @@ def rows():
     for step in (10, 15, 25, 50, 100, 140, 184, 250, 300, 350, 400, 450, 500):
         yield f"real fault, {step} ms", real, {"step": f"{step} ms"}
     yield "real fault, 184 ms, peak", real, {"objective": "peak"}
-    yield "real fault, 184 ms, slip within 1 µm", real, {"slip_noise": "1 um"}
-    yield "real fault, 184 ms, slip within 5 µm", real, {"slip_noise": "5 um"}
+    yield "real fault, 184 ms, slip noise 1 µm", real, {"slip_noise": "1 um"}
+    yield "real fault, 184 ms, slip noise 5 µm", real, {"slip_noise": "5 um"}
     yield "real fault, 184 ms, box ten-percent", real.with_box("ten-percent"), {}
     for excess in (2e-5, 5e-5, 1e-4, 2e-4):
         yield (
@@ -53,7 +53,7 @@ def rows():
     yield "35 MPa, 184 ms", replace(real, effective_normal_stress=35e6), {}
     for name in ("cta", "dia"):
         yield f"real fault, 184 ms, {name}", real, {"controller": name}
-    yield "real fault, 184 ms, slip within 1 µm, cta", real, {"controller": "cta", "slip_noise": "1 um"}
+    yield "real fault, 184 ms, slip noise 1 µm, cta", real, {"controller": "cta", "slip_noise": "1 um"}
     yield "real fault, 300 ms, cta", real, {"controller": "cta", "step": "300 ms"}
     for step in ("1", "2"):
         yield f"lab fault, {step} ms, cta", lab, {"controller": "cta", "step": f"{step} ms"}

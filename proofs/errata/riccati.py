@@ -70,7 +70,7 @@ def row_06(load: float = LOAD) -> Finding:
         bool(poles[0] < 0 and answers[0] > -1e-9 and round(origin[1], 2) == 0.45 and bounded),
         f"with ΔN̂ = 0 a pole at {origin[1]:+.4f} 1/s at the origin (β = {BETAS[1]:.3f}); with (σ'N̂)_max "
         f"{origin[0]:+.4f} there, {poles[0]:+.4f} at worst, and V̇ ≤ −xᵀQ0x at every vertex "
-        f"(relative margin {answers[0]:.0e})",
+        f"up to rounding (relative margin {answers[0]:.0e})",
     )
 
 
@@ -105,7 +105,7 @@ def row_07(bound: Callable = diagonal_bound) -> Finding:
         bool(worst < 0 and growth > 1.2 and covers and margin > -1e-9 and kept < 1),
         f"every constant vertex stable (slowest {worst:+.4f} 1/s), yet switching Δk̂ = ∓1 every {SOFT} and {STIFF} s at "
         f"Δη̂ = −1 multiplies x by {growth:.3f} per period: ×48 after {until:.0f} s. With W (w = {split:.2f}) the same "
-        f"period gives {kept:.3f} and V̇ ≤ −xᵀQ0x at every vertex (least eigenvalue {margin:+.0e})",
+        f"period gives {kept:.3f} and V̇ ≤ −xᵀQ0x at every vertex up to rounding (least eigenvalue {margin:+.0e})",
     )
 
 

@@ -70,9 +70,9 @@ class DesignOptions(WellOptions):
     published_scheme
         Scheme of the runs of published gains, see --scheme.
     plant
-        Plant of the runs and of the guarantee: stick-slip (friction holds the fault at rest), or printed (the
-        paper's plant, without stick). By default the runs are on stick-slip, and so is the guarantee if one is found
-        there; otherwise the guarantee is on printed. Not for rate-and-state faults, which never rest.
+        Plant of the runs and of the guarantee: stick-slip (friction holds the fault at rest), or printed (the paper's
+        plant, without stick). By default the runs are on stick-slip, and so is the guarantee if one is found there;
+        otherwise, and with --class rate, the guarantee is on printed. Not for rate-and-state faults, which never rest.
     whole_task
         Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
         either case.

@@ -316,8 +316,9 @@ def identify(
 def schema(command: str, /, *, output: Output = PLAIN) -> int:
     """Print the JSON Schema (draft 2020-12) of what a command prints with --json.
 
-    The schema is for faults of one block; it recognises the output for several blocks. Required keys are in every
-    output; options add further keys, whose values may be null. Units are in the table of keys (docs/reference/json.md).
+    Where the output for several blocks differs, the schema has a branch for it. Required keys of a branch are in every
+    output of its kind; options add further keys, whose values may be null. Units are in the table of keys
+    (docs/reference/json.md).
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ def guarantee(
     plant
         stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR or sliding mode, exact
         slip rate, a pressure without delay); printed: the paper's plant, without stick. By default stick-slip where it
-        has a proof, else printed.
+        has a proof, else printed; with --class rate printed.
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
         disturbance, such as '25 kPa'; by default about the largest with a guarantee.

@@ -527,8 +527,8 @@ class EstimateOptions:
     differentiator_bound
         λ_d in m/s^(n_d + 1): the law uses estimates of a differentiator.
     differentiator_order
-        n_d, the number of derivatives; for 2, as in the paper, the premise `differentiator` fails for every λ_d with a
-        zero-order hold (guarantee --measured differentiator proves such a loop without it).
+        n_d, the number of derivatives. For 2, as in the paper, the premise named 'differentiator' fails for every λ_d
+        with a zero-order hold; guarantee --measured differentiator proves such a loop without this premise.
     filter_order
         n_f, the filter order.
     differentiator_steps

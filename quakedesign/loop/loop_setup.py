@@ -175,8 +175,8 @@ class LoopSetup:
     rate_noise: Fraction = quantity("m/s", "Bound of the measurement error of the slip rate at any time.")
     initial_slip: Fraction = quantity(
         "m",
-        "Bound of the initial slip, of either sign, such as '0.01 mm'; the law starts at z = 0 (a sliding mode: with "
-        "its first measurement). The guarantee is on the plant without stick.",
+        "Bound of the initial slip, of either sign, such as '0.01 mm'; the states of the law start at 0 (those of a "
+        "sliding mode at values computed from its first measurement). The guarantee is on the plant without stick.",
     )
     initial_slip_rate: Fraction = quantity(
         "m/s",
