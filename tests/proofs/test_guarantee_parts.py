@@ -321,7 +321,7 @@ AT_SAMPLES = ("root", "reference_rate", *NOISES)
 @pytest.mark.usefixtures("coarse")
 @few(
     ("more", "held"),
-    [((), True), (("root",), True), (FORWARD, False), ((), False), *((more, True) for more in (*HEARD, *OFF))],
+    [((), False), (("root",), True), (FORWARD, False), ((), True), *((more, True) for more in (*HEARD, *OFF))],
     every=2,
 )
 @pytest.mark.parametrize("asked", [(), ("asked",)])

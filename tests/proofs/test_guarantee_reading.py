@@ -347,6 +347,12 @@ def test_files_with_other_keys_or_claims_are_refused(path, value):
         read_guarantee(raw)
 
 
+@pytest.mark.parametrize("claims", [5, None, True, "slip_error", ["slip_error"]])
+def test_claims_that_are_no_object_are_refused(claims):
+    with pytest.raises(checker.Refused, match="claims"):
+        checker.verify(changed(HELD, (("claims",), claims)))
+
+
 def test_the_package_reads_this_format_and_kind_alone():
     assert read_guarantee(HELD).task.name == "a fault"
     for change in (
@@ -484,6 +490,12 @@ def test_the_root_must_lie_between_its_lines_for_the_noise_on_top(monkeypatch):
         checker.verify(late)
     monkeypatch.setattr(checker, "bounds", lambda *_: ([F(0)] * 4, F(1, 3)))
     assert checker.verify(changed(late, (("loop", "jitter"), {"measured": "0", "delay": "1/9"})))
+    asked = []
+    monkeypatch.setattr(checker, "root_within", lambda _root, _step, *errors: asked.append(errors) or True)
+    both = changed(late, (("loop", "noise"), {"slip": "1/100", "rate": "1/13"}))
+    assert checker.verify(both)
+    moved = task.reference_rate / 9, task.reference_acceleration / 9
+    assert asked == [(F(1, 100) + moved[0], F(1, 4) + F(1, 13) + moved[1])]
 
 
 def test_zero_has_no_sign():

@@ -131,6 +131,13 @@ def test_negative_sizes_and_measured_shifts_are_refused_by_both(way, value):
     assert standalone(document) is None
 
 
+@pytest.mark.parametrize(("key", "value"), [("rate", "-1"), ("shift", ["1", "0"]), ("shift", ["1", "2"])])
+def test_the_checker_names_the_rule_of_loads(key, value):
+    with pytest.raises(CHECK.Refused, match=re.escape("a load needs rate >= 0 and C*shift = 0")):
+        CHECK.check(json.dumps(edited(("plant", "loads", 0, key), value)))
+    assert CHECK.beside("guarantee.plant").read_plant(edited(("plant", "loads", 0, "rate"), "0")["plant"]).loads
+
+
 def _holder(way):
     holder = STORED
     for key in way[:-1]:

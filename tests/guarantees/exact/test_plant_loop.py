@@ -1,5 +1,6 @@
 """Loops of uncertain plants and bounds of their responses: the standalone checker's, and closed forms."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction as F
 from math import exp
@@ -144,6 +145,31 @@ def test_a_loop_has_at_most_96_states():
     assert len(LAG.loop(many).flow) == 96
     with pytest.raises(ParameterError, match="at most 96 states"):
         LAG.loop(replace(many, delay=F(1, 2)))
+
+
+def test_the_standalone_checker_balances_a_load_by_states_that_depend_on_each_other():
+    """z1 = z1/2 + z2/4 and 3 = z2; a third state that nothing depends on may be anything, and is 0."""
+    A = rows(["1/2", "1/4", 0], [0, 1, 0], [0, 0, 1])
+    law = checker.Law(F(1), F(0), A, [], rows([0, 1, 0]), [])
+    assert checker.balance(law, [F(3)]) == [F(3, 2), 3, 0]
+    with pytest.raises(CHECK.Refused, match="must balance every load"):
+        checker.balance(replace(law, A=rows(["1/2", "1/4", 0], [0, "1/2", 0], [0, 0, 1])), [F(3)])
+
+
+@pytest.mark.parametrize(("work", "fades"), [(4, True), (5, False)])
+def test_a_map_must_become_small_within_the_work_that_is_allowed(work, fades, monkeypatch):
+    """The largest entry of its powers 1, 2, 4 and 8 is 4, 4, 2 and 1/4: four periods are the last that are large."""
+    monkeypatch.setattr(checker, "MOST_WORK", 8)
+    monkeypatch.setattr(checker, "BEYOND", 2)
+    leap = checker.fixed(rows(["1/2", 4], [0, "1/2"]))
+    with nullcontext() if fades else pytest.raises(CHECK.Refused, match="must be stable and decay fast"):
+        checker.require_fading(leap, 1, work)
+
+
+@pytest.mark.parametrize(("size", "fades"), [(2**80 - 1, True), (2**80, False), (2**81, False)])
+def test_a_map_of_entries_above_two_to_the_eightieth_is_not_followed(size, fades):
+    with nullcontext() if fades else pytest.raises(CHECK.Refused, match=r"must be stable$"):
+        checker.require_fading(checker.fixed(rows([0, size], [0, 0])), 1, 1)
 
 
 def test_a_load_that_the_law_cannot_balance_is_rejected():
