@@ -64,7 +64,8 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
 def checked(value: _Value) -> _Value:
     """Public name that checks its arguments; a function is also replaced in its module, so that it can be pickled.
 
-    For a class, construction and public methods check theirs; classes of SymPy are not changed.
+    For a class, its construction and its public methods check their arguments; classes derived from SymPy are not
+    changed.
     """
     if isfunction(value):
         replaced: Any = _checked(value)
@@ -82,7 +83,7 @@ if TYPE_CHECKING:
 else:
 
     def checked_dataclass(**options: Any) -> Callable[[type], type]:
-        """Dataclass that checks the arguments of its construction and methods, even if not loaded by a public name."""
+        """Dataclass that checks the arguments of construction and methods, even if imported from its own module."""
         return lambda kind: checked(dataclasses.dataclass(**options)(kind))
 
 
@@ -127,7 +128,7 @@ def _signature(function: Callable[..., Any]) -> Signature:
 
 @cache
 def _accept(function: Callable[..., Any], name: str) -> Callable[[Any], Any]:
-    """Function that returns a valid value of a parameter, with Python's number types, and rejects all others."""
+    """Function that returns a valid value of a parameter, NumPy numbers converted, and raises for an invalid one."""
     parameter, hint = _signature(function).parameters[name], _hint(function, name)
     if parameter.kind is Parameter.VAR_POSITIONAL:
         return lambda values: tuple(_accepted(function, name, hint, value) for value in values)
@@ -198,13 +199,13 @@ def _hint(function: Callable[..., Any], name: str) -> Any:
 
 
 def matches(value: Any, hint: Any) -> bool:
-    """Whether a value is of a type; each entry of a collection must have its declared type."""
+    """Whether a value is of a type; of a collection, the first 16 entries must have their declared type."""
     return _test(hint)(value)
 
 
 @cache
 def _test(hint: Any) -> Callable[[Any], bool]:
-    """Test whether a value is of a type, as a function for which the type is already analysed."""
+    """Function that tests whether a value is of a type; the type is analysed once, here."""
     origin, inner = get_origin(hint), get_args(hint)
     if hint in (Any, Parameter.empty):
         return lambda _: True
@@ -249,7 +250,7 @@ def _is_float_alone(hint: Any) -> bool:
 
 
 def _native(value: Any) -> Any:
-    """NumPy numbers converted to those of Python, also in tuples, lists and dictionaries; long floats to floats."""
+    """Value with NumPy numbers as Python numbers, also in tuples, lists, dictionaries; longdouble arrays as float64."""
     if hasattr(value, "dtype") and hasattr(value, "item"):
         if getattr(value, "ndim", 0):
             return value if value.dtype.kind != "f" or value.dtype.itemsize <= 8 else value.astype(float)

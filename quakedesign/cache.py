@@ -4,10 +4,11 @@ The key of an entry is a digest of the input data, the sources of this package, 
 libraries, and the machine. So no entry is ever out of date. A search only proposes candidates: exact arithmetic decides
 on them each time.
 
-The folder is that of ``QUAKEDESIGN_CACHE`` (``off`` for none), else ``quakedesign`` in the user's cache folder
-(``XDG_CACHE_HOME``, ``~/.cache``; ``~/Library/Caches``). Folder and files are used only if they belong to this user and
-no other user may write them; a corrupt file is ignored. Files are written whole, and the oldest are deleted if
-their total size is too large. After a failure, such as a folder without write permission, the result is computed anew.
+The folder is ``QUAKEDESIGN_CACHE`` if set (``off`` for no cache), else ``quakedesign`` in ``XDG_CACHE_HOME`` if set,
+else in ``~/.cache`` (``~/Library/Caches`` on macOS). There is no cache on Windows. Folder and files are used only if
+they belong to this user and no other user may write them; a corrupt file is ignored. Files are written whole, and the
+oldest are deleted if their total size is too large. After a failure, such as a folder without write permission, the
+result is computed anew.
 """
 
 import io

@@ -32,7 +32,7 @@ _MOST_DOTS = 400
 
 
 def parse_toml(text: str) -> Json:
-    """Entries of a TOML file of some 64 KiB.
+    """Entries of a TOML text; the caller bounds its size, 64 KiB for the files of this package.
 
     Raises
     ------
@@ -83,7 +83,7 @@ def read_bytes(path: str | Path, what: str, *, largest: int, refusal: type[Quake
     except QuakedesignError:
         raise
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "its name is none that a file can have"
+        reason = getattr(error, "strerror", None) or "no file can have this name"
         raise refusal(f"{what} cannot be read: {path}: {reason}. Give a readable file.") from None
 
 
@@ -124,9 +124,10 @@ def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
 
 
 def lock_of(target: Path) -> tuple[Path, int | None]:
-    """Lock of a path until `unlock`: a temporary folder in the same parent folder, and its descriptor.
+    """Lock a path until `unlock`, by a temporary folder in its parent folder; return this folder and its descriptor.
 
-    A command on another machine does not see the lock; the descriptor is None on a file system without locks.
+    A command on another machine does not see the lock. The descriptor is None on a file system without locks, or if
+    the folder cannot be made; then other processes are not kept out.
 
     Raises
     ------
@@ -182,7 +183,7 @@ def sweep_system() -> None:
 
 
 def discard_all() -> None:
-    """Remove all temporary folders of this process, even within their blocks."""
+    """Remove all temporary folders of this process, even those whose ``with`` block has not ended."""
     for folder in list(_mine):
         _discard(folder)
 
@@ -244,7 +245,7 @@ def _locked(folder: Path) -> int:
 
 
 def _discard(folder: Path) -> None:
-    """Remove a temporary folder after moving the contents of `ASIDE` back, unless they are replaced."""
+    """Move the contents of `ASIDE` back where their places are empty, then remove the temporary folder."""
     try:
         aside = list((folder / ASIDE).glob("*"))
     except OSError:  # the path cannot exist
@@ -318,7 +319,7 @@ def release(folder: Path | None = None) -> None:
 
 @contextmanager
 def sole_writer(folder: Path, *, make: bool = False) -> Iterator[None]:
-    """Lock a folder for a block, see `hold`."""
+    """Lock a folder during a ``with`` block; see `lock_folder`."""
     new = lock_folder(folder, make=make)
     try:
         yield
@@ -354,7 +355,7 @@ def write_whole(path: Path, content: str | bytes) -> None:
 
 @contextmanager
 def made_folder(folder: Path) -> Iterator[None]:
-    """Folder for files of a block, made with missing parents; these are removed again if the block fails.
+    """Make a folder and its missing parents for a ``with`` block; if it fails, remove those that are new and empty.
 
     Raises
     ------

@@ -46,8 +46,8 @@ class ExtendedLQR(Controller):
     # ``"state"``: k1 and k2 act on x1 and x2, as printed in eq. u. ``"error"``: they act on x1 − r and x2 − r', which
     # limits p and the error of tracking a ramp (ERRATA 29). The loop about a constant reference is the same.
     feedback: str = "error"
-    # p is limited to them; the excess of p beyond a limit drives the integrals back (back-calculation, Åström and
-    # Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
+    # p is kept within these limits; the excess of p beyond a limit drives the integrals back (back-calculation, Åström
+    # and Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
     limits: PressureLimits | None = None
     offset: Fraction = Fraction(0)  # p for Kx_a = 0 [Pa]: an initial pressure, since ξ = 0 initially
 
@@ -67,7 +67,7 @@ class ExtendedLQR(Controller):
         return sp.Min(sp.Max(wanted, to_sympy(self.limits.lowest)), to_sympy(self.limits.highest))
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """ξ1' = x1 − r and ξ2' = ξ1; at a limit both also track it with the double pole −1/recovery_time."""
+        """ξ1' = x1 − r and ξ2' = ξ1; at a limit, back-calculation gives both the double pole −1/recovery_time."""
         rates = signals.slip_error, signals.integrals[0]
         if self.limits is None:
             return rates

@@ -1,9 +1,9 @@
 """Gains scaled from one fault to a similar one, with exponents from the terms of the law.
 
-A law keeps its effect if every one of its terms scales like the quantity to which it is added: the pressure with λ_p,
-the rate of an integral state with that state over time. Slip errors scale with λ_δ, slip-rate errors with λ_δ/λ_t.
-These conditions are linear in the exponents of the gains. They are derived from the SymPy expression of the law and
-solved exactly, so that user-defined laws are scaled like those of the paper (appendix, with ERRATA 19 and 20).
+A law keeps its effect if every term scales like the sum to which it belongs. The pressure scales with λ_p, the rate of
+an integral state like this state divided by time, slip errors with λ_δ, and slip-rate errors with λ_δ/λ_t. These
+conditions are linear in the exponents of the gains. They are derived from the SymPy expression of the law and solved
+exactly, so that user-defined laws are scaled like those of the paper (appendix, with ERRATA 19 and 20).
 """
 
 import tomllib
@@ -45,7 +45,7 @@ class LawDimensions(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class CarriedGains:
-    """Exact gains of a law on a fault in `gain_units`, and growth of its integral states since the first fault."""
+    """Exact gains of a law on a fault in `gain_units`, and factors of its integral states from the source fault."""
 
     law: Controller
     gains: Mapping[str, Radical]
@@ -62,7 +62,7 @@ def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction
     Parameters
     ----------
     gains : Controller or CarriedGains
-        The latter for further scaling, or back with `scales.inverse()`, without rounding.
+        `CarriedGains` are scaled further, or back with `scales.inverse()`, without rounding.
     scales : Scales
         From source to target.
     divisor : Fraction, optional
@@ -171,7 +171,7 @@ def printed_gains(fault_name: str, law: str) -> Mapping[str, str]:
 def agrees(value: Radical, printed: str) -> bool:
     """True where a number rounds to a printed one, decided in exact arithmetic."""
     half = Fraction(Decimal(1).scaleb(int(Decimal(printed).as_tuple().exponent))) / 2
-    low, high = (  # signs and powers of the ends, in the order of the ends
+    low, high = (  # sign(end)·|end|^degree, which increases with the end
         (1 if end >= 0 else -1) * abs(end) ** value.degree
         for end in (rational(printed) - half, rational(printed) + half)
     )

@@ -32,8 +32,8 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
     Raises
     ------
     ParameterError
-        For an unknown domain; none or more than 6 states; a state declared with a sign; weights that are not integers
-        from 1 to 12 on `cells` or 1 on `reals`.
+        For an unknown domain; none or more than 6 states; a state declared with a sign; weights outside 1 to 12 on
+        `cells` (signed powers), or other than 1 on `reals` (polynomials).
     """
     if domain not in ("cells", "reals"):
         raise ParameterError(f"the domain of a loop must be cells or reals. Received {domain!r}.")
@@ -164,7 +164,7 @@ class LoopField:
     roots : mapping of Symbol to Symbol
         Symbols that stand for the positive square root of a gain.
     units : mapping of Symbol to Expr
-        Error that corresponds to one unit of a state, if not one; in gains.
+        Error per unit of a state, an expression in gains; states without an entry have 1.
 
     Raises
     ------

@@ -62,9 +62,9 @@ class RiccatiSolution:
 def solve_care(a: Entries, g: Entries, q: Entries) -> RiccatiSolution:
     """Stabilising solution of Q + AᵀX + XA − XGX = 0.
 
-    python-control's `care` (method "scipy") proposes X, first in the given states, then in states scaled by powers
-    of two to a unit diagonal of X. Newton's method (Kleinman 1968, IEEE Trans. Autom. Control 13, 114) with residuals
-    in rational arithmetic then removes the rounding, so that only the conditioning of the data is left.
+    python-control's `care` (method "scipy") proposes X, first in the given states, then in states scaled by powers of
+    two to a unit diagonal of X. Newton steps (Kleinman 1968, IEEE Trans. Autom. Control 13, 114), with the closed loop
+    of the proposal and with residuals in rational arithmetic, then remove the rounding error.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def _scaled(a: Matrix, g: Matrix, q: Matrix, units: Sequence[Fraction]) -> tuple
 
 
 def _propose(a: Matrix, g: Matrix, q: Matrix) -> np.ndarray:
-    """Floating-point X from python-control, with BR⁻¹Bᵀ = G by its eigenvalues."""
+    """Floating-point X from python-control, with B and R from the eigenvalue decomposition of G = BR⁻¹Bᵀ."""
     import control
 
     A, G, Q = map(floats, (a, g, q))
@@ -147,7 +147,7 @@ def relative_residual(a: Matrix, g: Matrix, q: Matrix, x: Matrix) -> Fraction:
         + 2 * frobenius(matrix_product(linear_problem.transpose(a), x))
         + frobenius(matrix_product(x, g, x))
     )
-    low = parts * Fraction(999_999, 1_000_000)  # each norm is an upper bound, tight to far less than this
+    low = parts * Fraction(999_999, 1_000_000)  # from below: the norms are above the exact ones by far less
     return frobenius(riccati_residual(a, g, q, x)) / low if low else Fraction(0)
 
 
@@ -159,7 +159,7 @@ _HEAVIEST, _ROUNDS = 0.0, 5
 COST = diagonal((Fraction(1), Fraction(1, 100), Fraction(1), Fraction(1)))
 """Q0 on x1, x2, ξ1, ξ2."""
 Choice = tuple[float, float]
-"""R and the split of W."""
+"""R, and the split w of W = diag(g1²/w, g2²/(1−w), 0, 0)."""
 
 
 class ScaledDesign:
@@ -368,7 +368,7 @@ def _finished(task: ScaledDesign, choice: Choice) -> RiccatiDesign:
 
 
 def _rounded_gains(problem: LinearProblem, gains: Sequence[Fraction], theta: Matrix) -> tuple[Fraction, ...]:
-    """Gains to ten significant digits, or to as many more as V needs to decrease over the whole box."""
+    """Gains to ten significant digits, or to 17 if only then V decreases over the whole box."""
     for digits in (10, 17):
         decimals = tuple(_decimal(g, digits) for g in gains)
         if decreases(problem, decimals, theta):
@@ -400,9 +400,12 @@ def _decimal(value: Fraction, digits: int = 17) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmallestGain:
-    """Infimum of the gain over every Q0 > 0 and R > 0 of the guaranteed set; reached as Q0/R → 0, with k3, k4 → 0."""
+    """Infimum of √(k1² + (ω_n·k2)²) over all Q0 > 0 and R > 0 for which the Riccati design has a guarantee.
 
-    # slip, rate: k1 [Pa/m] and k2 [Pa·s/m] of the smallest gain in natural units, k1² + (ω_nk2)²
+    It is the limit for Q0/R → 0, where k3, k4 → 0.
+    """
+
+    # slip, rate: k1 [Pa/m] and k2 [Pa·s/m] with the smallest k1² + (ω_n·k2)²
     slip: float
     rate: float
     split: float  # Its w

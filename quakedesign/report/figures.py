@@ -192,8 +192,8 @@ def _inset(axis: Any, run: "Trajectory", shade: str) -> None:
 # ----------------------------------------------------------------------
 # Figures of faults whose friction has a state: their cycle, and controlled slow sliding.
 
-_BANDS = 600  # most instants of a run: more are invisible, and make a file of many megabytes
-_PER_BAND = 16  # smallest number of instants, four periods
+_BANDS = 600  # about the largest number of bands of a run: more are invisible, and make a file of many megabytes
+_PER_BAND = 16  # smallest number of instants of a band: those of four sampling periods
 
 
 def state_figures(comparison: "Compared") -> dict[str, Any]:
@@ -351,7 +351,10 @@ def overview(comparison: "Compared") -> Any:
 
 
 def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
-    """Proved bound of the slip rate; worst case found and limit, of the slip-rate error without stick; if known."""
+    """Proved bound of the slip rate, worst case found and limit of every controller, as far as known.
+
+    Without stick the last two are those of the slip-rate error.
+    """
     if entry.proof is None or entry.guarantee is None:
         return
     peak = entry.proof.peak_slip_rate
@@ -523,7 +526,7 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
 
 
 def _region(axis: Any, plane: Plane, size: float, stiffness: np.ndarray, high: float) -> None:
-    """Colour the stable part of one panel, and draw the critical stiffness and the limits of damping alone."""
+    """Colour both regions of a panel; draw the critical stiffness and the values at which damping alone decides."""
     across, critical = plane.across / size, np.where(plane.critical > 0, plane.critical, np.nan) / high
     levels = [-0.5, 0.5, 1.5]
     axis.contourf(across, stiffness, plane.stable.astype(float), levels=levels, colors=list(_COLOURS.values()))

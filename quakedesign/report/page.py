@@ -94,12 +94,12 @@ def mathml(latex: str, *, display: str = "block") -> Markup:
 _SHOWN_STATES = 4  # largest number of states of a law whose matrices are shown
 ASKED = {
     "sampling_time": "the pressure is renewed at least this often",
-    "delay": "no more time passes from the measurement to the pressure",
+    "delay": "the time from the measurement to the pressure is not longer than certified",
     "control_coefficient": "the input gain β stays in the certified range",
     "friction_slope": "friction changes with slip no faster than certified",
     "along_reference": "reference and disturbance alone change h no faster than the law withstands",
     "level_set": "a start at rest lies in the certified region, at every phase of the disturbance",
-    "on_trajectory": "h changes in the run that is shown no faster than the law withstands",
+    "on_trajectory": "in the run that is shown, h changes no faster than the law withstands",
     "constant_reference": "the reference stands still",
     "vanishing_disturbance": "the disturbance vanishes at the equilibrium",
     "pressure_at_rest": "the pressure that the task needs lies inside the limits of the law",
@@ -114,7 +114,7 @@ class Account:
 
     label: str
     badge: str
-    good: bool  # Whether the simulated loop has a guarantee, or the proof covers it
+    good: bool  # Whether there is a guarantee, or a certificate whose premises all hold for this loop and task
     # guarantee, run, limits, verdict, proof: Sentences without a full stop
     guarantee: list[str]
     run: list[str]
@@ -189,10 +189,10 @@ def _slowly(entry: "Entry") -> list[str]:
         "The pressure at the well is p plus a plan: what the nominal fault needs along its reference, kV/(μ*A) per "
         "second.",
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
-        "except for exponentials, inertia and diffusion modes that the model omits. The exponentials lie in sectors "
-        "for |y| ≤ Y; the others are bounded. L1 norms of the linear loop then bound all errors in terms of the "
-        f"claimed bounds, and the claims imply themselves (small gain). They hold {proof.lasts}. The box of constants "
-        f"is divided into {cells}.",
+        "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
+        "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
+        f"terms of the claimed bounds, and the claims imply themselves (small gain). They hold {proof.lasts}. The box of "
+        f"constants is divided into {cells}.",
     ]
 
 
@@ -261,7 +261,7 @@ def _python(entry: "Entry") -> list[str]:
 
 
 def badge(entry: "Entry") -> str:
-    """Verdict in two or three words."""
+    """Verdict in a few words."""
     if entry.proof is not None:
         step = entry.design.fault.sampling_time
         return f"not guaranteed at T_s = {step:g} s" if entry.design.other_step else "guaranteed as it runs"
@@ -376,13 +376,13 @@ CAPTIONS = {
     "overview": "How fast does the fault slip? Slip rate and slip over logarithmic time, without control and with the "
     "controllers of the legend; thick: the designed controller with the smallest proved bound. Horizontal lines are "
     "for that controller.",
-    "uncontrolled": "Without control: slip, with the slip at which the statics let the fault rest, and slip rate of "
-    "the natural earthquake.",
-    "cycle": "Without control, loaded from afar at the reference rate of the law: slip and slip rate; dotted: the "
-    "loading rate.",
-    "slow-sliding": "Held in slow sliding under the stress that the guarantee allows, as a sine: slip and its "
-    "reference, slip rate with what it never exceeds, fluid pressure in the fault, and state of friction over that of "
-    "steady sliding.",
+    "uncontrolled": "Natural earthquake without control: slip and slip rate. Dotted: the slip at which the fault comes "
+    "to rest according to statics.",
+    "cycle": "Without control, loaded from afar at the operating rate of the friction law: slip and slip rate. Dotted: "
+    "the loading rate.",
+    "slow-sliding": "Held in slow sliding. The stress is a sine with the amplitude that the guarantee allows. Slip and "
+    "its reference, slip rate and its proved bound, fluid pressure in the fault, and friction state divided by its "
+    "value in steady sliding.",
     "sliding-errors": "How far slip and slip rate are from their references in that run.",
     "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "
     "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",
@@ -396,8 +396,8 @@ CAPTIONS = {
     "earthquakes": "Natural earthquake and the one that a constant injection induces.",
     "friction-coefficient": "Friction coefficient in closed loop between its smallest and largest value.",
     "errors-and-power": "Errors and pressure over those of the e-LQR; bars to the left of one are better.",
-    "peak-against-tracking": "What tracking costs: errors that were seen over the peak that is guaranteed, one point a "
-    "design.",
+    "peak-against-tracking": "What tracking costs: simulated errors against the guaranteed slip-rate error, one point "
+    "a design.",
 }
 
 
@@ -419,8 +419,8 @@ _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "a diffusion pat
 SLIDING_LIMITS = (
     "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
     "of the run nor of the proof",
-    "the stress disturbance of the run is a sine with the period of the largest tide, or a quarter of a short run, "
-    "which need not be the worst; the worst case found is reported with the guarantee",
+    "the stress disturbance of the run is a sine, which need not be the worst; its period is that of the largest tide, "
+    "or a quarter of the duration of a short run; the worst case found is reported with the guarantee",
 )
 
 

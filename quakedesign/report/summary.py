@@ -30,8 +30,8 @@ class Row:
 
     name: str
     outcome: str
-    # slip_rate, slip: Proved bound, worst case found, and largest value of the run: slip rate [m/s], slip error [m];
-    # None without
+    # slip_rate, slip: Proved bound, worst case found, and largest value of the run, for slip rate [m/s] and slip error
+    # [m]; None where there is no such value
     slip_rate: tuple[Number, Number, Number]
     slip: tuple[Number, Number, Number]
     pressure: tuple[Bound | float, Bound | float] | None  # Range [Pa]: the proved one, or that of the run
@@ -125,7 +125,7 @@ def _row(entry: "Entry") -> Row:
         outcome=run.outcome.kind if run else "not run",
         slip_rate=(
             proof.peak_slip_rate if proof else None,
-            worst.peak_slip_rate if worst else None,  # none where only the error is searched
+            worst.peak_slip_rate if worst else None,  # None where only the errors are searched
             run.outcome.peak_slip_rate if run else None,
         ),
         slip=(

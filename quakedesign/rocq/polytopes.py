@@ -27,12 +27,12 @@ from quakedesign.guarantees.exact.stick_slip_set import (
 from quakedesign.rocq import gallina
 
 _BITS, _GRAIN = 80, 40  # bits of numbers and of multipliers in polytope.v
-_CLOSE = 2.0**-30  # least margin of a bound by multipliers below 1; with less a facet is bounded by itself
+_CLOSE = 2.0**-30  # bounds by multipliers count if below 1 by more than this; else the facet itself is used
 _DIGITS = 12  # of ranges, rounded outward
 _OFF = 77  # bits of accuracy of the polynomials for the impulse responses
 _MOST_TERMS = 400
 _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (3, 0), 6: (3, 1)}
-"""Least or largest r' of four polytopes, by the order of `resting_rows`."""
+"""By place in `resting_rows`: number of the polytope, 0 to 3, and 0 for the least r' or 1 for the largest."""
 
 
 def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
@@ -117,7 +117,9 @@ def _near(value: arb) -> str:
 
 
 def _terms(period: Period) -> str:
-    """Number of terms of the impulse responses' Taylor polynomials, and n with e^KT <= 3^n for their error's growth K.
+    """Number of terms of the Taylor polynomials of the impulse responses, and n with e^(KT) <= 3^n.
+
+    K is the growth rate of their error.
 
     Raises
     ------
@@ -139,7 +141,7 @@ def _terms(period: Period) -> str:
 
 @dataclass(frozen=True)
 class _Hint:
-    """Bound of a facet: whether by the facet itself, and multipliers of constraints."""
+    """Bound of a facet: whether the facet's own inequality is used, and the multipliers of the constraints."""
 
     own: bool
     shares: tuple[tuple[int, float], ...]
@@ -185,13 +187,13 @@ def _hints(deciding: list[Verifier], given: Iterable[Rows]) -> Iterator[tuple[Ro
 
 
 def _pair(least: _Hint, largest: _Hint, *, positive: bool = False) -> str:
-    """Bounds at the least and the largest r'; with `positive` the second may omit the target rate, never negative."""
+    """Bounds at the least and the largest r'; with `positive` they may omit the target rate, which is at least 0."""
     bare = positive and largest.own and any(i == largest.turn and share > 0 for i, share in largest.shares)
     return f"Pair {str(bare).lower()} ({least.text()}) ({largest.text(without=largest.turn if bare else None)})"
 
 
 def _by_slide(given: Iterator[tuple[Rows, dict[int, _Hint]]], count: int) -> list[str]:
-    """Bounds per facet, ordered by cut-off of the innovation, chord, beta and end of r'."""
+    """Bounds per facet, ordered by cut-off of the innovation, chord and β, each for the seven `COMBINATIONS`."""
     by_facet: dict[int, list[str]] = {i: [] for i in range(count)}
     for many in zip(*[given] * len(COMBINATIONS), strict=True):
         for facet in many[0][1]:
@@ -200,7 +202,7 @@ def _by_slide(given: Iterator[tuple[Rows, dict[int, _Hint]]], count: int) -> lis
 
 
 def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) -> list[str]:
-    """Bounds per facet, ordered by chord, share, polytope, and least and largest r'."""
+    """Bounds per facet, ordered by chord, weight of the innovation at rest, polytope, and least and largest r'."""
     raised, table = [i for i, fall in enumerate(falls) if not fall], {}
     groups = [2 if raised else 0, 1 if any(falls) else 0]
     for part, chord in product(range(len(_PAIRS)), range(2)):

@@ -51,7 +51,7 @@ _USE_OF_ONE = {
     "limited": "If pump or valve limit the pressure, give the applied pressure to prevent windup of the law, as in "
     "simulate --saturation; else give a null pointer.",
 }
-_PLAN = "planned pressure"  # fact that only laws of blocks in slow sliding have
+_PLAN = "planned pressure"  # key of an entry of `facts` that only laws for several blocks in slow sliding have
 _USE_OF_WELLS = {
     "inputs": "",
     "written": "the fluid pressure [Pa] of CONTROLLER_PRESSURES wells{beside}",
@@ -61,7 +61,7 @@ _ADDED = """Add the planned pressure (below) to each, continuously in time and n
 planned pressure reaches the fault unchanged, and that the pressure written here passes the proved lag. """
 _APPLIED_INPUT = " and the pressure [Pa] applied since the last call"
 _APPLIED = """
-   applied may be a null pointer: then it was the pressure of the last call. Before the first call it is 0."""
+   applied may be a null pointer: then the pressure of the last call counts as applied (0 before the first call)."""
 _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
 
 
@@ -190,10 +190,10 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
     """Bytes of an FMU of a sampled step, and the platform of its binary or the reason why it has none.
 
     Inputs are the measurement and, for one block, ``applied`` [Pa], the pressure that pump or valve applied since the
-    last sample. It defaults to the commanded pressure; if set after initialisation, set it before every sample, since
-    the law winds up otherwise. The output ``pressure`` [Pa], for several wells ``pressure_1`` and so on, is the command
-    of the last sample. Samples are T_s apart, from the start of the experiment. The FMU contains the sources, so that
-    any platform can compile them.
+    last sample. By default the commanded pressure counts as applied. A value that is set after initialisation stays in
+    force until it is set again: then set it before every sample, or the law winds up. The output ``pressure`` [Pa], for
+    several wells ``pressure_1`` and so on, is the command of the last sample. Samples are T_s apart, from the start of
+    the experiment. The FMU contains the sources, so that any platform can compile them.
 
     References
     ----------
@@ -289,8 +289,7 @@ def controller_step(
         T_s [s]; unless given, that of a sampled law, or else the fault's sampling time.
     scheme : str or Scheme, optional
         A sampled scheme; unless given, that of a sampled law, or else ``explicit``. Only the software part of its
-        measurement is exported: with a `Sensor` the slip alone is measured, else the slip, and the slip rate if the
-        step uses it.
+        measurement is exported. Inputs are the slip and, if the step uses it, the slip rate.
     remarks : tuple of str
         Further sentences at the top of the header, after those on T_s and on the stages between controller and fault.
 
@@ -360,7 +359,7 @@ def export_controller(
     ParameterError
         As `controller_step`.
     OutputError
-        If the folder exists, or cannot be written.
+        If the folder exists and `force` is False, contains other files than an export, or cannot be written.
     """
     require_free(Path(folder), force)
     exported = controller_step(fault, controller, step=step, scheme=scheme, remarks=remarks)
@@ -481,8 +480,8 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
     behind = f"designed for {between} between controller and fault: the pressure is the command to the valve"
     by_a_clock = (
-        f"to be called periodically, once every {float(own.step):.6g} s, since the reference counts the calls; "
-        "aperiodic sampling, for which it is proved, includes this"
+        f"to be called periodically, once every {float(own.step):.6g} s, since the reference is computed from the "
+        "number of calls; the guarantee for aperiodic sampling covers periodic sampling"
         if own and own.longest
         else ""
     )

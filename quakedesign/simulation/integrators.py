@@ -106,7 +106,7 @@ class ClassicRungeKutta(Integrator):
 
 TIGHTEST, LOOSEST = 1e-13, 1e-3  # relative tolerances that a run may have
 RTOL = 1e-9  # default relative tolerance
-TIGHT_RTOL = 1e-11  # of velocity steps, slow sliding and blocks under control, whose errors are small differences
+TIGHT_RTOL = 1e-11  # of velocity steps, and of slow sliding and blocks under control: small differences
 CYCLE_RTOL = 1e-8  # of commands that run seismic cycles
 FLOOR = 1e-4  # share of a variable's size below which its tolerance is absolute
 _MOST_STEPS = 20000  # between two requested instants
@@ -284,7 +284,7 @@ class Cvodes(AdaptiveIntegrator):
 
 
 class Idas(AdaptiveIntegrator):
-    """Backward differentiation formulas of orders 1 to 5 for 0 = f − y', of another family than in `Cvodes`."""
+    """Backward differentiation formulas of orders 1 to 5 for the implicit equation 0 = f − y', from IDAS."""
 
     name: ClassVar[str] = "idas"
     source: ClassVar[str] = "Hindmarsh et al. (2005), ACM TOMS 31, 363; Brenan, Campbell and Petzold (1996), SIAM"

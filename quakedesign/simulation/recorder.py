@@ -330,7 +330,7 @@ def metrics(
     signals = list(further)
     kind = ActuatorMetrics if signals else Metrics
     if watched["diverged"] >= 0:
-        peak = watched["peak_slip_rate"]  # valid if only the numbers of the law overflow
+        peak = watched["peak_slip_rate"]  # meaningful if ξ, p or h diverged, but not slip or slip rate
         known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
         return kind(**known, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
     figures = {"peak_slip_rate": watched["peak_slip_rate"]}

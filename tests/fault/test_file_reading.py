@@ -220,7 +220,7 @@ def test_files_that_cannot_be_read(tmp_path):
         "missing.toml": "No such file or directory",
         "folder.toml": "Is a directory",
         "latin.toml": "its text is not UTF-8",
-        "zero\0.toml": "its name is none that a file can have",
+        "zero\0.toml": "no file can have this name",
         "huge.toml": "at most 64 KiB",
     }
     for name, reason in reasons.items():

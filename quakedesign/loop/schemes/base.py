@@ -28,7 +28,7 @@ from quakedesign.loop.sensing.measurement import EXACT, Measurement, Sensor, gen
 # ----------------------------------------------------------------------
 # Interface of all schemes.
 
-Motion = Callable[..., ca.SX]  # maps numbers or symbols to the rates of a state, or to another column
+Motion = Callable[..., ca.SX]  # from numbers or symbols to a column vector: the rates of a state, or other signals
 
 
 class Stepped(ABC):
@@ -304,15 +304,15 @@ class ControlSample:
 class Sampled(Scheme, Decided):
     """A controller that measures every T_s and holds its pressure in between (zero-order hold).
 
-    The entries of the memory are: the numbers of law, actuator and measurement, the scheme's own memory, the last
-    held pressure, and the memories of the actuator, the noise generator and the aperiodic sampling.
+    The entries of the memory are: the numbers of law, actuator and measurement, B0, the scheme's own memory, the last
+    held pressure, and the memories of the actuator, the sensor and the aperiodic sampling.
 
     Attributes
     ----------
     substeps : int
         Steps of the integrator per sample, 1 … 100.
     measurement : Measurement or Sensor
-        A sensor that is no `Measurement` reads only the true slip, and only at its own sampling period.
+        A sensor other than `Measurement` needs the slip alone, not the slip rate, and requires its own sampling period.
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
     clock : AperiodicClock or None
@@ -359,7 +359,7 @@ class Sampled(Scheme, Decided):
         return pressure
 
     def integral_effect(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
-        """Pressure change [Pa] (SX) due to the change of ξ at a sample; ξ stays constant where a limit prevents it."""
+        """Pressure change [Pa] (SX) due to the update of ξ at a sample, before anti-windup holds ξ at a limit."""
         return self._sample(loop, counter, state, step).integral_effect
 
     def outputs(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> dict[str, ca.SX]:

@@ -33,10 +33,11 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 #
 # - At a jump of a sign, where its argument vanishes, the two one-sided values of F show on which side the solution
 #   lies, or that it lies at the jump; then a linear equation gives the selection from [−1, 1]. So all signs are known.
-# - With the signs fixed, w = g(w) with g continuous and non-increasing. The solution lies between 0 and g(0): for
-#   g(0) ≥ 0, 0 − g(0) ≤ 0 and g(0) − g(g(0)) ≥ 0, as g(g(0)) ≤ g(0); likewise with the signs reversed. Reducing this
-#   bracket to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; evaluating three points at once uses a processor better than one.
-#   At a jump this search is skipped: a loop that its signs hold there would spend most of its time on it.
+# - With the signs fixed, w = g(w) with g continuous and non-increasing. The solution lies between 0 and g(0): if
+#   g(0) ≥ 0, then w − g(w) is −g(0) ≤ 0 at w = 0, and g(0) − g(g(0)) ≥ 0 at w = g(0), because g(g(0)) ≤ g(0); likewise
+#   with the signs reversed. Reducing this bracket to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; evaluating three points at
+#   once uses a processor better than one. At a jump the search is skipped, since a loop in sliding mode, which stays at
+#   a jump, would spend most of its time on it.
 
 ROUNDS = 27
 AT_ONCE = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
@@ -46,7 +47,7 @@ InclusionValues = dict[sp.Symbol, ca.SX]
 
 
 def direction(expression: sp.Expr) -> int | None:
-    """1, 0 or −1 if an expression never falls, never changes or never rises with the end of the step; else None."""
+    """1, 0 or −1 if an expression never falls, changes or rises with `end_slip` and `end_rate`; else None."""
     if not expression.free_symbols & {end_slip, end_rate}:
         return 0
     if expression in (end_slip, end_rate):
@@ -244,7 +245,7 @@ def where_needed(function: ca.Function) -> ca.Function:
 
 
 def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
-    """Argument, or its negative, that increases with the end of the step, without its scale; and the sign taken out."""
+    """Argument without its constant factor, negated if it decreases; and its direction, 1 or −1."""
     way = direction(argument)
     if not way:
         raise ParameterError(
@@ -263,7 +264,7 @@ def _is_straight(expression: sp.Expr) -> bool:
 
 
 def _sign_only(expression: sp.Expr) -> sp.Expr:
-    """An expression of the same sign without its first cube root: that of a + c⌈x⌋^⅓ is that of a³ + c³x."""
+    """Expression with the same sign, without the first cube root: a + c⌈x⌋^⅓ has the sign of a³ + c³x."""
     expanded = sp.expand_mul(expression)
     for term in sp.Add.make_args(expanded):
         factor, root = term.as_independent(end_slip, end_rate, as_Add=False)

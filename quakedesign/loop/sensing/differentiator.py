@@ -177,10 +177,11 @@ DISCRETISATIONS = ("euler", "homogeneous", "implicit")
 class Differentiator:
     """Estimates slip and n_d derivatives, exact after a transient if |x1^(n_d+1)| ≤ L_d < λ_d; filter order n_f.
 
-    With measurement errors of at most ε and sampling period T, the error of the estimate of derivative i is a multiple
-    of λ_d·δ^(n_d+1−i), δ = max(T, (ε/λ_d)^(1/(n_d+1))); for ``euler`` with n_d = 1 only. Levant and Livne (2020),
-    European Journal of Control 55, 33. The paper takes n_d = n_f = 2, for which no λ_d works in a sliding mode; for
-    n_d = 1 one does (ERRATA 21). See `quakedesign.loop.sensing.differentiator` for the equations.
+    With measurement errors of at most ε and sampling period T, the error of the estimate of derivative i is at most a
+    constant times λ_d·δ^(n_d+1−i), δ = max(T, (ε/λ_d)^(1/(n_d+1))); with ``euler`` this holds for n_d = 1 only. Levant
+    and Livne (2020), European Journal of Control 55, 33. The paper takes n_d = n_f = 2, for which no λ_d suffices under
+    a sliding-mode law, since x1‴ is unbounded there; for n_d = 1 some λ_d does (ERRATA 21). See
+    `quakedesign.loop.sensing.differentiator` for the equations.
 
     Attributes
     ----------
@@ -360,16 +361,18 @@ def _next(entries: Iterator[ca.SX], count: int) -> Entries:
 # ----------------------------------------------------------------------
 # The implicit differentiator from rest, with a sufficiently large bound λ_d, is a filter of backward differences.
 #
-# With y = (w_1 … w_nf, z_0 … z_nd) as in the first chapter, let w = 0 before a reading x, let
-# z_0 = x1 be the previous reading, and z_i = ∇ⁱx1/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is
-# −T^nf·∇^(nd+1)x, and if |∇^(nd+1)x| ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from
-# z_i⁺ = z_i + T·z_(i+1)⁺, z_(i+1)⁺ = ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the differentiator
-# is this filter for all t and any n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and
-# a law with its estimates is a law of the slip alone, whose guarantee includes all errors of the estimates.
+# With y = (w_1 … w_nf, z_0 … z_nd) as in the first chapter, let w = 0 before a reading x, let z_0 = x⁻ be the previous
+# reading, and z_i = ∇ⁱx⁻/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is −T^nf·∇^(nd+1)x, and if |∇^(nd+1)x|
+# ≤ λ̃_0·λ_d·T^(nd+1) the step gives s⁺ = 0. So w stays 0, z_0⁺ = x and, from z_i⁺ = z_i + T·z_(i+1)⁺, z_(i+1)⁺ =
+# ∇^(i+1)x/T^(i+1). At rest at slip 0 all of y is 0. By induction the differentiator is this filter for all t and any
+# n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and a law with its estimates is a
+# law of the slip alone, whose guarantee includes all errors of the estimates.
 #
 # With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: no bound of x1‴ is needed, which does not
-# exist with zero-order hold. ∇²x1 is the integral of x1″ weighted by a triangle over two periods, so that c is the area
-# of |∇^(nd−1) of triangles|: straight lines between binomials of either sign, c = 1 for n_d = 1, 3/2 for n_d = 2.
+# exist with zero-order hold. ∇²x1 is T times the integral of x1″ weighted by a triangular function over two periods. So
+# c is the integral of the absolute value of the (n_d−1)-th difference of this function, in units of T. That difference
+# is piecewise linear, and its corners are binomial coefficients of alternating sign: c = 1 for n_d = 1, 3/2 for n_d =
+# 2.
 
 ORDER = 2  # n_d as printed
 

@@ -224,7 +224,7 @@ class SlidingProgram:
     law: LinearLaw
     step: Fraction  # T_s [s]
     path: PressurePath
-    # stress, period: Amplitude [Pa] and period [s] of the stress of a sample whose share is 1
+    # stress, period: Amplitude [Pa] and period [s] of the stress of a sample with the relative amplitude 1
     stress: float
     period: float
     plant: str
@@ -233,7 +233,7 @@ class SlidingProgram:
 
     @property
     def fingerprint(self) -> str:
-        """Digest of the fields that `inputs` does not contain; the library versions there identify the solver."""
+        """Digest of pressure path, stress, period and method; the versions in `inputs` identify the solver."""
         text = f"{self.path} {self.stress!r} {self.period!r} {self.method}"
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -583,7 +583,7 @@ class SteppedProblem(CampaignProblem):
         return np.array(self.recorder(sample).start(self.setting.settled_from))
 
     def starts(self, samples: Sequence[Sample]) -> "np.ndarray":
-        """See `CampaignProblem.starts`; without noise samples differ only in initial state and factors."""
+        """See `CampaignProblem.starts`; without noise, the samples differ only in initial state and factors."""
         if not samples or self._noisy:
             return super().starts(samples)
         rows = np.tile(self.start(samples[0]), (len(samples), 1))

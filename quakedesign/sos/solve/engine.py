@@ -48,8 +48,9 @@ from quakedesign.sos.solve.rounding import scaled
 # ----------------------------------------------------------------------
 # Multipliers of a polynomial P on ℝⁿ: powers of the sum of squares, and sums of squares that are searched for P.
 #
-# A sum of squares σ of given degree for which σ·P is one too is the solution of a linear conic programme. σ is computed
-# in floating point and scaled variables, rounded, and proved to be a sum of squares. The caller decides σ·P exactly.
+# Let σ be a sum of squares of given degree. That σ·P is also a sum of squares is a linear conic condition on σ. σ is
+# computed in floating point and scaled variables, rounded, and proved to be a sum of squares. The caller decides σ·P
+# exactly.
 
 _TERMS = 40  # most terms of σ, so that the programme is solved within seconds
 _GRID = 2**8  # denominator of its coefficients
@@ -57,7 +58,10 @@ _LEAST = 1e-5  # least margin of σ, whose coefficients are at most one
 
 
 def searched(variables: tuple[str, ...], polynomial: Polynomial, top: int) -> Polynomial | None:
-    """Sum of squares σ of given degree for which σ·P may be one; a form if P is one. None if none is found."""
+    """Sum of squares σ of given degree such that σ·P may be a sum of squares; None if not found.
+
+    σ is a form if P is a form.
+    """
     moved = scaled(statement(variables, polynomial))
     target = moved.statement.polynomial
     used = [i for i in range(len(variables)) if any(e[i] for e in target)]
@@ -76,7 +80,10 @@ def searched(variables: tuple[str, ...], polynomial: Polynomial, top: int) -> Po
 
 
 def _centred(variables: tuple[str, ...], target: Polynomial, terms: list[Exponents]) -> list[float] | None:
-    """Coefficients of σ, at most one, with the largest t for which σ − t·Σ m² is a sum of squares."""
+    """Coefficients of σ, each of size at most 1, with the largest t such that σ − t·Σ m² and σ·P are sums of squares.
+
+    m² are the terms of σ with even exponents.
+    """
     squares = {e: Fraction(1) for e in terms if not any(k % 2 for k in e)}
     own: list[Polynomial] = [{e: Fraction(1)} for e in terms]
     multiplied = [product(len(variables), (target, p)) for p in own]
@@ -141,14 +148,15 @@ def prove(
         Constraints of the set such as ``"x >= 0"``, ``"x^2 + y^2 <= 1"``, ``"x*y == 1"``; ℝⁿ unless given.
     multiplier : str, SymPy expression or mapping, optional
         multiplier · polynomial is decided instead. ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
-        for forms on the orthant) up to the third. On ℝⁿ the variables are those of the squarefree cofactor of the
-        polynomial, and a sum of squares searched for it is tried before the first and second power, of equal degree.
+        for forms on the orthant) up to the third. On ℝⁿ only variables that remain after division by the square factor
+        occur; a sum of squares of the same degree, found by a search, is tried before the first and the second power.
     variables : sequence of str or Symbol, optional
         Variables in order; by default in order of appearance.
     margin : rational, optional
         polynomial − margin·Σ x_i^d (forms of degree d) or − margin·(1 + Σ x_i^d) is decided instead.
     products : bool, optional
-        All squarefree products of inequalities if True, none if False; by default products of variables only.
+        All squarefree products of inequalities if True, single inequalities only if False. By default products of
+        inequalities that are variables, and the others singly.
     degree_bound : int, optional
         Largest degree of a summand. By default the smallest even degree possible and, on a constrained set, also the
         next even degree.
@@ -317,7 +325,8 @@ class SquareFactor(Method):
     def propose(self, claim: Statement) -> SumOfSquares | None:
         """See `Method.propose`; None also if r is no sum of squares.
 
-        A square factor of the multiplier may be needed for r, so the polynomial is also factored without multiplier.
+        Two polynomials are factored: the given one, with the multiplier kept for r, and its product with the
+        multiplier, which may lose a square factor of the multiplier that r needs.
         """
         count = len(claim.variables)
         whole = replace(claim, polynomial=claim.target, multiplier=constant(count))

@@ -204,7 +204,7 @@ def simplest(value: float, tolerance: float) -> Fraction:
 
 
 def just_below(value: Fraction) -> Fraction:
-    """Fraction of few digits below a positive number, by at most 1e-7 relative, less than a bisection step."""
+    """Simple fraction at or below a positive number, by at most 1e-7 relative: finer than the bisection on levels."""
     return simplest_between(value * (1 - Fraction(1, 10**7)), value)
 
 

@@ -117,9 +117,10 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
 
 
 def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[float], float]]:
-    """Points strictly inside where the polynomial is negative, with their distances from x in decreasing order.
+    """Points strictly inside where the polynomial is negative, with their step from x, in decreasing order of the step.
 
-    They lie in the direction in which the slowest active constraint increases fastest; none if no direction exists.
+    The direction is the one in which the slowest active constraint increases fastest, with coordinates of at most 1;
+    without an active constraint the point is x itself; none if there is no such direction.
     """
     point = np.asarray(x, dtype=float)
     direction = _into(statement, point)
@@ -174,7 +175,9 @@ def polished_zeros(statement: Statement, candidates: Sequence[Sequence[float]]) 
 
 
 def local_minima(statement: Statement, hints: Sequence[Sequence[float]] = ()) -> Iterator[list[float]]:
-    """Local minima of the polynomial on the set in floating point, from seeded starts; on ℝⁿ also at infinity.
+    """Candidates for local minima of the polynomial on the set, in floating point, from seeded starts.
+
+    Minima at infinity are returned as far points; on constrained sets the lowest samples come first.
 
     On ℝⁿ and orthants the homogenised polynomial is minimised on the sphere (x_i = v_i² where x_i ≥ 0); with other
     constraints SLSQP works in the variables themselves.
@@ -283,7 +286,7 @@ def negative_point(
 
 
 def _inside(statement: Statement, x: Sequence[float], scale: Sequence[Fraction]) -> Iterator[tuple[Fraction, ...]]:
-    """Rational points inside a boundary point, with rounding errors below their distance from it."""
+    """Rational points of the interior near a boundary point, with rounding errors below their distance from it."""
     if statement.inequalities and not statement.equalities:
         for moved, distance in inwards(statement, x):
             size = max(1e-2, *map(abs, moved))
