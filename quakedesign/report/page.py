@@ -191,8 +191,8 @@ def _slowly(entry: "Entry") -> list[str]:
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
         "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
         "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
-        f"terms of the claimed bounds, and the claims imply themselves (small gain). They hold {proof.lasts}. The box of "
-        f"constants is divided into {cells}.",
+        f"terms of the claimed bounds, and the claims imply themselves (small gain). They hold {proof.lasts}. The box "
+        f"of constants is divided into {cells}.",
     ]
 
 
