@@ -763,6 +763,7 @@ def test_products_of_many_columns_and_of_many_rows_are_those_of_integers(bits, s
 def test_places_of_a_long_integer_hold_the_largest_sums():
     left, right = [[(1 << 190) - 1] * 20], [[(1 << 193) - 1, 1 - (1 << 193)]] * 20
     assert checker.long_product(left, right) == [[20 * left[0][0] * v for v in right[0]]]
+    assert checker.long_product([[-31] * 7], [[127] * 3] * 7) == [[-7 * 31 * 127] * 3]  # 15 bits and a sign
 
 
 def test_bounds_are_rounded_up_to_whole_units():
