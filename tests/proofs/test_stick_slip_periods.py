@@ -1,7 +1,9 @@
 """Bounds of a period of the stick-slip plant in both checkers, against courses of such plants."""
 
 from collections import defaultdict
+from contextlib import nullcontext
 from copy import copy
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 from itertools import chain
@@ -9,7 +11,7 @@ from itertools import chain
 import numpy as np
 import pytest
 from flint import ctx
-from stick_slip_box import STICK, box, period_of
+from stick_slip_box import CHECK, STICK, box, period_of
 from thinned import few
 
 from quakedesign.guarantees import read_guarantee
@@ -335,3 +337,98 @@ def test_noise_of_the_slip_may_put_a_fault_at_rest_in_both_checkers():
         lines = package.polytopes(claim.task, claim.held, claim.reach.facets, known)[package.SLICES :]
         found.append([line[-7][1] for line in lines])
     assert [after - before for before, after in zip(*found, strict=True)] == [more] * 7
+
+
+class Held:
+    """A polytope on which every function has the same largest value."""
+
+    def __init__(self, value):
+        self.value = value
+
+    def largest(self, *_):
+        return self.value
+
+
+def bare(monkeypatch, *facets, law=None, value=0, **fields):
+    """A period in which every map of some facets has one value, and the facets and maps that were asked for."""
+    p, asked = copy(period()), []
+    p.law = replace(p.law, **(law or {}))
+    rows = [[Fraction(v) for v in facet] for facet in facets]
+    p.reach = replace(p.reach, facets=rows, multipliers=[[Fraction(0)] * 5 for _ in rows])
+    p.flat, p.force = [Held(value)] * 3, Fraction(10**9)
+    vars(p).update(fields)
+    monkeypatch.setattr(p, "respond", lambda _: None)
+    monkeypatch.setattr(p, "sliding", lambda row, _, cut: asked.append((tuple(row), cut)) or iter([(0, None)]))
+    monkeypatch.setattr(p, "resting", list)
+    return p, asked
+
+
+def test_a_limited_innovation_counts_for_facets_that_grow_with_the_estimate(monkeypatch):
+    p, asked = bare(monkeypatch, (0, 0, 1), (0, 0, 0), (0, 0, -1), (1, 0, 2))
+    p.verify()
+    cut = [(0, 0, 1), (1, 0, 2)]
+    assert sorted(asked) == sorted(
+        [(facet, False) for facet in (*cut, (0, 0, 0), (0, 0, -1))] + [(facet, True) for facet in cut]
+    )
+
+
+def test_a_facet_may_be_reached_and_not_passed(monkeypatch):
+    bare(monkeypatch, (0, 1, 0), value=STICK.ONE)[0].verify()
+    p, _ = bare(monkeypatch, (0, 1, 0), value=STICK.ONE + 1)
+    with pytest.raises(CHECK.Refused, match="facet 0 must hold after a sliding period"):
+        p.verify()
+    p, _ = bare(monkeypatch, (0, 1, 0))
+    monkeypatch.setattr(p, "stopped", lambda *_: iter([None]))
+    for value, holds in ((STICK.ONE, True), (STICK.ONE + 1, False)):
+        monkeypatch.setattr(p, "resting", lambda value=value: [(Held(value), p.ends[:1])])
+        with nullcontext() if holds else pytest.raises(CHECK.Refused, match="after a period that ends at rest"):
+            p.verify()
+
+
+@pytest.mark.parametrize(("noise", "inside"), [("1/4", True), ("251/1000", False)])
+def test_the_first_state_lies_in_the_set_with_its_noise(noise, inside, monkeypatch):
+    """Of two facets the first has e1 + 3d/2 at most 1/2: 1/4 + 1/4 for a noise of 1/4 and a slip gain of 2/3."""
+    law = {"slip_noise": Fraction(noise), "slip": Fraction(2, 3)}
+    p, _ = bare(monkeypatch, (2, 0, 3), (-1, 0, -1), law=law)
+    with nullcontext() if inside else pytest.raises(CHECK.Refused, match="must contain the initial state"):
+        p.verify()
+
+
+@pytest.mark.parametrize(("longest", "least"), [("0", 1), ("3", 0)])
+@pytest.mark.parametrize("share", ["1", "999999/1000000"])
+@pytest.mark.parametrize("push", ["4", "-4"])
+def test_the_range_of_beta_has_at_most_the_effect_of_the_disturbance(longest, least, share, push, monkeypatch):
+    """(δS·q·T²/2 + δw·T(1 + S⁺q·T²))·b·(β1 − 1)·U⁺, with β1 for β1 − 1 and the longest T of several."""
+    T = max(Fraction(2), Fraction(longest))
+    of_push = Fraction(1, 3) * T**2 / 2 + Fraction(1, 5) * T * (1 + Fraction(1, 7) * Fraction(3, 2) * T**2)
+    needed = of_push * 5 * (Fraction(3, 2) - least) * max(Fraction(push), 0)
+    p, _ = bare(
+        monkeypatch, (0, 1, 0),
+        law={"step": Fraction(2), "longest": Fraction(longest)},
+        per_slip=Fraction(1, 3), per_rate=Fraction(1, 5), slope=(Fraction(-1), Fraction(1, 7)), growth=Fraction(3, 2),
+        push=(Fraction(-9), Fraction(push)), force=needed * Fraction(share),
+        task=replace(period().task, b=Fraction(5), beta=(Fraction(1), Fraction(3, 2))),
+    )  # fmt: skip
+    with nullcontext() if share == "1" or not needed else pytest.raises(CHECK.Refused, match="range of beta"):
+        p.verify()
+
+
+def test_bounds_contain_the_noise_on_either_side():
+    """The state contains the slip plus its largest error: behind by that much more, ahead by that much less."""
+    p = copy(period())
+    p.law = replace(p.law, slip_noise=Fraction(1, 100))
+    found, plain = p.bounds(), period().bounds()
+    moved = {name: found[name] - plain[name] for name in found}
+    assert moved == {**dict.fromkeys(found, 0), "slip_behind": Fraction(1, 100), "slip_ahead": -Fraction(1, 100)}
+
+
+@pytest.mark.parametrize("name", STICK.CLAIMS)
+def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
+    document, exact = box(), period().bounds()
+    monkeypatch.setattr(STICK.Period, "verify", lambda _: None)
+    for share, holds in ((0, True), (1, False)):
+        away = Fraction(share, 10**9) * (1 if name.startswith("least") else -1)
+        claims = {key: str(value + (away if key == name else 0)) for key, value in exact.items()}
+        given = dict(document, claims=claims)
+        with nullcontext() if holds else pytest.raises(CHECK.Refused, match=f"claim {name} must follow"):
+            STICK.verify(given)
