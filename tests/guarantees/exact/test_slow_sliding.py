@@ -207,7 +207,7 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction, swing):
     assert [moved[name] for name in OUTPUTS[:3]] == cell.soon(F(3))
 
 
-@few("path", [*PATHS, {"diffusion": F(40), "delay": F(20), "slip_noise": F(1, 10**7)}], every=2)
+@few("path", [{"diffusion": F(40), "delay": F(20), "slip_noise": F(1, 10**7)}, *PATHS], every=2)
 @pytest.mark.parametrize("friction", FRICTION.values(), ids=FRICTION)
 def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
     """Exactly, of gains that are made up: what adds at once, what a step does, small gain and bounds."""
@@ -560,7 +560,8 @@ def test_a_guarantee_along_references_of_a_swing_is_proved_by_both_checkers_and_
 def test_a_swing_that_is_none_or_stops_the_reference_is_refused_by_both(swing):
     raw = json.loads(guarantee_text(SWINGING))
     raw["reference"]["swing"] = swing
-    with pytest.raises(checker.Refused):
+    reason = "swing must be above 0 and below 1" if isinstance(swing, str) else "swing must be a rational"
+    with pytest.raises(checker.Refused, match=reason):
         checker.check(json.dumps(raw))
     with pytest.raises(CertificateError):
         parse_guarantee(json.dumps(raw))
@@ -745,6 +746,27 @@ def test_a_key_that_is_not_known_is_refused_by_both(where):
         parse_guarantee(json.dumps(raw))
 
 
+@pytest.mark.parametrize("name", ["fault", "reference", "loop", "claims", "cells"])
+@pytest.mark.parametrize("value", [5, None, True])
+def test_a_part_that_is_no_object_and_no_list_is_refused_by_both(name, value):
+    raw = json.loads(guarantee_text(CLAIM)) | {name: value}
+    with pytest.raises(checker.Refused):
+        checker.check(json.dumps(raw))
+    with pytest.raises(CertificateError):
+        parse_guarantee(json.dumps(raw))
+
+
+def test_a_lag_and_a_diffusion_path_of_half_a_second_are_read_and_bound_the_pressure():
+    """q̇ = (1/lag or 5/(2τ))·(asked + drift·(τ/2 + lag) + push) + drift, with τ = L²/D and a drift of 2 Pa/s."""
+    one, half = task(ranges=UNSURE, ramp=F(14)), F(1, 2)
+    for path, fastest, late in (({"lag": half}, 1 / half, half), ({"diffusion": half}, F(5, 2) / half, half / 2)):
+        cell = alone(one, SampledLoop(law=STIFF, step=F(1), **path))
+        assert cell.fastest_push() == fastest * (380000 + 2 * late + 380000) + 2
+    nothing = json.loads(guarantee_text(CLAIM))["loop"] | {"lag": "0", "diffusion": "0"}
+    with pytest.raises(checker.Refused, match="through a lag or a diffusion path"):
+        standalone.read_path(nothing)
+
+
 @pytest.mark.parametrize("name", ["log_rate", "log_state"])
 def test_logarithms_above_3_are_refused_by_both_for_that_reason(name):
     text = changed(("claims", name), "300001/100000")
@@ -785,7 +807,8 @@ def test_the_statement_has_the_conditions_inward_and_the_bounds_outward(changes,
     assert ("with the slip law" in first, "with the ageing law" in first) == (wide.swing > 0, wide.swing == 0)
     assert law.endswith(" of the true one") is (noise != "0")
     assert (f"within {noise} m" in law) is (noise != "0")
-    assert ("along any reference whose rate stays within (1 +- 0.05)" in disturbance) is (wide.swing > 0)
+    assert ("whose rate stays within (1 +- 0.05)" in disturbance) is (wide.swing > 0)
+    assert ("along any reference" in disturbance) is (wide.swing > 0)
     needed = 6_000_000 * wide.distance / F(3, 10)  # K·distance/μ*, which the plan reaches at its end
     assert fault == f"pressure in the fault from -3.8e+05 Pa to {float(380_000 + needed):.4g} Pa"
     assert valve == f"pressure at the valve from -3.8e+05 Pa to {float(380_000 + needed):.4g} Pa"
