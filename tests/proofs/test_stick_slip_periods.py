@@ -432,3 +432,142 @@ def test_every_claim_may_be_what_follows_and_no_less(name, monkeypatch):
         given = dict(document, claims=claims)
         with nullcontext() if holds else pytest.raises(CHECK.Refused, match=f"claim {name} must follow"):
             STICK.verify(given)
+
+
+# ---------------------------------------------------------------- what the standalone checker reads
+
+
+def test_a_basis_names_constraints_of_its_polytope_alone(monkeypatch):
+    """Facets, y >= 0 and the ends of a slice: one, two and one. At rest slip >= 0, the condition and six bounds."""
+    asked, read = {}, STICK.read_bases
+    monkeypatch.setattr(
+        STICK, "read_bases", lambda given, where, size, counts: asked.update({where: (size, counts)}) or read(
+            given, where, size, counts
+        )
+    )  # fmt: skip
+    document = box()
+    STICK.read_reach(document["set"])
+    plain = [len(document["set"]["facets"]) + 1 + ends for ends in (1, 2, 1)]
+    assert asked == {"sliding": (3, tuple(plain)), "resting": (4, tuple(plain[s] + 8 for s in (0, 0, 1, 1, 1, 2, 2)))}
+
+
+@pytest.mark.parametrize(
+    "bases", [5, "ab", {"a": 1}, [5, []], [[], [[0, 1, 2]]], [[[0, 1, 2]], {"a": 1}], [[[0, 1, 2]], ["012"]],
+              [[[0, 1, 2]], [{0: 1, 1: 1, 2: 2}]], [[[0, 1, 2]], [[0, 1]]], [[[0, 1, 2]], [[0, 1, 9]]],
+              [[[0, 1, 2]], [[0, 1, -1]]], [[[0, 1, 2]], [[0, 1, True]]], [[[0, 1, 8]], [[0, 1, 2]]]]
+)  # fmt: skip
+def test_bases_are_lists_of_numbers_of_constraints(bases):
+    assert STICK.read_bases([[[0, 1, 7]], [[8, 1, 2]]], "sliding", 3, (8, 9)) == [[[0, 1, 7]], [[8, 1, 2]]]
+    with pytest.raises(CHECK.Refused, match="sliding"):
+        STICK.read_bases(bases, "sliding", 3, (8, 9))
+
+
+def test_a_set_has_five_facets_at_least_and_a_law_may_have_gains_of_zero():
+    document = box()
+    five = {name: document["set"][name][:5] for name in ("facets", "multipliers")}
+    five |= {"sliding": [[[0, 1, 2]]] * 3, "resting": [[[0, 1, 2, 3]]] * 7}
+    assert len(STICK.read_reach(document["set"] | five).facets) == 5
+    for value in (5, "facets", None):
+        with pytest.raises(CHECK.Refused, match="there must be 5 to 400 facets"):
+            STICK.read_reach(document["set"] | {"facets": value})
+    for name in ("level_gain", "slip_gain"):
+        for value in ("0", "1/2"):
+            assert STICK.read_law(document["loop"] | {name: value})
+        with pytest.raises(CHECK.Refused, match="level_gain and slip_gain must be >= 0"):
+            STICK.read_law(document["loop"] | {name: "-1/2"})
+    for value in (5, None, ["pull"]):
+        with pytest.raises(CHECK.Refused, match="loop"):
+            STICK.read_law(value)
+
+
+def test_an_implicit_step_has_at_most_sixteen_terms():
+    term = {"factor": ["1", "1"], "power": "1", "of": "slip"}
+    law = box()["loop"] | {"target_gain": "2", "return_rate": "2"}
+    assert len(STICK.read_law(law | {"pull": [term] * 16}).pull) == 16
+    assert STICK.read_law(law | {"pull": [term | {"of": [term] * 15}]}).pull
+    for beyond in ([term] * 17, [term | {"of": [term] * 16}]):
+        with pytest.raises(CHECK.Refused, match="at most 16"):
+            STICK.read_law(law | {"pull": beyond})
+
+
+def test_states_of_a_slice_have_the_sizes_and_signs_of_the_first_facets():
+    p = period(True)
+    ahead, peak, up, behind, down = (1 / abs(next(v for v in row if v)) for row in p.reach.facets[:5])
+    turn = (p.task.reference_rate + 2 * p.law.back * p.law.slip_noise) / p.law.back
+    assert [sizes[0] for sizes in p.sizes] == [behind, min(ahead, turn), ahead]
+    assert {tuple(sizes[1:]) for sizes in p.sizes} == {(peak, max(up, down))}
+    assert p.signs == [(-1, 1, 0), (1, 1, 0), (1, 1, 0)]
+
+
+class Rock:
+    """A fault with given ranges: at rest, of the slope with and without the pressure, and of the damping."""
+
+    def __init__(self, still=(10, 12), slopes=(-2, "1/8"), chords=(-3, "1/9"), damping=(1, 2)):
+        self.still, self.damping = (tuple(map(Fraction, pair)) for pair in (still, damping))
+        self.slopes, self.chords = (tuple(map(Fraction, pair)) for pair in (slopes, chords))
+        self.stiffness, self.area = (Fraction(1), Fraction(3)), (Fraction(2), Fraction(5))
+        self.mu, self.asked = {"static": Fraction(1, 2)}, []
+
+    def stress(self, slip, growth):
+        self.asked.append((slip, growth))
+        return self.still
+
+    def of_slip(self, stress, growth):
+        self.asked.append((stress, growth))
+        return self.chords if stress == self.still else self.slopes
+
+    def of_rate(self, stress, growth):
+        self.asked.append((stress, growth))
+        return self.damping
+
+
+def ranged(rock, growth=1, force=9, normal=200, **law):
+    """A period with the ranges of a fault; steps of 1/2, pressures from 4 below to 5 above those at rest."""
+    p = copy(period())
+    p.law, p.push, p.force = replace(p.law, step=Fraction(1, 2), **law), (Fraction(-4), Fraction(5)), Fraction(force)
+    p.task = replace(p.task, normal_stress=Fraction(normal))
+    p.find_ranges(rock, Fraction(3), [Fraction(growth), Fraction(1, 7)])
+    return p
+
+
+def test_ranges_are_those_of_the_fault_at_the_pressures_and_contain_zero():
+    rock = Rock()
+    p = ranged(rock)
+    slip = 3 + p.ahead + p.task.reference_rate / 2
+    assert rock.asked == [(slip, 1), ((6, 17), 1), ((6, 17), Fraction(1, 7)), ((10, 12), 1)]
+    assert (p.rest, p.slope, p.damping) == ((188, 190), (-2, Fraction(1, 8)), (1, 2))
+    moves = 1 + p.task.slope_of_beta * p.peak / 2
+    assert p.chord == (-3 * moves, moves / 9)
+    assert p.longest == min(g * p.peak + h for g, h in p.stops())
+    assert ranged(Rock(slopes=("1/9", "1/8"), chords=("1/9", "1/8"))).slope == (0, Fraction(1, 8))
+    assert ranged(Rock(slopes=(-2, -1), chords=(-2, -1))).slope == (-2, 0)
+    assert ranged(Rock(chords=(-2, -1))).chord == (-2 * moves, 0)
+    assert ranged(Rock(chords=("1/9", "1/8"))).chord == (0, moves / 8)
+
+
+@pytest.mark.parametrize(
+    ("rock", "given", "reason"),
+    [
+        (Rock(still=(4, 12)), {}, "must not open"),
+        (Rock(damping=("-1/100", 2)), {}, "damping must not be negative"),
+        (Rock(slopes=(-2, 4)), {}, "short against the weakening"),
+        (Rock(slopes=(-2, "1/8"), still=("401/100", 12)), {"normal": "1/100"}, "must not reverse"),
+        (Rock(slopes=(-40, "1/8")), {}, "stops|condition of rest"),
+    ],
+)
+def test_each_condition_on_the_ranges_is_asked_for(rock, given, reason):
+    with pytest.raises(CHECK.Refused, match=reason):
+        ranged(rock, **given)
+
+
+def test_conditions_on_the_ranges_hold_up_to_their_ends():
+    assert ranged(Rock(still=("401/100", 12)))
+    assert ranged(Rock(damping=(0, 2)))
+    assert ranged(Rock(slopes=(-2, "399/100")))
+    p = ranged(Rock())
+    slip = 3 + p.ahead + p.task.reference_rate / 2
+    for growth, stiffness in ((1, 2), (3, 0), (4, 0), (-1, 4)):  # load = 2·(1/2)·normal, stiffness from 3 less growth
+        least = stiffness * slip + 9
+        assert ranged(Rock(), growth, normal=least + Fraction(1, 10**9))
+        with pytest.raises(CHECK.Refused, match="must not reverse"):
+            ranged(Rock(), growth, normal=least)
