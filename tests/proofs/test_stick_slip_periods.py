@@ -571,3 +571,57 @@ def test_conditions_on_the_ranges_hold_up_to_their_ends():
         assert ranged(Rock(), growth, normal=least + Fraction(1, 10**9))
         with pytest.raises(CHECK.Refused, match="must not reverse"):
             ranged(Rock(), growth, normal=least)
+
+
+def test_weights_are_sixty_times_the_integrals_of_hat_functions():
+    """∫ (1 − |t − i|)·t^j over the pieces beside i, from the antiderivatives of t^j and t^(j+1)."""
+    pieces = range(STICK.PIECES)
+    for j, line in enumerate(STICK.weights()):
+        whole, first = (lambda t, j=j: Fraction(t ** (j + 1), j + 1)), (lambda t, j=j: Fraction(t ** (j + 2), j + 2))
+        rises = [first(i + 1) - first(i) - i * (whole(i + 1) - whole(i)) for i in pieces]
+        falls = [whole(i + 1) - whole(i) - rise for i, rise in zip(pieces, rises, strict=True)]
+        assert line == [60 * (a + b) for a, b in zip([0, *rises], [*falls, 0], strict=True)]
+    assert STICK.weights() == STICK.WEIGHTS
+    assert len(STICK.WEIGHTS) == 4
+
+
+@pytest.mark.parametrize(
+    ("loop", "task", "said", "unsaid"),
+    [
+        ({}, {}, ["any acceleration of at most 0.125 m/s^2", "law for the stick-slip plant, every 1/2 s",
+                  "slip and slip rate measured exactly", "any function of slip and slip rate within"],
+         ["any order", "deadbeat", "slip measured within", "none (amplitude 0)"]),
+        ({"slip_noise": "1/90", "rest_slip": "1/40"}, {"amplitude": Fraction(0)},
+         ["slip measured within 0.01111 m, slip rate exactly", "disturbance: none (amplitude 0); from rest"],
+         ["measured exactly", "any acceleration"]),
+        ({"longest": "5/8"}, {"steady_beta": True},
+         ["every 1/2 s to 5/8 s in any order", "any function of the slip alone"],
+         ["slip and slip rate within"]),
+        ({"target_gain": "2", "return_rate": "2", "pull": [{"factor": ["1", "1"], "power": "1", "of": "slip"}]}, {},
+         ["sliding mode for the stick-slip plant", "its implicit step is deadbeat, w = -e1/step, on this set"], []),
+    ],
+)  # fmt: skip
+def test_the_statement_says_what_is_assumed_and_bounds_outward(loop, task, said, unsaid):
+    document = box()
+    document["loop"] |= loop
+    p = copy(period())
+    p.law, p.task = STICK.read_law(document["loop"]), replace(p.task, **task)
+    p.slope, p.damping = (Fraction(-2, 3), Fraction(1, 3)), (Fraction(1, 3), Fraction(2, 3))
+    numbers = (Fraction(n, 3) for n in (1, 2, 4, -5, 7))
+    lines = STICK.statement(document, p, dict(zip(STICK.CLAIMS, numbers, strict=True)))
+    text = "\n".join(lines)
+    assert [words for words in said if words not in text] == []
+    assert [words for words in unsaid if words in text] == []
+    assert lines[0].startswith('fault "a box" (a label; ')
+    assert lines[1].startswith(
+        "derived accelerations: per slip within a period [-0.6667, 0.3334] 1/s^2, per slip rate "
+    )
+    assert "minus [0.3333, 0.6667] 1/s, per pressure " in lines[1]
+    assert f"{float(p.task.b):.4g} m^2/kg times [1, " in lines[1]
+    assert float(lines[1].split("[1, ")[1].rstrip("]")) >= p.task.beta[1]
+    assert f"a set of {len(p.reach.facets)} facets" in lines[2]
+    assert lines[-3:] == [
+        "the slip rate of this fault never exceeds 1.334 m/s",
+        "the slip is at most 0.3334 m behind and 0.6667 m ahead of the reference",
+        "pressure from -1.667 Pa to 2.334 Pa",
+    ]
