@@ -228,6 +228,50 @@ def test_the_package_names_the_rule_that_a_file_breaks(raw, path, value, said):
         CHECK.check(json.dumps(given))
 
 
+OF_REFERENCE = [["1/3", "1/5"], ["0", "1/7"]]
+
+
+@pytest.mark.parametrize(
+    ("raw", "reason"),
+    [
+        (changed(HELD, (("loop", "of_reference"), [["0", "0"], ["0", "0"]])), "of_reference must not be zero if given"),
+        *((changed(raw, (("loop", "of_reference"), OF_REFERENCE)), "without diffusion, root and longest")
+          for raw in (LAYERED, ROOTED, changed(HELD, (("loop", "longest"), "11/10")))),
+    ],
+)  # fmt: skip
+def test_gains_of_the_reference_are_refused_where_no_theorem_covers_them(raw, reason):
+    with pytest.raises(checker.Refused, match=reason):
+        checker.read_loop(raw["loop"], checker.read_task(raw))
+    with pytest.raises(CertificateError):
+        parse_guarantee(json.dumps(raw))
+
+
+@pytest.mark.parametrize("errors", [(1, 0), (0, 1), (1, 1)])
+def test_a_law_in_continuous_time_starts_at_rest(errors):
+    task = checker.read_task(CONTINUOUS)
+    assert checker.read_loop(CONTINUOUS["loop"], task, [F(0), F(0)]).start == []
+    with pytest.raises(checker.Refused, match="must start at rest"):
+        checker.read_loop(CONTINUOUS["loop"], task, list(map(F, errors)))
+
+
+WITHOUT_RATE = [[["1", "0"]], ["1", "0"]]
+
+
+@pytest.mark.parametrize(
+    ("raw", "heard"),
+    [
+        (HELD, []),
+        (changed(HELD, *zip((("loop", "measured"), ("loop", "feedback")), WITHOUT_RATE, strict=True)), [0]),
+        (changed(HELD, (("loop", "measured"), [["1", "1"]]), (("loop", "feedback"), ["1", "0"])), [0, 1]),
+        (changed(HELD, (("loop", "measured"), [["1", "0"]]), (("loop", "feedback"), ["1", "1"])), [0, 1]),
+        (changed(ROOTED, (("loop", "measured"), [["1", "0", "1"]]), (("loop", "feedback"), ["1", "0", "1"])), [0, 1]),
+    ],
+)
+def test_a_timing_error_is_an_error_of_what_the_law_uses(raw, heard):
+    late = {"jitter": {"measured": "1/9", "delay": "0"}} if heard else {}
+    assert checker.read_loop(raw["loop"] | late, checker.read_task(raw)).told == heard
+
+
 @pytest.mark.usefixtures("coarse")
 def test_a_largest_step_is_claimed_where_it_counts_alone_and_has_to_be_for_a_pump_of_some_rate(monkeypatch):
     """Steps of 1/5 m/s², 5 Pa with b = 1/25 m²/kg; ramps of 1/9 s at 45 Pa/s are just enough for them."""

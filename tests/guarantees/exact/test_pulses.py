@@ -86,6 +86,15 @@ def test_both_bound_the_worst_course_and_come_near(events, first, early, late):
     assert np.allclose([max(floats[y, "w"]) for y in ROWS], seen, rtol=0.35)
 
 
+@pytest.mark.parametrize(("events", "first"), [(2, 0), (2, 1), (3, 2)])
+def test_both_bound_a_pulse_alike_in_pieces_of_different_lengths(events, first, monkeypatch):
+    monkeypatch.setitem(globals(), "FINE", tuple(F(i, 128) for i in (0, 1, 6, 15, 32, 64, 106, 128)))
+    pulse = Pulse(entry=ENTRY, first=first, early=F(1, 20), late=F(1, 10), before=F(1, 20), after=F(1, 12))
+    loop = loop_of(pulse, *PERIODS[events])
+    ours = np.array([norms(loop)[y, "w"] for y in ROWS], float)
+    assert np.allclose(ours, [[float(v) for v in row] for row in theirs_of(loop, pulse)], rtol=1e-6)
+
+
 @pytest.mark.parametrize("first", [0, 1])
 def test_in_every_piece_both_bound_what_is_there(first):
     pulse = Pulse(entry=ENTRY, first=first, early=F(1, 10), late=F(1, 10), before=F(1, 10), after=F(1, 10))
