@@ -249,9 +249,18 @@ def test_gains_of_the_reference_are_refused_where_no_theorem_covers_them(raw, re
 @pytest.mark.parametrize("errors", [(1, 0), (0, 1), (1, 1)])
 def test_a_law_in_continuous_time_starts_at_rest(errors):
     task = checker.read_task(CONTINUOUS)
-    assert checker.read_loop(CONTINUOUS["loop"], task, [F(0), F(0)]).start == []
+    found = checker.read_loop(CONTINUOUS["loop"], task, [F(0), F(0)])
+    assert (found.start, found.longest, found.layer, found.asked, found.stepped) == ([], 0, 0, False, False)
     with pytest.raises(checker.Refused, match="must start at rest"):
         checker.read_loop(CONTINUOUS["loop"], task, list(map(F, errors)))
+
+
+def test_the_box_of_initial_conditions_has_the_law_s_answer_to_errors_and_to_their_noise():
+    raw = changed(NOISY, (("loop", "first"), [["2", "3"]]))
+    found = checker.read_loop(raw["loop"], checker.read_task(raw), [F(1, 2), F(1, 5)]).start
+    assert [column[:3] for column in found] == [
+        [F(1, 2), 0, 1], [0, 0, F(2, 9)], [0, F(1, 5), F(3, 5)], [0, 0, F(3, 7)]
+    ]  # fmt: skip
 
 
 WITHOUT_RATE = [[["1", "0"]], ["1", "0"]]

@@ -491,7 +491,7 @@ def test_an_implicit_step_has_at_most_sixteen_terms():
 
 
 def test_states_of_a_slice_have_the_sizes_and_signs_of_the_first_facets():
-    p = period(True)
+    p = period.__wrapped__(True)
     ahead, peak, up, behind, down = (1 / abs(next(v for v in row if v)) for row in p.reach.facets[:5])
     turn = (p.task.reference_rate + 2 * p.law.back * p.law.slip_noise) / p.law.back
     assert [sizes[0] for sizes in p.sizes] == [behind, min(ahead, turn), ahead]
@@ -625,3 +625,33 @@ def test_the_statement_says_what_is_assumed_and_bounds_outward(loop, task, said,
         "the slip is at most 0.3334 m behind and 0.6667 m ahead of the reference",
         "pressure from -1.667 Pa to 2.334 Pa",
     ]
+
+
+def test_polytopes_at_rest_have_the_bases_of_their_slice_and_sign(monkeypatch):
+    """Four of them, each with the bases of its least r' and, but for (1, -), of its largest, which is its own."""
+    made = []
+    monkeypatch.setattr(STICK, "Polytope", lambda *given: made.append(given) or given)
+    p = period()
+    p.resting()
+    listed = p.reach.resting
+    expected = [listed[0] + listed[1], listed[2] + listed[3], listed[4], listed[5] + listed[6]]
+    assert [bases for *_, bases in made] == expected
+    for (_, sizes, signs, _), place in zip(made, (0, 1, 1, 2), strict=True):
+        assert sizes == [*p.sizes[place], p.longest]
+        assert signs == [*p.signs[place], 1]
+
+
+def test_an_integral_has_the_error_of_its_worst_node():
+    p, nodes = copy(period()), STICK.PIECES + 1
+    p.interval, p.bent = Fraction(1), [STICK.Near.of(Fraction(0))] * 2
+    p.nodes = [[STICK.Near(STICK.ONE, 10**6 * i), STICK.Near(0, 0)] for i in range(nodes)]
+    for j, found in enumerate(p.integrals(Fraction(1), Fraction(0))):
+        piece = Fraction(1, STICK.PIECES) ** (j + 1) / 60
+        assert found.off >= sum(w * 10**6 * i for i, w in enumerate(STICK.WEIGHTS[j])) * piece
+
+
+@pytest.mark.parametrize(("damping", "short"), [(5, True), (12, False), (24, False)])
+def test_a_step_is_short_against_the_damping(damping, short):
+    """1/2 + wT/24 < 1, which 24 meets for T = 1/2, and w(1 − 1/2 − wT/24)T < 1, which is 3/2 for 12."""
+    with nullcontext() if short else pytest.raises(CHECK.Refused, match="short against damping"):
+        ranged(Rock(slopes=("-1/100", "1/8"), damping=(damping, damping)))
