@@ -534,3 +534,75 @@ def test_the_condition_that_a_set_misses_is_named(wrong, said):
 def test_a_set_is_made_of_rationals_and_whole_numbers(wrong):
     with pytest.raises(ParameterError, match=f"{next(iter(wrong))} of InvariantPolytope must be a tuple of"):
         replace(claim().reach, **wrong)
+
+
+# ---------------------------------------------------------------- what the standalone checker reads
+
+
+def loop_of(rank):
+    """A loop of so many states that all pass a sample, with two inputs and three outputs."""
+    unit = checker.unit(rank)
+    return checker.Loop(checker.zeros(rank), [(unit, F(1))], [unit[0]] * 3, [unit[0]] * 2, None, F(1), longest=F(2))
+
+
+def set_of(facets, rank=2, sampled=1, between=1, **given):
+    """A set with so many facets, and so many pieces at the samples and between them."""
+    basis = list(range(rank))
+    rows = [["0"] * (i % rank) + ["1"] + ["0"] * (rank - 1 - i % rank) for i in range(facets)]
+    parts = {"at_samples": [[basis] * (sampled + 1)] * facets, "between": [[basis] * (between + 1)] * 3}
+    return {"inputs": ["1", "0"], "facets": rows} | parts | given
+
+
+def test_a_set_is_read_up_to_its_limits():
+    for value, rank in (
+        (set_of(2), 2),
+        (set_of(400), 2),
+        (set_of(6, rank=6), 6),
+        (set_of(2, sampled=32, between=32), 2),
+        (set_of(397, sampled=9, between=9), 2),  # 397·10 + 3·10 bases
+    ):
+        assert len(checker.read_reach(value, loop_of(rank)).facets) == len(value["facets"])
+
+
+@pytest.mark.parametrize(
+    ("value", "rank", "said"),
+    [
+        (set_of(1), 2, "2 to 400 facets"),
+        (set_of(401), 2, "2 to 400 facets"),
+        (set_of(2) | {"facets": 5}, 2, "2 to 400 facets"),
+        (set_of(2, inputs=["1", "-1/9"]), 2, "bounds of the inputs must be >= 0"),
+        (set_of(7, rank=7), 7, "at most 6 entries"),
+        (set_of(397, sampled=9, between=10), 2, "at most 4000 bases"),
+        (set_of(2, at_samples=5), 2, "at_samples must have 2 rows"),
+        (set_of(2, at_samples=[[[0, 1]] * 2]), 2, "at_samples must have 2 rows"),
+        (set_of(2, at_samples=[[[0, 1]] * 2, 5]), 2, "at_samples must be rows"),
+        (set_of(2, at_samples=["ab", "ab"]), 2, "at_samples must be rows"),
+        (set_of(2, sampled=0), 2, "1 to 32 pieces"),
+        (set_of(2, sampled=33), 2, "1 to 32 pieces"),
+        (set_of(2, at_samples=[[[0, 1]] * 2, [[0, 1]] * 3]), 2, "the same pieces in every row"),
+        (set_of(2, at_samples=[[[0, 1], "01"], [[0, 1]] * 2]), 2, "must name 2 facets each time"),
+        (set_of(2, at_samples=[[[0, 1], {0: 1, 1: 1}], [[0, 1]] * 2]), 2, "must name 2 facets each time"),
+        (set_of(2, at_samples=[[[0, 1], [0]], [[0, 1]] * 2]), 2, "must name 2 facets each time"),
+        (set_of(2, at_samples=[[[0, 1], [0, 2]], [[0, 1]] * 2]), 2, "must name facets by their numbers"),
+        (set_of(2, at_samples=[[[0, 1], [0, -1]], [[0, 1]] * 2]), 2, "must name facets by their numbers"),
+        (set_of(2, at_samples=[[[0, 1], [0, True]], [[0, 1]] * 2]), 2, "must name facets by their numbers"),
+    ],
+)
+def test_a_set_beyond_a_limit_is_refused_by_the_standalone_checker(value, rank, said):
+    with pytest.raises(checker.Refused, match=said):
+        checker.read_reach(value, loop_of(rank))
+
+
+def test_the_share_of_an_input_is_that_of_its_bound_and_none_of_one_that_is_zero(monkeypatch):
+    """Of a: (1/2)·e1 + 1·e2 + (1/4)·v = 3/2 + 1 + 1 of 7; of d: 1/5 of e2, or none where its bound is 0."""
+    asked = []
+    monkeypatch.setattr(checker.Between, "__init__", lambda *_: None)
+    monkeypatch.setattr(checker.Between, "outputs", lambda *_: [F(3), F(1), F(4)])
+    task = checker.read_task(json.loads(text()))
+    task = replace(task, s=(F(-1), F(0)), w=(F(1), F(3)), beta=(F(1), F(3, 2)))
+    for coupling, bound, small in ((F(1, 5), F(1, 4), F(4, 5)), (F(0), F(0), F(1, 2))):
+        given = F(1), F(0), coupling, F(1, 3)
+        monkeypatch.setattr(checker, "inputs", lambda _, half, given=given: asked.append(half) or given)
+        found = checker.bounds_within(task, loop_of(2), checker.Reach([F(7), bound], [], [], []))
+        assert found == ([3, 1, 4 + F(1, 3)], small)
+    assert asked == [F(1, 4), F(1, 4)]
