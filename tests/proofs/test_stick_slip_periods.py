@@ -629,9 +629,8 @@ def test_the_statement_says_what_is_assumed_and_bounds_outward(loop, task, said,
 
 def test_polytopes_at_rest_have_the_bases_of_their_slice_and_sign(monkeypatch):
     """Four of them, each with the bases of its least r' and, but for (1, -), of its largest, which is its own."""
-    made = []
+    p, made = period(), []
     monkeypatch.setattr(STICK, "Polytope", lambda *given: made.append(given) or given)
-    p = period()
     p.resting()
     listed = p.reach.resting
     expected = [listed[0] + listed[1], listed[2] + listed[3], listed[4], listed[5] + listed[6]]

@@ -228,3 +228,79 @@ def test_both_checkers_move_the_equilibrium_with_a_load_alike(delay):
     assert listed(package.inputs) == listed(standalone.inputs)
     moved = next(column for column in package.inputs if F(-5) in column)
     assert {F(-1), F(-2)} <= set(moved) or delay == 0
+
+
+# ---------------------------------------------------------------- the standalone checker's verdict and statement
+
+NUMBERS = ["5", "7", "2"]
+BOUNDS = [F(3), F(4), F(10), F(6), F(9), F(8)]
+"""Of two outputs, of the arguments of three sectors, of a control."""
+
+
+def decided(monkeypatch, bounds=BOUNDS, start=("0", "3"), disturbances=((["1", "0"], "2/3"),), **changes):
+    """What the checker says of a file whose rows have certain bounds; two sectors and one of a single slope."""
+    sector = {"entry": ["1", "0"], "row": ["0", "1", "0"]}
+    document = {
+        "format": 1, "kind": "uncertain_plant", "pieces": 2, "inputs": NUMBERS,
+        "claims": {"output_1": "3", "output_2": "4", "control_1": "8"},
+        "plant": {
+            "A": [["-1", "0"], ["0", "-1"]], "B": [["1"], ["0"]], "C": [["1", "0"]],
+            "disturbances": [{"entry": entry, "size": size} for entry, size in disturbances], "loads": [],
+            "sectors": [sector | {"slopes": ["1/10", "1"], "within": "21/2"}, sector | {"slopes": ["-1", "1"]},
+                        sector | {"slopes": ["2", "2"]}],
+            "noise": ["0"], "start": list(start), "outputs": [["1", "0"], ["0", "1"]],
+        },
+        "law": {"step": "1/2", "delay": "1/8", "A": [], "B": [], "C": [[]], "D": [["-1"]]},
+    }  # fmt: skip
+    monkeypatch.setattr(checker, "responses", lambda *_: None)
+    monkeypatch.setattr(checker, "rows_of", lambda *_: list(bounds))
+    return checker.verify(document | changes)
+
+
+def test_bounds_that_meet_every_condition_are_proved_and_said(monkeypatch):
+    said = decided(monkeypatch)
+    assert said[0] == "plant with 2 states, 1 controls, 3 sectors, 0 loads; law with 0 states, every 1/2 s, 1/8 s late"
+    assert said[1] == "disturbances of at most 0.6666; from |x_i| <= start_i, for all t >= 0"
+    assert said[2] == "|output_1| <= 3, |output_2| <= 4, |control_1| <= 8"
+    still = decided(monkeypatch, start=("0", "0"), disturbances=())
+    assert still[1] == "disturbances of at most none; from rest, for all t >= 0"
+
+
+@pytest.mark.parametrize(
+    ("place", "most", "reason"),
+    [
+        (2, "10999/1000", "argument must stay within the bound"),  # beyond 21/2, while (9/20)·y is below 5
+        (2, "21/2", "argument must stay within the bound"),
+        (3, "7", "small-gain condition"),  # 1·y = 7
+        (0, "3001/1000", "claims must follow"),
+        (1, "4001/1000", "claims must follow"),
+        (5, "8001/1000", "claims must follow"),
+    ],
+)
+def test_every_condition_on_the_bounds_is_asked_for(place, most, reason, monkeypatch):
+    bounds = [*BOUNDS[:place], F(most), *BOUNDS[place + 1 :]]
+    with pytest.raises(CHECK.Refused, match=reason):
+        decided(monkeypatch, bounds)
+
+
+def test_half_the_width_of_a_sector_counts_in_the_small_gain(monkeypatch):
+    """(1 − 1/10)/2 = 9/20 of the argument, below 10·9/20 = 9/2; a sector of one slope has no part."""
+    assert decided(monkeypatch, inputs=["4501/1000", "7", "0"])
+    for inputs in (["9/2", "7", "0"], ["4499/1000", "7", "0"], ["5", "6", "0"]):
+        with pytest.raises(CHECK.Refused, match="small-gain condition"):
+            decided(monkeypatch, inputs=inputs)
+
+
+@pytest.mark.parametrize(
+    ("pieces", "valid"), [(1, True), (64, True), (0, False), (65, False), ("2", False), (True, False)]
+)
+def test_a_flow_is_cut_into_one_to_sixty_four_pieces(pieces, valid, monkeypatch):
+    with nullcontext() if valid else pytest.raises(CHECK.Refused, match="pieces must be 1 to 64"):
+        decided(monkeypatch, pieces=pieces)
+
+
+@pytest.mark.parametrize("value", [5, None, {"a": 1}, "ab", [0] * 41])
+def test_a_list_of_a_file_has_at_most_forty_entries(value):
+    assert checker.listed([0] * 40, "loads") == [0] * 40
+    with pytest.raises(CHECK.Refused, match="loads must be a list of at most 40"):
+        checker.listed(value, "loads")
