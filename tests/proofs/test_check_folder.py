@@ -36,6 +36,16 @@ FORGED = 'raise SystemExit("another module")\n'
 OTHERS = {"guarantee.slow_sliding", "guarantee.stick_slip", "guarantee.polytope", "guarantee.plant"}
 
 
+def test_the_finder_finds_the_modules_of_the_folder_alone():
+    check = module("finder_of_a_folder", PROOFS / "check.py")
+    assert check.Finder().find_spec("json") is None
+    for name in NAMES:
+        found = check.Finder().find_spec(f"{check.PACKAGE}.{name}")
+        assert Path(found.origin) == CHECKER.joinpath(*name.split(".")).with_suffix(".py")
+    with pytest.raises(OSError, match=re.escape("absent.py must stand beside check.py")):
+        check.Finder().find_spec(f"{check.PACKAGE}.absent")
+
+
 def guarantee():
     return {"format": 1, "kind": "guarantee"}
 

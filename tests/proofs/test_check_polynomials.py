@@ -1157,3 +1157,35 @@ def test_the_largest_reduction_ends_within_a_minute():
     start = time.process_time()
     assert verify(many_pairs()).verdict == "refuted"
     assert time.process_time() - start < 60
+
+
+NEGATIVE, BY_X, BY_Y = {(0, 0): Fraction(-1)}, {(2, 0): Fraction(-1)}, {(0, 2): Fraction(-3)}
+
+
+@pytest.mark.parametrize(
+    ("inequalities", "equalities", "polynomial", "empty"),
+    [
+        ([NEGATIVE | BY_X], [], {}, True),  # -1 - x^2 >= 0
+        ([{(1, 0): Fraction(1)}, NEGATIVE | BY_X | BY_Y], [], {}, True),
+        ([NEGATIVE], [], {}, True),
+        ([BY_X], [], {}, False),  # at x = 0
+        ([NEGATIVE | {(2, 0): Fraction(1)}], [], {}, False),
+        ([NEGATIVE | {(1, 0): Fraction(-1)}], [], {}, False),  # at x = -1
+        ([NEGATIVE | {(2, 1): Fraction(-1)}], [], {}, False),
+        ([], [{(0, 0): Fraction(1), (2, 0): Fraction(1)}], {}, True),  # 1 + x^2 = 0
+        ([], [NEGATIVE | BY_X], {}, True),
+        ([], [{(0, 0): Fraction(1)} | BY_X], {}, False),
+        ([], [], NEGATIVE, True),  # -1 >= 0, proved
+        ([], [], NEGATIVE | BY_X, False),
+        ([], [], BY_X, False),
+        ([], [], {(0, 0): Fraction(1)}, False),
+        ([], [], {}, False),
+    ],
+)
+def test_a_set_without_points_is_seen_by_signs_and_even_powers_alone(inequalities, equalities, polynomial, empty):
+    found = polynomials.Statement(["x", "y"], polynomial, {(0, 0): Fraction(1)}, inequalities, equalities, [], 2)
+    assert polynomials.is_empty(found) is empty
+
+
+def test_a_number_is_as_long_as_the_longer_of_numerator_and_denominator():
+    assert [exact_numbers.length(Fraction(*parts)) for parts in ((9, 2), (2, 9), (-9, 2))] == [4, 4, 4]

@@ -234,6 +234,36 @@ def test_a_term_that_is_disregarded_uses_no_lift():
         nested(field, lifts=lifts, gains={"c": "0"})
 
 
+@pytest.mark.parametrize(
+    ("number", "ends", "small", "large"),
+    [
+        (3, ("1/2", 2), {(2,): F(3, 2)}, {(2,): F(6)}),
+        (-3, ("1/2", 2), {(2,): F(-6)}, {(2,): F(-3, 2)}),
+        (3, (0, 0), {}, {}),
+        (3, (0, 2), None, None),
+        (-3, (0, 2), None, None),
+    ],
+)
+def test_the_argument_of_a_lift_is_taken_at_both_ends_of_a_root(number, ends, small, large, monkeypatch):
+    """A coefficient that is 0 at one end has no sign on the whole range."""
+    monkeypatch.setattr(loops, "restrict", lambda of, _cell, at: {(2,): of["term"] * at["r"]} if at["r"] else {})
+    given = loop(uncertain={"r": tuple(map(F, ends))})
+    if small is None:
+        with pytest.raises(checker.Refused, match="whose signs the ranges of roots decide"):
+            loops.restrict_to_ends({"term": F(number)}, None, given, "lift n")
+    else:
+        assert loops.restrict_to_ends({"term": F(number)}, None, given, "lift n") == (small, large)
+
+
+def test_a_parameter_may_vary_in_a_term_of_a_lift_that_is_disregarded():
+    lifts = {"n": [["1", [], [["x", "1", "s"]]], ["1", ["c", "p"], [["x", "1", "s"]]]]}
+    field = [["-1", ["k"], [["n", "0", "s"]]]]
+    given = {"gains": {"k": "1", "c": "0"}, "lifts": lifts, "uncertain": {"p": ["1", "2"]}}
+    assert nested(field, **given)
+    with pytest.raises(checker.Refused, match="without parameters that vary"):
+        nested(field, **given | {"gains": {"k": "1", "c": "1"}})
+
+
 def test_a_parameter_of_one_point_stands_in_a_lift():
     lifts = {"n": [["1", ["p"], [["x", "1", "s"]]]]}
     field = [["-1", [], [["n", "1", "s"]]]]
