@@ -119,9 +119,9 @@ def listed(value: Any, where: str) -> list[Any]:
     return value  # type: ignore[no-any-return]
 
 
-def table(value: Any, where: str, width: int, most: int = MOST_LAW) -> list[Row]:
+def table(value: Any, where: str, width: int) -> list[Row]:
     """A matrix of any height that is bounded."""
-    need(type(value) is list and len(value) <= most, f"{where} must have at most {most} rows")
+    need(type(value) is list and len(value) <= MOST, f"{where} must have at most {MOST} rows")
     return matrix(value, where, len(value), width)
 
 

@@ -304,3 +304,82 @@ def test_a_list_of_a_file_has_at_most_forty_entries(value):
     assert checker.listed([0] * 40, "loads") == [0] * 40
     with pytest.raises(CHECK.Refused, match="loads must be a list of at most 40"):
         checker.listed(value, "loads")
+
+
+def plant_of(n=1, m=1, **changes):
+    """A plant as a file states it, of n states and m controls, with a sector on the first state."""
+    sector = {"entry": ["0"] * n, "row": ["1"] + ["0"] * (n + m - 1), "slopes": ["0", "1"], "within": "1/2"}
+    given = {
+        "A": [["0"] * n] * n, "B": [["1"] * m] * n, "C": [["1"] + ["0"] * (n - 1)], "disturbances": [], "loads": [],
+        "sectors": [sector], "noise": ["0"], "start": ["0"] * n, "outputs": [["1"] + ["0"] * (n - 1)],
+    }  # fmt: skip
+    return given | changes
+
+
+def sector_of(**changes):
+    return {"sectors": [plant_of()["sectors"][0] | changes]}
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        plant_of(), plant_of(n=40), plant_of(m=40), plant_of(C=[["0"]] * 40, noise=["0"] * 40),
+        plant_of(outputs=[["0"]] * 40), plant_of(**sector_of(slopes=["1", "1"])), plant_of(**sector_of(within="1/9")),
+        plant_of(sectors=[{k: v for k, v in plant_of()["sectors"][0].items() if k != "within"}]),
+    ],
+)  # fmt: skip
+def test_plants_are_read_up_to_their_limits(given):
+    found = checker.read_plant(given)
+    assert (len(found.A), len(found.B[0]), len(found.C)) == (len(given["A"]), len(given["B"][0]), len(given["C"]))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (plant_of(A=5), "A must have 1 to 40 rows"), (plant_of(A=[]), "A must have 1 to 40 rows"),
+        (plant_of(n=41), "A must have 1 to 40 rows"), (plant_of(A="ab"), "A must have 1 to 40 rows"),
+        (plant_of(B=5), "B must have a row a state"), (plant_of(B=[["1"], ["1"]]), "B must have a row a state"),
+        (plant_of(B=[5]), "B must have a row a state"), (plant_of(B=["1"]), "B must have a row a state"),
+        (plant_of(B=[]), "B must have a row a state"), (plant_of(B=[[]]), "B must have 1 to 40 columns"),
+        (plant_of(m=41), "B must have 1 to 40 columns"), (plant_of(C=5), "C must have at most 40 rows"),
+        (plant_of(C=[["0"]] * 41, noise=["0"] * 41), "C must have at most 40 rows"),
+        (plant_of(outputs={"0": 1}), "outputs must have at most 40 rows"),
+        (plant_of(sectors=[5]), "a sector"), (plant_of(sectors=["within"]), "a sector"),
+        (plant_of(**sector_of(slopes=["1", "0"])), "slopes must be in order"),
+        (plant_of(**sector_of(within="0")), "within must be > 0"),
+        (plant_of(**sector_of(within="-1")), "within must be > 0"),
+        (plant_of(**sector_of(row=["1", "1"])), "of a row of the states alone"),
+        (plant_of(noise=["-1"]), "sizes must be >= 0"), (plant_of(start=["-1"]), "sizes must be >= 0"),
+        (plant_of(disturbances=[{"entry": ["1"], "size": "-1"}]), "sizes must be >= 0"),
+    ],
+)  # fmt: skip
+def test_plants_beyond_a_limit_are_refused_by_the_standalone_checker(given, said):
+    with pytest.raises(CHECK.Refused, match=said):
+        checker.read_plant(given)
+
+
+def test_a_plant_of_one_state_is_decided(monkeypatch):
+    monkeypatch.setattr(checker, "responses", lambda *_: None)
+    monkeypatch.setattr(checker, "rows_of", lambda *_: [F(1), F(1, 3), F(1)])
+    law = {"step": "1", "delay": "0", "A": [], "B": [], "C": [[]], "D": [["0"]]}
+    document = {"format": 1, "kind": "uncertain_plant", "plant": plant_of(), "law": law, "pieces": 1, "inputs": ["1"]}
+    said = checker.verify(document | {"claims": {"output_1": "1", "control_1": "1"}})
+    assert said[0].startswith("plant with 1 states, 1 controls, 1 sectors, 0 loads; law with 0 states")
+
+
+def law_of(q=0, **changes):
+    """A law of q integrals as a file states it, with one measurement and one control."""
+    unit = [[str(int(i == j)) for j in range(q)] for i in range(q)]
+    return {"step": "1/2", "delay": "0", "A": unit, "B": [["1"]] * q, "C": [["0"] * q], "D": [["0"]]} | changes
+
+
+def test_laws_of_a_plant_are_read_up_to_their_limits():
+    for given in (law_of(), law_of(48), law_of(delay="4"), law_of(step="1/9")):
+        assert len(checker.read_law(given, 1, 1).A) == len(given["A"])
+    for given, said in (
+        (law_of(49), "at most 48 states"), (law_of(A=5), "at most 48 states"), (law_of(delay="401/100"), "delay 0 to 8"),
+        (law_of(delay="-1/9"), "delay 0 to 8"), (law_of(step="0"), "step must be > 0"), (law_of(step="-1"), "step must be"),
+        (law_of(D=[["0", "0"]]), "D of the law"), (law_of(C=[]), "C of the law"), (law_of(1, B=[[]]), "B of the law"),
+    ):  # fmt: skip
+        with pytest.raises(CHECK.Refused, match=said):
+            checker.read_law(given, 1, 1)
