@@ -37,7 +37,7 @@ OTHERS = {"guarantee.slow_sliding", "guarantee.stick_slip", "guarantee.polytope"
 
 
 def test_the_finder_finds_the_modules_of_the_folder_alone():
-    check = module("finder_of_a_folder", PROOFS / "check.py")
+    check = LOOPS.checker
     assert check.Finder().find_spec("json") is None
     for name in NAMES:
         found = check.Finder().find_spec(f"{check.PACKAGE}.{name}")

@@ -1170,6 +1170,7 @@ NEGATIVE, BY_X, BY_Y = {(0, 0): Fraction(-1)}, {(2, 0): Fraction(-1)}, {(0, 2): 
         ([NEGATIVE], [], {}, True),
         ([BY_X], [], {}, False),  # at x = 0
         ([NEGATIVE | {(2, 0): Fraction(1)}], [], {}, False),
+        ([NEGATIVE | {(2, 0): Fraction(1, 2)}], [], {}, False),
         ([NEGATIVE | {(1, 0): Fraction(-1)}], [], {}, False),  # at x = -1
         ([NEGATIVE | {(2, 1): Fraction(-1)}], [], {}, False),
         ([], [{(0, 0): Fraction(1), (2, 0): Fraction(1)}], {}, True),  # 1 + x^2 = 0
@@ -1189,3 +1190,12 @@ def test_a_set_without_points_is_seen_by_signs_and_even_powers_alone(inequalitie
 
 def test_a_number_is_as_long_as_the_longer_of_numerator_and_denominator():
     assert [exact_numbers.length(Fraction(*parts)) for parts in ((9, 2), (2, 9), (-9, 2))] == [4, 4, 4]
+
+
+def test_a_proof_on_an_empty_set_says_so():
+    """-1 = x^2 + (-1 - x^2), where the set of the second has no point; the disc is not empty."""
+    nowhere = {"0,0": "-1", "2,0": "-1"}
+    proof = sos(square([[1, 0]], "1"), square([[0, 0]], "1", product=[0]))
+    said = checker.check(json.dumps(file({"0,0": "-1"}, "sos", proof, on=[nowhere], products=[[], [0]]))).statement
+    assert said[-1] == "the set is empty, so that this holds trivially"
+    assert not any("empty" in line for line in checker.check(json.dumps(disc())).statement)

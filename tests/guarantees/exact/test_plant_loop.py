@@ -377,8 +377,9 @@ def test_laws_of_a_plant_are_read_up_to_their_limits():
     for given in (law_of(), law_of(48), law_of(delay="4"), law_of(step="1/9")):
         assert len(checker.read_law(given, 1, 1).A) == len(given["A"])
     for given, said in (
-        (law_of(49), "at most 48 states"), (law_of(A=5), "at most 48 states"), (law_of(delay="401/100"), "delay 0 to 8"),
-        (law_of(delay="-1/9"), "delay 0 to 8"), (law_of(step="0"), "step must be > 0"), (law_of(step="-1"), "step must be"),
+        (law_of(49), "at most 48 states"), (law_of(A=5), "at most 48 states"),
+        (law_of(delay="401/100"), "delay 0 to 8"), (law_of(delay="-1/9"), "delay 0 to 8"),
+        (law_of(step="0"), "step must be > 0"), (law_of(step="-1"), "step must be > 0"),
         (law_of(D=[["0", "0"]]), "D of the law"), (law_of(C=[]), "C of the law"), (law_of(1, B=[[]]), "B of the law"),
     ):  # fmt: skip
         with pytest.raises(CHECK.Refused, match=said):
