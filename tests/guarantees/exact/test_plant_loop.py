@@ -4,6 +4,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction as F
 from math import exp
+from types import SimpleNamespace
 
 import pytest
 from standalone_guarantee import CHECK
@@ -384,3 +385,22 @@ def test_laws_of_a_plant_are_read_up_to_their_limits():
     ):  # fmt: skip
         with pytest.raises(CHECK.Refused, match=said):
             checker.read_law(given, 1, 1)
+
+
+def test_bounds_of_rows_count_every_input_with_its_size():
+    """Disturbance, load, sectors of two slopes and of one, noise that is not 0: 1 + 2·2 + 3·5 + 4·7 + 5·0 + 6/3."""
+    load = {"control": ["1"], "shift": ["0", "1"], "rate": "5"}
+    sector = {"entry": ["0", "0"], "row": ["1", "0", "0"], "slopes": ["0", "1"]}
+    plant = checker.read_plant(
+        plant_of(
+            n=2, C=[["1", "0"], ["1", "0"]], noise=["0", "1/3"], loads=[load],
+            disturbances=[{"entry": ["1", "0"], "size": "2"}],
+            sectors=[sector, sector | {"slopes": ["2", "2"]}],
+        )
+    )  # fmt: skip
+    found = SimpleNamespace(start=[F(1), F(0)], inputs=[[F(2), F(3), F(4), F(5)], [F(0)] * 4], told=[[F(6)], [F(9)]])
+    assert checker.rows_of(plant, found, [F(7), F(11)]) == [1 + 4 + 15 + 28 + 2, 3]
+    assert checker.rows_of(plant, found, [F(0), F(0)]) == [1 + 4 + 15 + 2, 3]
+    for numbers in ([F(-1), F(0)], [F(7), F(-1, 9)]):
+        with pytest.raises(CHECK.Refused, match="inputs of the sectors must be >= 0"):
+            checker.rows_of(plant, found, numbers)
