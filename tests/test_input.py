@@ -32,7 +32,7 @@ def test_what_is_no_file_is_refused_at_once(tmp_path):
         ".": "Is a directory|regular file",
         "none": "No such file",
         "x" * 5000: "File name too long",
-        "nul\0": "none that a file can have",
+        "nul\0": "no file can have this name",
     }
     for name, reason in said.items():
         with pytest.raises(ScenarioError, match=f"^it .*({reason})") as raised:
