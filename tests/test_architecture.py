@@ -464,7 +464,7 @@ BUDGETS = {
     "fault": 3222,
     "symbolic": 3133,
     "sos": 6341,
-    "laws": 3109,
+    "laws": 3110,
     "loop": 4181,
     "plant": 1457,
     "guarantees": 13289,

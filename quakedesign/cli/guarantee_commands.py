@@ -78,8 +78,8 @@ def guarantee(
     controller
         elqr, or a sliding mode: cta, dia. For several blocks: centralised (default) or decentralised.
     objective
-        Of a design. peak: the smallest certified slip-rate error. tracking: the smallest slip error under a drifting
-        disturbance, with a slip-rate error of at most 1.6 times the smallest.
+        Of a design. peak: the smallest certified slip-rate error. tracking: a smaller slip error under a drifting
+        disturbance, with a somewhat larger slip-rate error.
     gains
         k1 to k4 of an e-LQR whose integrals are summed once per sample; by default a law with a disturbance estimate is
         designed. For a sliding mode its base gains (λ = 1), which the command scales by λ.

@@ -330,10 +330,11 @@ def _require_shapes(wanted: Mapping[str, tuple[Matrix, int, int]]) -> None:
             )
 
 
-# ---------------------------------------------------------------------- An integrator perturbed by rounding. A
-# guarantee needs z with Az = z and Cz = 1, exactly: at rest the law then commands any constant pressure without an
-# error. If no such z exists, but A has a pole within 1e-6 of 1, let v and q be its right and left eigenvectors with Cv
-# = 1 and qv = 1. Then A′ = A − (Av − v)q has A′v = v exactly, and differs from A by rounding alone.
+# ----------------------------------------------------------------------
+# An integrator perturbed by rounding. A guarantee needs z with Az = z and Cz = 1, exactly: at rest the law then
+# commands any constant pressure without an error. If no such z exists, but A has a pole within 1e-6 of 1, let v and q
+# be its right and left eigenvectors with Cv = 1 and qv = 1. Then A′ = A − (Av − v)q has A′v = v exactly, and differs
+# from A by rounding alone.
 
 _NEAR = 1e-6
 _DEPENDENT = 1e-6

@@ -126,8 +126,8 @@ def guarantee(
         User-defined law, as with `controller`. A ``StateSpace`` in discrete time is for an `UncertainPlant`, from its
         measurements to its controls.
     objective : str
-        Of a design. ``peak``: the smallest proved slip-rate error. ``tracking``: the smallest slip error under a
-        drifting disturbance, with a slip-rate error of at most 1.6 times the smallest.
+        Of a design. ``peak``: the smallest proved slip-rate error. ``tracking``: a smaller slip error under a drifting
+        disturbance, with a somewhat larger slip-rate error.
     gains : sequence or array of str, float or Fraction, optional
         k1 to k4 of an e-LQR whose integrals are summed once per sample, run by the scheme ``explicit``; base gains of a
         sliding mode. A matrix of one row, as the K of ``control.dlqr``, is accepted.

@@ -113,8 +113,8 @@ def test_slips_are_those_of_an_integrator_with_events():
 
 
 def test_slips_where_the_pressure_diffuses_are_those_of_an_integrator_with_events():
-    chain, duration = replace(hurried(1000 * STEP), wells=(1400.0, 3500.0, 4600.0), diffusivity=2e6), 5.5 * STEP
-    exact = with_events(chain, proved().law, 5)
+    chain, duration = replace(hurried(1000 * STEP), wells=(1400.0, 3500.0, 4600.0), diffusivity=2e6), 10.5 * STEP
+    exact = with_events(chain, proved().law, 10)
     few, many, steady = (
         np.abs(simulate_blocks(one, proved().law, duration=duration, substeps=substeps).slip - exact).max()
         for one, substeps in ((chain, 20), (chain, 80), (replace(chain, diffusivity=None), 80))

@@ -204,11 +204,11 @@ def solved(rows: Sequence[Sequence[Fraction]], unknowns: int) -> Row:
     return tuple(solution)
 
 
-# ---------------------------------------------------------------------- L1 norms of all rows for all inputs at once.
-# Statements and proofs are those of `norms`, with two differences. Sums for unit columns, computed once, bound the
-# remainders of all inputs. And rows are multiplied by the map Ψ of one period: P_k = rows·Ψᵏ. The sum of |P_k·columns|
-# over k < K is computed. The sum over k ≥ K is at most |P_K|x for any x with y + |Ψᴷ|x ≤ x, y the computed sum for unit
-# rows.
+# ----------------------------------------------------------------------
+# L1 norms of all rows for all inputs at once. Statements and proofs are those of `norms`, with two differences. Sums
+# for unit columns, computed once, bound the remainders of all inputs. And rows are multiplied by the map Ψ of one
+# period: P_k = rows·Ψᵏ. The sum of |P_k·columns| over k < K is computed. The sum over k ≥ K is at most |P_K|x for any x
+# with y + |Ψᴷ|x ≤ x, y the computed sum for unit rows.
 
 _BITS = (128, 256)  # precision of balls; the larger if the smaller does not show decay
 _AT_ONCE = 8  # periods

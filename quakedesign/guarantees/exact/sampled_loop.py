@@ -360,7 +360,7 @@ def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
 def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
     """Inputs of a loop with a diffusion path.
 
-    Without a lag the truncation error fades after each step, and is an input of its own; with a lag it is part of the
+    Without a lag the truncation error fades after each step, and is a separate input; with a lag it is part of the
     acceleration.
     """
     fades = ("left_out", "left_out") in gains
