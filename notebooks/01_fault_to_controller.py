@@ -15,7 +15,7 @@
 
 # %% [markdown]
 # # From a fault to a controller with a proof
-# Without control, a strike-slip fault of 5 km slips within a minute: an earthquake of magnitude 5.8. With feedback of the fluid pressure the same slip takes 7.67 days.
+# Without control, a strike-slip fault of 5 km slips within a minute: an earthquake of magnitude 5.8. With feedback control by the fluid pressure the same slip takes 7.67 days.
 # This notebook designs two controllers, proves guarantees and simulates. Numbers are in SI units.
 
 # %%

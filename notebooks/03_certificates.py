@@ -84,7 +84,7 @@ display(both)
 
 # %% [markdown]
 # ## Break it
-# One entry of one matrix, one gain, one coefficient of $V$, one claim, the range of the disturbance. Each is changed by a thousandth.
+# One entry of one matrix, one gain, one coefficient of $V$, one claim, the range of $\dot h$. Each is changed by a thousandth.
 
 
 # %%

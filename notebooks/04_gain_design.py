@@ -30,7 +30,7 @@ from quakedesign.lyapunov import largest_lipschitz
 # %% [markdown]
 # ## The smallest gains for a given disturbance
 # With $e \to \lambda e$ a set of gains for $|\dot h| \le \bar L$ becomes one for $\lambda\bar L$; the norm $\|(k_1\bar L^{-2/3}, k_2\bar L^{-1/2}, k_3/\bar L, k_4/\bar L)\|_2$ does not change, so it compares ratios of gains, not their scale. The exponents follow from the terms
-# of the field. The search starts from the gains in the literature and follows the bilinear inequalities, changing $V$ and the gains together.
+# of the field. The search starts from the gains in the literature and solves the bilinear inequalities by path following, changing $V$ and the gains together.
 
 # %%
 small = synthesise("cta", "norm", lipschitz=1, degrees=(5, 6), starts=1)
@@ -66,7 +66,7 @@ display(pd.DataFrame([{**{n: float(k) for n, k in c.gains.items()}, "norm": c.no
 # %% [markdown]
 # ## A map
 # A coarse map over $k_1$ and $k_2$ around the first published set, at two levels of $\bar L$, with $V$ of degree 5. Shaded points are screened in floating point; markers
-# are proved exactly. (The gains found above are not on this map: it holds $k_3$ and $k_4$ at the published values, and they need a $V$ of degree 6.)
+# are proved exactly. (The gains found above are not on this map: $k_3$ and $k_4$ have the published values on it, and the gains found need a $V$ of degree 6.)
 
 # %%
 drawn = gain_map(
@@ -77,7 +77,7 @@ print(counts)
 display(gain_map_figure(drawn))
 
 # %% [markdown]
-# The command line solves the same problems: `quakedesign synthesise cta --objective decay --out gains.json`, or, for the smallest measured error of a
+# The command line solves the same problems: `quakedesign synthesise cta --objective decay --out gains.json`, or, for the smallest simulated error of a
 # sampled run among gains that are proved, `quakedesign synthesise cta real-fault --objective sampled --step 0.184`; and `quakedesign map cta --over k1 k2`.
 
 # %%

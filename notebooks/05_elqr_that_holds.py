@@ -14,7 +14,7 @@
 # ---
 
 # %% [markdown]
-# # An e-LQR that holds where the printed theorem does not
+# # An e-LQR whose proof holds where the printed theorem does not
 #
 # The extended LQR feeds back the slip error, the slip-rate error and two integrals, $p=-Kx$. Theorem 2 of the paper requires $K$ to be optimal for
 # some $Q \ge Q_0 + R\,G^\top G$, where the row $G=[g_1\;g_2\;0\;0]$ is meant to bound the uncertainty. Two plants show that this is not sufficient
@@ -146,11 +146,11 @@ print(sampled.sentence())
 # %% [markdown]
 # ## How fast can the fault slip?
 # The theorem is about a constant reference and a disturbance that vanishes. The task has neither: $r(t)$ moves and $|\varphi_e| \le 3.2\cdot10^{-4}$ m/s² does not
-# vanish. Let $s$ (slope of the net force in slip), $w$ (damping) and $\beta$ be the midpoints of their ranges over the box, $\delta_s$, $\delta_w$, $\delta_\beta$ the half-widths, and $b$ the nominal input gain (these letters are independent of those above).
+# vanish. Let $s$ (slope of the net force in slip), $w$ (damping) and $\beta$ be the midpoints of their ranges over the box, $\delta_s$, $\delta_w$, $\delta_\beta$ the half-widths, and $b$ the smallest input gain of the box (these letters are independent of those above).
 # Then $e_2' = s e_1 - w e_2 + \beta b(p-p^*) + a$, where one bounded input $a$ collects all other terms: $|a| \le |\varphi_e - w_* r' - r''| + \delta_s|e_1| + \delta_w|e_2| + \delta_\beta b|p-p^*|$, with any damping $w_*$ of the range.
 # The gains from $a$ to $e_1$, $e_2$ and $b(p-p^*)$ are integrals of absolute impulse responses, $G_1$, $G_2$, $G_p$. If $M = \delta_s G_1 + \delta_w G_2 + \delta_\beta G_p < 1$, then $|a| \le H/(1-M)$ for all $t \ge 0$, and $e_1$, $e_2$ and $p$ are bounded as well. $H$ bounds
 # $|\varphi_e - w_* r' - r''|$ plus the effect of the motion of $p^*$, which is a second input. *amplitude*: any
-# measurable disturbance of that size; *rate*: one that is also no faster than the sine of the task. This is continuous time, for a pressure without delay; `design.guarantee` is the result for the sampled loop.
+# measurable disturbance of that size; *rate*: one that also changes no faster than the sinusoidal disturbance of the task. This is continuous time, for a pressure without delay; `design.guarantee` is the result for the sampled loop.
 
 # %%
 peaks = {kind: design.certified_peaks(kind) for kind in ("amplitude", "rate")}
@@ -172,7 +172,7 @@ plt.xlabel("time [s]"), plt.ylabel("relative to its peak"), plt.title("impulse r
 plt.show()
 
 # %% [markdown]
-# The bound has a file, like any other certificate (`quakedesign certify elqr … --peaks amplitude --out FILE`), and `proofs/check.py` verifies it without this package, from the fault's data to the sentence. For a bound that is
+# The bound has a file, like any other certificate (`quakedesign certify elqr … --peaks amplitude --out FILE`), and `proofs/check.py` verifies it without this package, from the fault's data to the printed statement. For a bound that is
 # one percent smaller the file is rejected, because it does not prove that bound.
 
 # %%
@@ -184,7 +184,7 @@ print(certificate.sentence())
 
 # %% [markdown]
 # The bound holds from rest, on the plant without stick. A run of the first 4000 s on the stick–slip plant
-# with the sine of the task stays far below it.
+# with the sinusoidal disturbance of the task stays far below it.
 
 # %%
 run = qd.simulate(fault, design.controller, duration=4000)

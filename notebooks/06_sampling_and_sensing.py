@@ -80,7 +80,7 @@ print(table.map("{:.3g}".format).to_string())
 # %% [markdown]
 # ## Orders of accuracy
 # Sampled explicitly, a homogeneous sliding mode of this kind has $|e_1|\sim T_s^3$, $|e_2|\sim T_s^2$, $|e_3|\sim T_s$ ($e_3$: integral state plus $h$). The implicit step loses one order of $e_1$
-# (a constant force leaves $T_s^2$ times that force), and the estimate restores it.
+# (a constant force leaves an error of $T_s^2$ times that force), and the estimate restores it.
 
 # %%
 study = sim.accuracy(

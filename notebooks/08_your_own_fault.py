@@ -90,7 +90,7 @@ print("\n".join(limits_lines(limits)))
 
 # %% [markdown]
 # ## A controller and its guarantee
-# The guarantee covers every a, b and D_c of the record, and every shear stress disturbance up to 15 kPa: tides are several times smaller.
+# The guarantee covers every a, b and D_c that the record allows, and every shear stress disturbance up to 15 kPa: tides are several times smaller.
 
 # %%
 design = qd.design(fault, "elqr", stress="15000", spread=spread)

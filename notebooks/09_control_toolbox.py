@@ -79,8 +79,8 @@ plt.tight_layout()
 
 # %% [markdown]
 # ## What is guaranteed
-# One call proves, in exact arithmetic, bounds on the slip error and slip-rate error of the sampled loop, for every friction law, all parameters and every
-# disturbance of the box. The worst case found by a search is reported with them. From the command line: `quakedesign guarantee real-fault --gains …`.
+# One call proves, in exact arithmetic, bounds on the slip error and slip-rate error of the sampled loop, for every friction law and all parameters of
+# the box, and every disturbance of the class. The worst case found by a search is reported with them. From the command line: `quakedesign guarantee real-fault --gains …`.
 
 # %%
 found = qd.guarantee(fault, gains=tuple(gains.values()))
