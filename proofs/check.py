@@ -32,7 +32,7 @@ class Source(SourceFileLoader):
 
 
 class Finder(MetaPathFinder):
-    """Finds the modules of the folder there only, and no others."""
+    """Finds the modules of the package, in the folder ``checker`` only; no other modules."""
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
         """Location of a module of the package; an OSError names a missing file."""
@@ -154,7 +154,7 @@ def report(name: str) -> int:
     except Outdated:
         expected = "FILE must be a proof, a refutation or of the kind guarantee"
         remedy = "Make the new file with quakedesign certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE"
-        print(f"{expected}. Received {name!a}, a bound under inputs: no longer read. {remedy}.", file=sys.stderr)
+        print(f"{expected}. Received {name!a}, of an older kind: no longer read. {remedy}.", file=sys.stderr)
         return 2
     except (OSError, ValueError) as error:
         reason = ascii(getattr(error, "strerror", None) or str(error))

@@ -13,7 +13,7 @@ _OBJECTS = 100_000
 def main() -> None:
     """Run the command line; an interruption prints one line, even during the first imports."""
     gc.set_threshold(_OBJECTS, *gc.get_threshold()[1:])
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # for small matrices, threads of linear algebra only wait for another
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # for small matrices, linear-algebra threads only wait for each other
     open_all()
     widen()
     try:

@@ -82,7 +82,7 @@ if TYPE_CHECKING:
     from dataclasses import dataclass as checked_dataclass
 else:
 
-    def checked_dataclass(**options: Any) -> Callable[[type], type]:
+    def checked_dataclass(**options: object) -> Callable[[type], type]:
         """Dataclass that checks the arguments of construction and methods, even if imported from its own module."""
         return lambda kind: checked(dataclasses.dataclass(**options)(kind))
 
@@ -103,12 +103,12 @@ def _takes_any(function: Any, member: Any) -> bool:
     return not getattr(function, "__isabstractmethod__", False) and count > (not isinstance(member, staticmethod))
 
 
-def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
+def _checked(function: Callable[..., object]) -> Callable[..., object]:
     if hasattr(function, "checks_arguments"):
         return function
 
     @wraps(function)
-    def checking(*positional: Any, **named: Any) -> Any:
+    def checking(*positional: object, **named: object) -> object:
         try:
             bound = _signature(function).bind(*positional, **named)
         except TypeError as error:
@@ -122,12 +122,12 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @cache
-def _signature(function: Callable[..., Any]) -> Signature:
+def _signature(function: Callable[..., object]) -> Signature:
     return signature(function)
 
 
 @cache
-def _accept(function: Callable[..., Any], name: str) -> Callable[[Any], Any]:
+def _accept(function: Callable[..., object], name: str) -> Callable[[Any], Any]:
     """Function that returns a valid value of a parameter, NumPy numbers converted, and raises for an invalid one."""
     parameter, hint = _signature(function).parameters[name], _hint(function, name)
     if parameter.kind is Parameter.VAR_POSITIONAL:
@@ -147,7 +147,7 @@ def _accept(function: Callable[..., Any], name: str) -> Callable[[Any], Any]:
     return entries
 
 
-def _accepted(function: Callable[..., Any], name: str, hint: Any, value: Any) -> Any:
+def _accepted(function: Callable[..., object], name: str, hint: Any, value: Any) -> Any:
     if not matches(value, hint):
         remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
         raise ParameterError(
@@ -185,7 +185,7 @@ _late = cache(_Late)
 
 
 @cache
-def _hint(function: Callable[..., Any], name: str) -> Any:
+def _hint(function: Callable[..., object], name: str) -> Any:
     """Type of a parameter; `Any` if only a type checker can resolve it."""
     hint = _signature(function).parameters[name].annotation
     if not isinstance(hint, str):
@@ -198,13 +198,13 @@ def _hint(function: Callable[..., Any], name: str) -> Any:
     return Any
 
 
-def matches(value: Any, hint: Any) -> bool:
+def matches(value: object, hint: Any) -> bool:
     """Whether a value is of a type; of a collection, the first 16 entries must have their declared type."""
     return _test(hint)(value)
 
 
 @cache
-def _test(hint: Any) -> Callable[[Any], bool]:
+def _test(hint: Any) -> Callable[[object], bool]:
     """Function that tests whether a value is of a type; the type is analysed once, here."""
     origin, inner = get_origin(hint), get_args(hint)
     if hint in (Any, Parameter.empty):
@@ -224,12 +224,12 @@ def _test(hint: Any) -> Callable[[Any], bool]:
     return _test_of_class(hint) if isinstance(hint, type) else lambda _: True
 
 
-def _test_of_class(hint: type) -> Callable[[Any], bool]:
+def _test_of_class(hint: type) -> Callable[[object], bool]:
     numbers = _NUMBERS.get(hint.__name__)
     if hint.__name__ == "SX":  # also all other CasADi expressions and matrices
         hint = next(base for base in hint.__mro__ if base.__name__ == "GenericExpressionCommon")
 
-    def test(value: Any) -> bool:
+    def test(value: object) -> bool:
         if hint.__name__ == "ndarray":  # masked arrays are instances as well
             return isinstance(value, hint) and not _lacks_entries(value)
         if type(value) is hint:
@@ -273,11 +273,11 @@ def _is_float(value: Any) -> bool:
     return True
 
 
-def _test_of_collection(origin: type, inner: tuple[Any, ...]) -> Callable[[Any], bool]:
+def _test_of_collection(origin: type, inner: tuple[Any, ...]) -> Callable[[object], bool]:
     tests = [_test(part) for part in inner if part is not Ellipsis]
     fixed = origin is tuple and len(tests) == len(inner) > 0
 
-    def test(value: Any) -> bool:
+    def test(value: object) -> bool:
         if isinstance(value, str | bytes) or not _is_one(value, origin):
             return False
         if not isinstance(value, Collection) or not tests:
@@ -291,7 +291,7 @@ def _test_of_collection(origin: type, inner: tuple[Any, ...]) -> Callable[[Any],
     return test
 
 
-def _is_one(value: Any, origin: type) -> bool:
+def _is_one(value: object, origin: type) -> bool:
     """Whether a collection is of a kind; lists and arrays count as tuples and sequences, mappings as dictionaries."""
     if type(value) is origin:
         return True
@@ -303,7 +303,7 @@ def _is_one(value: Any, origin: type) -> bool:
     return isinstance(value, origin) or (issubclass(origin, Sequence) and listed)
 
 
-def _lacks_entries(value: Any) -> bool:
+def _lacks_entries(value: object) -> bool:
     """Whether a NumPy array has no dimension, or masked entries."""
     mask = getattr(value, "mask", None)
     return getattr(value, "ndim", 1) == 0 or (mask is not None and hasattr(mask, "any") and bool(mask.any()))
@@ -333,5 +333,5 @@ def _said(hint: Any) -> str:
     return _WORDS.get(name, f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 
-def _name(function: Callable[..., Any]) -> str:
+def _name(function: Callable[..., object]) -> str:
     return function.__qualname__.removesuffix(".__init__")

@@ -30,7 +30,7 @@ class QuakedesignError(Exception):
 
     @property
     def quantity(self) -> str:
-        """Quantity at fault: the text before "must" or "needs" in the message; empty without these words."""
+        """Quantity at fault: the text before "must", "need" or "needs" in the message; empty without these words."""
         subject, verb, _ = re.split(r" (must|needs?) ", f"{self.args[0]} must ", maxsplit=1)
         return subject if verb and subject != self.args[0] else ""
 

@@ -18,6 +18,7 @@ from quakedesign.text import PREFIXES
 
 if TYPE_CHECKING:
     import sympy as sp
+    from flint import arb
 
 
 # ----------------------------------------------------------------------
@@ -40,8 +41,8 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     Raises
     ------
     ParameterError
-        When the value is not a finite number of at most 300 characters and 308 digits, or is of a real type, not
-        rational, that exceeds float precision.
+        When the value is not a finite number of at most 300 characters and 308 digits, or when it has a real type
+        that is not rational (such as a long double) and no float equals it.
     """
     if isinstance(value, Fraction):
         return value if type(value) is Fraction else Fraction(value)
@@ -95,7 +96,7 @@ def fraction_of(value: Any) -> Fraction:
     return Fraction(int(value.p), int(value.q))
 
 
-def end_of(ball: Any) -> Fraction:
+def end_of(ball: "arb") -> Fraction:
     """Fraction of a python-flint ball of radius 0, such as the end of a wider ball."""
     return fraction_of(ball.fmpq())
 

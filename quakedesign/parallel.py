@@ -60,7 +60,7 @@ class Background:
         """End the current run early."""
         self._stopped = True
 
-    def submit(self, run: Callable[..., _Result], *given: Any, **named: Any) -> "Future[_Result]":
+    def submit(self, run: Callable[..., _Result], *given: object, **named: object) -> "Future[_Result]":
         """Queue a run; it takes ``progress``."""
         return self._executor.submit(run, *given, **named, progress=self._report)
 
@@ -146,7 +146,7 @@ class _Ending:
         self._number = self._number or number
         os._exit(self._conclude())
 
-    def not_raised(self, what: Any) -> None:
+    def not_raised(self, what: "sys.UnraisableHookArgs") -> None:
         """End the process where Python would only report the interruption and continue, as in a finaliser."""
         if isinstance(what.exc_value, Interruption):
             os._exit(self._conclude())
@@ -298,7 +298,7 @@ class Crew(ABC):
         """Useful number of simultaneous tasks."""
 
     @abstractmethod
-    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    def submit(self, task: Callable[..., _Result], *arguments: object) -> "Future[_Result]":
         """Start a task."""
 
     @abstractmethod
@@ -315,7 +315,9 @@ class Crew(ABC):
         """Argument in place of a value that many tasks use, so that it is sent to the workers only once."""
         return value
 
-    def results(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+    def results(
+        self, task: Callable[..., _Result], arguments: Sequence[tuple[object, ...]]
+    ) -> Iterator[tuple[int, _Result]]:
         """Results of a task for many arguments, each with the index of its arguments, in any order.
 
         Raises
@@ -361,7 +363,7 @@ class Processes(Crew):
     """
 
     def __init__(
-        self, count: int | None = None, begin: Callable[..., object] | None = None, arguments: tuple[Any, ...] = ()
+        self, count: int | None = None, begin: Callable[..., object] | None = None, arguments: tuple[object, ...] = ()
     ) -> None:
         self._count = cores() if count is None else require_workers(count)
         self._begin = pickle.dumps((begin, arguments))  # importing its modules takes seconds
@@ -375,7 +377,7 @@ class Processes(Crew):
         """See `Crew.width`."""
         return self._count
 
-    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    def submit(self, task: Callable[..., _Result], *arguments: object) -> "Future[_Result]":
         """See `Crew.submit`."""
         with undisturbed():  # so that every started process is registered
             try:
@@ -442,9 +444,9 @@ _PATIENCE = "10s"
 class SerialExecutor(Executor):
     """Runs every task immediately in the calling process."""
 
-    def submit(self, task: Callable[..., Any], /, *arguments: Any, **named: Any) -> "Future[Any]":
+    def submit(self, task: Callable[..., _Result], /, *arguments: object, **named: object) -> "Future[_Result]":
         """Completed future."""
-        future: Future[Any] = Future()
+        future: Future[_Result] = Future()
         try:
             future.set_result(task(*arguments, **named))
         except Exception as error:
@@ -460,14 +462,16 @@ class InProcess(Crew):
         """See `Crew.width`."""
         return 1
 
-    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    def submit(self, task: Callable[..., _Result], *arguments: object) -> "Future[_Result]":
         """See `Crew.submit`."""
         return SerialExecutor().submit(task, *arguments)
 
     def renew(self) -> None:
         """See `Crew.renew`: no worker dies."""
 
-    def results(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+    def results(
+        self, task: Callable[..., _Result], arguments: Sequence[tuple[object, ...]]
+    ) -> Iterator[tuple[int, _Result]]:
         """See `Crew.results`."""
         return ((place, task(*given)) for place, given in enumerate(arguments))
 
@@ -490,7 +494,7 @@ class UserExecutor(Crew):
         """See `Crew.width`."""
         return self._width
 
-    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    def submit(self, task: Callable[..., _Result], *arguments: object) -> "Future[_Result]":
         """See `Crew.submit`."""
         return self._executor.submit(task, *arguments)
 
@@ -553,7 +557,7 @@ class Cluster(UserExecutor):
         """See `Crew.shared`: the workers distribute the value among themselves."""
         return _Sent(value, self._client.scatter(value, broadcast=True, hash=False))
 
-    def submit(self, task: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+    def submit(self, task: Callable[..., _Result], *arguments: object) -> "Future[_Result]":
         """See `Crew.submit`."""
         return super().submit(task, *(self._there(given) if isinstance(given, _Sent) else given for given in arguments))
 
@@ -568,7 +572,9 @@ class Cluster(UserExecutor):
         """Twice the current number of threads of the cluster, so that none waits for the next batch."""
         return 2 * max(1, int(sum(self._client.nthreads().values())))
 
-    def results(self, task: Callable[..., Any], arguments: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Any]]:
+    def results(
+        self, task: Callable[..., _Result], arguments: Sequence[tuple[object, ...]]
+    ) -> Iterator[tuple[int, _Result]]:
         """See `Crew.results`."""
         from distributed import KilledWorker
 

@@ -96,13 +96,13 @@ def _shortened(text: str, length: int) -> str:
 
 
 def lasting(seconds: float, digits: int = 4) -> str:
-    """A time in seconds, and also in years, days or hours from two of them on."""
+    """A time in seconds, from two hours on also in years, days or hours: the largest unit that it contains twice."""
     short = duration(seconds)
     return f"{seconds:.{digits}g} s" + ("" if short.endswith(" s") else f" ({short})")
 
 
 def duration(seconds: float) -> str:
-    """A time in years, days or hours from two of them on, else in seconds."""
+    """A time in years, days or hours, the largest unit that it contains twice, else in seconds."""
     size, name = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), (1.0, "s"))
     return f"{plain(seconds / size)} {name}"
 

@@ -79,7 +79,7 @@ def decide(document: dict[str, Any]) -> tuple[str, list[str]]:
 
 
 def prove(document: dict[str, Any], positive: Statement, decrease: Statement) -> list[str]:
-    """Verify that V is positive and that it falls below the level, but at the origin."""
+    """Verify that V is positive, and that it decreases where it is below the level, except at the origin."""
     for part, statement in (("positive", positive), ("decrease", decrease)):
         prove_squares(document[part], statement)
         check_powers(document[part], len(statement.variables), part)

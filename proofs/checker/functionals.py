@@ -57,7 +57,7 @@ def reduce(bases: dict[Product, list[int]], factors: dict[Product, Coded], kept:
     """Drop monomials whose diagonal Gram entries must be zero, as long as there are any.
 
     Where only positive diagonal entries contribute to a monomial that is not kept, they add up to zero: each is
-    zero, and its row with it. Other contributions can only decrease, so the order does not matter.
+    zero, and its row with it. The number of other contributions can only decrease, so the order does not matter.
     """
     hindering: Counter[int] = Counter()  # by monomial, the number of all other contributions
     diagonal: dict[int, list[tuple[Product, int]]] = defaultdict(list)

@@ -203,7 +203,7 @@ def add_product(total: dict[Any, Any], first: dict[Any, Any], second: dict[Any, 
 
 
 def to_integers(numbers: Collection[Number], where: str) -> tuple[list[int], int]:
-    """Return the numbers times their common denominator, and that."""
+    """Return the numbers times their common denominator, and this denominator."""
     common = 1
     for denominator in {number.denominator for number in numbers}:
         common = lcm(common, denominator)

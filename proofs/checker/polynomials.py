@@ -134,7 +134,7 @@ def sum_squares(value: Any, where: str, statement: Statement, expanded: Expander
 
 
 def check_multiplier(value: Any, statement: Statement, expanded: Expander) -> None:
-    """Check that the multiplier is non-negative on the set, and positive where this may have no interior."""
+    """Check that the multiplier is non-negative on the set, and positive on it if the set may have no interior."""
     one, limits = (0,) * len(statement.variables), statement.inequalities
     units = [e for g in limits for e, number in g.items() if len(g) == 1 and sum(e) == 1 and number > 0]
     signed = {exponents.index(1) for exponents in units}

@@ -28,7 +28,8 @@ def is_positive_definite(upper: list[list[int]], *, or_singular: bool = False) -
     """Decide whether a symmetric matrix is positive (or non-negative) definite, by fraction-free elimination (Bareiss).
 
     Before step k every entry left is a minor of order k + 1, the pivot a leading one, so that `//` is exact. A
-    singular matrix is non-negative where a zero pivot has a zero row; omitting both changes no other minor.
+    singular matrix is non-negative definite only if every zero pivot has a zero row; omitting that row and its column
+    changes no other minor.
     """
     size, divisor = len(upper), 1
     for k, row in enumerate(upper):

@@ -19,7 +19,7 @@ from rich.text import Text
 
 from quakedesign.discovery import allow_code
 from quakedesign.errors import OutputError, ParameterError
-from quakedesign.files import require_writable
+from quakedesign.files import Json, require_writable
 from quakedesign.text import in_lines, visible
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
@@ -28,7 +28,7 @@ _typed: ContextVar[tuple[str, ...]] = ContextVar("typed", default=())
 
 
 def store_command(arguments: Sequence[str]) -> None:
-    """Store the typed command for `command_line`; enable output until `set_output`, and forbid code named by files."""
+    """Store the typed command for `command_line`; enable output until `set_output`; forbid running code from files."""
     _typed.set(tuple(arguments))
     allow_code(False)
     set_output(quiet=False, level="warning")
@@ -47,7 +47,7 @@ def set_output(*, quiet: bool, level: str) -> None:
 
 
 def command_line() -> str:
-    """Running command as typed; empty outside a command."""
+    """Command line as typed; empty outside a command."""
     return shlex.join(("quakedesign", *_typed.get())) if _typed.get() else ""
 
 
@@ -79,7 +79,7 @@ def reject(options: Mapping[str, Any], what: str) -> None:
         raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Omit {', '.join(names)}.")
 
 
-def print_json(value: dict[str, Any]) -> None:
+def print_json(value: Json) -> None:
     """Print a result as JSON on stdout."""
     print(json.dumps(value, indent=1, allow_nan=False))
 
@@ -95,7 +95,7 @@ class _Screen(Console):
     """Console that prints strings as plain text: no markup, no emoji, no control characters, no endless line."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print lines, wrapped with a hanging indent on a terminal and whole to files and pipes."""
+        """Print strings, with a hanging indent on a terminal; elsewhere only text over 200 characters is broken."""
         if self.is_terminal:
             objects = tuple(self._wrapped(text) if isinstance(text, str) else text for text in objects)
         super().print(*objects, **options)
@@ -115,7 +115,7 @@ def _hanging(text: str) -> str:
 
 
 def console(**options: Any) -> Console:
-    """Console for text, on stdout by default; every string is one line, a long one several."""
+    """Console for text, on stdout by default; a string is printed as one line, a long string as several."""
     return _Screen(quiet=_quiet.get(), markup=False, emoji=False, highlight=False, soft_wrap=True, **options)
 
 

@@ -20,7 +20,7 @@ from quakedesign.cli.options import (
 )
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational
-from quakedesign.files import lock_folder, made_folder, require_writable
+from quakedesign.files import Json, lock_folder, made_folder, require_writable
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.text import counted
 
@@ -60,7 +60,8 @@ def blocks(
     wells
         one: one well for all blocks, whose law measures the means of slip and slip rate; each: a well for each block.
     coupling
-        Spring stiffness divided by the mass of a block, in 1/s^2; by default the stiffness of elastic strips.
+        Stiffness of the springs between blocks divided by the mass of a block, in 1/s^2; by default that of elastic
+        strips, G·blocks²/(ρL²).
     step
         Sampling time T_s; the fault's by default.
     out
@@ -150,7 +151,7 @@ def _scope(proof: Any, chain: "BlockChain") -> list[str]:
     return [*([healed] if excess else []), meant]
 
 
-def _values(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> dict[str, Any]:
+def _values(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> Json:
     if not proof.found:
         return {"verdict": "undecided", "reason": proof.reason}
     proved = {} if one is None else one.proved_values()
@@ -283,7 +284,7 @@ def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
         raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
 
 
-def _run_values(one: "ChainRun | SlidingChainRun") -> dict[str, Any]:
+def _run_values(one: "ChainRun | SlidingChainRun") -> Json:
     if one.proof is None:
         return {"run": one.to_dict(), "guarantee": None}
     values = _values(one.proof, one.chain, one)

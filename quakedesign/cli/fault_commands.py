@@ -14,6 +14,7 @@ from cyclopts import Parameter
 from quakedesign.cli.app import app, console, new_file, print_json, progress, require_different
 from quakedesign.cli.options import PLAIN, Box, FaultName, Force, Gains, Output, Pascals, Whole, in_unit
 from quakedesign.errors import UnknownNameError, require_known
+from quakedesign.files import Json
 
 # ----------------------------------------------------------------------
 # Commands about the fault itself: its data, its equations, its scaling, the paper's errata.
@@ -59,7 +60,7 @@ def derive(
 
     model = derive_model(load_fault(fault))
     write = in_latex if latex else plain
-    equations: dict[str, Any] = {
+    equations: Json = {
         "error_dynamics": {"beta": write(model.error_dynamics.beta), "h": write(model.error_dynamics.h)},
         "jacobian": write(model.jacobian),
         "instability": write(model.instability),
@@ -118,7 +119,7 @@ def scale(
 
 @app.command
 def errata(*rows: int, output: Output = PLAIN) -> int:
-    """List where the paper cannot be taken literally; every row is recomputed.
+    """List the statements of the paper that cannot be taken literally; every row is recomputed.
 
     Parameters
     ----------
@@ -137,7 +138,7 @@ def errata(*rows: int, output: Output = PLAIN) -> int:
     return 0
 
 
-def _row_lines(row: dict[str, Any]) -> list[str]:
+def _row_lines(row: Json) -> list[str]:
     outcome = "holds" if row["holds"] else "DOES NOT HOLD"
     text = f"{row['row']}. {outcome} ({row['kind']}): {row['evidence']}"
     return [text, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]
@@ -214,8 +215,9 @@ def identify(
     """Identify friction parameters, with confidence regions, from a laboratory record.
 
     Velocity steps and slide-hold-slide tests give rate-and-state parameters; a measured slip, or a test on a stiff
-    machine, gives slip-weakening parameters. The first line is the verdict: explains the record, does not, or cannot
-    tell. Exit code 0 only if the fit explains the record and every parameter is determined.
+    machine, gives slip-weakening parameters. The first line is the verdict: the fit explains the record, does not
+    explain it, or the record cannot tell. Exit code 0 only if the fit explains the record and every parameter is
+    determined.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from quakedesign.cli.app import app, console, new_file, progress, reject, specified
 from quakedesign.cli.options import PLAIN, Force, Formats, Gains, Output, Scheduler, Seconds, Whole
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
-from quakedesign.files import lock_folder
+from quakedesign.files import Json, lock_folder
 
 if TYPE_CHECKING:
     from quakedesign.lyapunov.gains.synthesise import Synthesis
@@ -42,7 +42,7 @@ def synthesise(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Find proved gains that are optimal in one objective, and compare them with gains from the literature.
+    """Search for proved gains that optimise one objective, and compare them with gains from the literature.
 
     Exit code 0 only if gains are proved. No gains are printed without a proof.
 
@@ -57,14 +57,16 @@ def synthesise(
         all |e_i| ≤ L̄ (the number of --lipschitz). beta: widest certified range of the input gain β. sampled: smallest
         simulated error of proved gains on a fault.
     lipschitz
-        Bound on |h'|, in the unit of ν per second; 1 by default; for sampled 1.1 times the largest |h'| of the fault.
+        Bound on |h'|, the rate of change of the matched disturbance h, in the unit of the control ν per second; by
+        default 1, for sampled 1.1 times the largest |h'| of the fault.
     gain_range
         b_m and b_M, the range of the input gain β; 1 1 by default, for sampled that of the fault. For beta
         the certified range contains this range and has the same geometric mean.
     bound
         Objectives decay and beta: largest norm of the gains; by default the smallest norm of gains from the literature.
     degree
-        Degree of V; repeat for more. By default the two lowest; higher degrees find better gains and take longer.
+        Degree of the Lyapunov function V; repeat for more. By default the two lowest; higher degrees find better gains
+        and take longer.
     starts
         Number of starting points, 4 by default; not for sampled.
     seed
@@ -124,7 +126,7 @@ def _sampled(
     return synthesise_sampled(trial, degrees=degree or None), {"fault": fault, **tried}
 
 
-def _values(synthesis: "Synthesis | None") -> dict[str, Any]:
+def _values(synthesis: "Synthesis | None") -> Json:
     """Answer as JSON: gains and ranges as texts, measured values as numbers."""
     if synthesis is None:
         return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
@@ -203,8 +205,9 @@ def gain_map(
 ) -> int:
     """Map where two gains are certified, at one or more levels of |h'|, with certificates, figure and table.
 
-    Every grid point is screened in floating point. All points at the edges and a random sample inside are then proved
-    exactly; figure and table distinguish both. Exit code 0 if some point is certified and every edge point is proved.
+    Every grid point is screened in floating point. All points at the edge of the certified region of a level, and a
+    random sample inside, are then proved exactly; figure and table distinguish screened from proved points. Exit code 0
+    if some point is certified and every edge point is proved.
 
     Parameters
     ----------
@@ -215,9 +218,11 @@ def gain_map(
     gains
         All gains of the law; those that do not vary keep these values. By default those from the literature.
     range
-        Four numbers: both ends of the first gain, then of the second; by default 0.25 to 4 times its value in --gains.
+        Four numbers: both ends of the first gain, then of the second; by default 0.25 and 4 times the gain's value in
+        --gains.
     lipschitz
-        One or more bounds on |h'|; by default 25, 50, 75, 90 and 99 % of the bound that no proof can exceed.
+        One or more bounds on |h'|, the rate of change of the matched disturbance h; by default 25, 50, 75, 90 and 99 %
+        of the bound that no proof can exceed.
     gain_range
         b_m and b_M, the range of the input gain β.
     points

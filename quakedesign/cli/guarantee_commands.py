@@ -33,7 +33,7 @@ from quakedesign.cli.options import (
 )
 from quakedesign.errors import ParameterError, QuakedesignError, SimulationError
 from quakedesign.exact import rational
-from quakedesign.files import lock_folder, made_folder, require_writable
+from quakedesign.files import Json, lock_folder, made_folder, require_writable
 
 # ----------------------------------------------------------------------
 # The command about the sampled loop.
@@ -92,11 +92,12 @@ def guarantee(
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
         differentiator (implicit, n_d = 2, any n_f), for which the smallest λ_d is printed.
     disturbance_class
-        amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of change is bounded too.
+        amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of change is bounded too, by the
+        fault's amplitude times frequency, and it starts at 0.
     plant
-        stick-slip: friction holds the fault at rest, and it never slips backward (designed e-LQR or sliding mode, exact
-        slip rate, a pressure without delay); printed: the paper's plant, without stick. By default stick-slip where it
-        has a proof, else printed; with --class rate printed.
+        stick-slip: friction holds the fault at rest, and it never slips backward (only for a designed e-LQR or a
+        sliding mode, with an exactly measured slip rate and a pressure without delay); printed: the paper's plant,
+        without stick. By default stick-slip where it has a proof, else printed; with --class rate printed.
     stress
         Rate-and-state faults (slow sliding, e-LQR through a diffusion path or a lag): bound of the shear stress
         disturbance, such as '25 kPa'; by default about the largest with a guarantee.
@@ -196,7 +197,7 @@ def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | No
     return [*files]
 
 
-def _values(result: Any, path: Path | None) -> dict[str, Any]:
+def _values(result: Any, path: Path | None) -> Json:
     """Result as JSON; its file is written if there is a proof."""
     from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 

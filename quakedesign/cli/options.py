@@ -12,12 +12,13 @@ from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
-from cyclopts import Group, Parameter
+from cyclopts import Group, Parameter, Token
 
 from quakedesign.cli.app import print_json, print_lines, reject, set_output, specified
 from quakedesign.errors import ParameterError, UnitError
 from quakedesign.exact import rational
 from quakedesign.fault.equilibrium import by_equilibrium
+from quakedesign.files import Json
 from quakedesign.loop import Actuator, stages
 from quakedesign.loop.actuators.base import Option, Stage
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, quantities
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
 
-def _gains(_type: Any, tokens: Sequence[Any]) -> tuple[str, ...]:
+def _gains(_type: object, tokens: Sequence[Token]) -> tuple[str, ...]:
     """One word, or numbers as typed."""
     texts = tuple(token.value for token in tokens)
     for place, text in enumerate(texts if len(texts) > 1 else (), start=1):
@@ -49,10 +50,10 @@ def _gains(_type: Any, tokens: Sequence[Any]) -> tuple[str, ...]:
 Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains)]
 
 
-def quantity(unit: str) -> Callable[[Any, Sequence[Any]], float]:
+def quantity(unit: str) -> Callable[[object, Sequence[Token]], float]:
     """Converter of an option's text, with a unit or a bare number in the SI unit."""
 
-    def read(_type: Any, tokens: Sequence[Any]) -> float:
+    def read(_type: object, tokens: Sequence[Token]) -> float:
         return in_unit(tokens[0].value, unit, (tokens[0].keyword or "value").strip("-").replace("-", " "))
 
     return read
@@ -66,7 +67,7 @@ def in_unit(text: str, unit: str, name: str) -> float:
         return _with_unit(text, unit, name)
 
 
-def whole(_type: Any, tokens: Sequence[Any]) -> int:
+def whole(_type: object, tokens: Sequence[Token]) -> int:
     """Whole number of an option's text."""
     text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
     try:
@@ -75,10 +76,10 @@ def whole(_type: Any, tokens: Sequence[Any]) -> int:
         raise ParameterError(f"{name} must be a whole number. Received {text!r}. Write for example 8.") from None
 
 
-def _exact_reader(unit: str) -> Callable[[Any, Sequence[Any]], str]:
+def _exact_reader(unit: str) -> Callable[[object, Sequence[Token]], str]:
     """Converter to an exact number as typed, also p/q, or to that of a text with a unit."""
 
-    def read(_type: Any, tokens: Sequence[Any]) -> str:
+    def read(_type: object, tokens: Sequence[Token]) -> str:
         text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
         try:
             rational(text)
@@ -142,7 +143,7 @@ Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
 # Options that several commands share, each defined once.
 
 
-def _fault_name(_type: Any, tokens: Sequence[Any]) -> str:
+def _fault_name(_type: object, tokens: Sequence[Token]) -> str:
     """Name of a fault; an unknown one is rejected before anything else loads."""
     from quakedesign.fault.fault_toml import require_source
 
@@ -173,7 +174,7 @@ Scheduler = Annotated[
 ]
 Formats = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
-    Parameter(consume_multiple=True, negative="", help="Of the figures, one or several: svg, pdf, png."),
+    Parameter(consume_multiple=True, negative="", help="File formats of the figures, one or several: svg, pdf, png."),
 ]
 Force = Annotated[bool, Parameter(negative="", help="Replace the output of an earlier run.")]
 
@@ -192,7 +193,7 @@ class Output:
     log_level
         Messages on stderr: info for every step, debug for all progress.
     no_cache
-        Do not read or write the cache of searches, compiled code and long runs, as QUAKEDESIGN_CACHE=off.
+        Do not read or write the cache of searches, compiled code and long runs; same as QUAKEDESIGN_CACHE=off.
     allow_code
         Allow fault files to run code: friction as module:Class. Only for files that you trust.
     """
@@ -215,7 +216,7 @@ class Output:
         if (self.quiet, self.log_level) != (False, "warning"):
             set_output(quiet=self.quiet, level=self.log_level)
 
-    def show(self, values: dict[str, Any], text: Iterable[str] | Callable[[], object]) -> None:
+    def show(self, values: Json, text: Iterable[str] | Callable[[], object]) -> None:
         """Print facts as JSON, or else as text: lines, or a function that prints them."""
         if self.json:
             print_json(values)
@@ -290,7 +291,7 @@ class LawOptions:
         ]
         if unlike:
             raise ParameterError(
-                f"--certificate contains the law, an e-LQR. Received {', '.join(unlike)} with {self.certificate}. "
+                f"--certificate contains the law. Received {', '.join(unlike)} with {self.certificate}. "
                 "Omit these options."
             )
         return certified_choice(fault, self.certificate)
@@ -525,7 +526,8 @@ class EstimateOptions:
     averaging
         Number of latest readings that are averaged for the differentiator.
     differentiator_bound
-        λ_d in m/s^(n_d + 1): the law uses estimates of a differentiator.
+        Bound λ_d on the derivative of order n_d + 1 of the slip, in m/s^(n_d + 1); with this option the law uses
+        estimates of a differentiator.
     differentiator_order
         n_d, the number of derivatives. For 2, as in the paper, the premise named 'differentiator' fails for every λ_d
         with a zero-order hold; guarantee --measured differentiator proves such a loop without this premise.

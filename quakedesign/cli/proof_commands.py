@@ -2,13 +2,14 @@
 
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from quakedesign.cli.app import app, new_file, reject
 from quakedesign.cli.options import PLAIN, Box, ExactSeconds, Force, Gains, Output
 from quakedesign.errors import ParameterError, PolynomialError
+from quakedesign.files import Json
 
 # ----------------------------------------------------------------------
 # Commands that prove, refute and re-check.
@@ -43,12 +44,14 @@ def certify(
     fault
         e-LQR: preset or path of a .toml file.
     gains
-        Exact numbers: decimals, exponents or p/q; four for cta and elqr (SI).
+        Exact numbers: decimals, with or without exponent, or p/q; four for cta and for elqr (elqr: in SI units).
     lipschitz
-        Sliding mode: bound on |h'|, in the unit of ν per second.
+        Sliding mode: bound on |h'|, the rate of change of the matched disturbance h, in the unit of the control ν per
+        second.
     maximize
-        Sliding mode: lipschitz (largest bound on |h'|; also the smallest λ for the bound of --lipschitz), beta (upper
-        end of its range), beta-factor (f in [b/f, b·f]) or decay (with a bound of the settling time).
+        Sliding mode: quantity to maximise: lipschitz (the bound on |h'|; also gives the smallest λ for the bound of
+        --lipschitz), beta (the upper end of the range of β), beta-factor (f in the range [b/f, b·f] of β) or decay (the
+        decay rate; also gives a bound of the settling time).
     gain_range
         Sliding mode: b_m and b_M, the range of the input gain β; 1 1 by default. For
         --maximize beta-factor give b, the centre of the range, twice.
@@ -136,8 +139,8 @@ def check(
     fault
         Preset or .toml file: the certificates must also cover its constants and ranges.
     rocq
-        Write a file that Rocq's compiler, coqc, verifies, for every valid certificate. Exit code 1 if a kind of
-        certificate has none.
+        For every valid certificate, write a file that Rocq's compiler, coqc, verifies. Exit code 1 if there is no such
+        file for the kind of a certificate.
     out
         With --rocq: output folder; ./quakedesign-rocq by default.
     """
@@ -157,7 +160,7 @@ def check(
         for path, (verdict, statement) in verdicts.items()
         for line in (f"{path}: {verdict}", *(f"    {line}" for line in (*statement, *written.get(path, ())[1:])))
     )
-    entries: dict[str, Any] = {"files": {path: verdict for path, (verdict, _) in verdicts.items()}}
+    entries: Json = {"files": {path: verdict for path, (verdict, _) in verdicts.items()}}
     if rocq:
         entries["rocq"] = {path: written[path][0] if path in written else None for path in verdicts}
     output.show(entries, text)
@@ -240,7 +243,7 @@ def sos(
         result = prove(polynomial, on=on, multiplier=multiplier, margin=margin, degree_bound=degree, products=products)
     if out is not None and result.proof is not None:
         result.save(out)
-    entries: dict[str, Any] = {
+    entries: Json = {
         "verdict": str(result.verdict),
         "variables": list(result.statement.variables),
         "degree": result.statement.degree,
@@ -273,23 +276,24 @@ def attraction(
 ) -> int:
     """Prove the largest sublevel set of a Lyapunov function from which all solutions converge to the origin.
 
-    Exit code 0 if a level is proved.
+    Exit code 0 if a level, or with --everywhere global convergence, is proved.
 
     Parameters
     ----------
     field
-        TOML file: in [field] the rate of every state, such as x = "-y" and y = "x + (x^2 - 1)*y", polynomials that
-        vanish at the origin; above it V = "...", optional. By default V = x'Px with A'P + PA = -1 for the linearised
-        field; with --everywhere a V of degree 2 or 4 is searched for.
+        TOML file with a table [field]: the rate of every state, such as x = "-y" and y = "x + (x^2 - 1)*y", as a
+        polynomial that vanishes at the origin. A line V = "..." before this table is optional. By default V = x'Px with
+        A'P + PA = -I for the linearised field x' = Ax; with --everywhere a V of degree 2 or 4 is searched for.
     everywhere
-        Prove global convergence. A point may refute the given V or, without one, every V.
+        Prove global convergence. If that fails, a point may refute the given V; without a given V, another equilibrium
+        refutes every V.
     relative
         Relative width of the last bisection interval, from 1e-6 to below 1.
     degree
         Also search for V of at most this even degree, to enlarge the sublevel set of --shape in the region.
     shape
         Positive definite polynomial, such as "x^2 + 2*y^2": proves the largest b whose sublevel set shape <= b lies in
-        the region. With --degree by default the sum of squares of the states.
+        the proved region. With --degree the default is the sum of squares of the states.
     out
         Proof file to write; the refutation if nothing is proved, unless --above is given.
     above

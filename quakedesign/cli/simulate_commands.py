@@ -37,11 +37,13 @@ from quakedesign.cli.options import (
 )
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.fault.equilibrium import by_equilibrium
-from quakedesign.files import lock_folder
+from quakedesign.files import Json, lock_folder
 from quakedesign.parallel import remedy
 
 if TYPE_CHECKING:
     from quakedesign.fault import Fault
+    from quakedesign.lyapunov.exact.premises import Premise
+    from quakedesign.simulation import Trajectory
     from quakedesign.simulation.campaign import Campaign, CampaignProblem
 
 
@@ -73,7 +75,7 @@ def simulate(
 ) -> int:
     """Simulate a closed loop over the whole task, or the natural earthquake without a controller.
 
-    Quantities have a unit, as '20 MPa', or are numbers in SI units.
+    Give quantities with a unit, such as '20 MPa', or as numbers in SI units.
 
     Parameters
     ----------
@@ -185,7 +187,7 @@ def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
     return [name for name in (*_BESIDE, *groups) if name in changed and name not in within]
 
 
-def _values(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
+def _values(trajectory: "Trajectory", fault: "Fault", premises: "Sequence[Premise]") -> Json:
     from quakedesign.simulation.earthquake import waiting
     from quakedesign.studies.comparison import shortfall
 
@@ -206,7 +208,7 @@ def _values(trajectory: Any, fault: Any, premises: Any) -> dict[str, Any]:
     }
 
 
-def _print_run(trajectory: Any, fault: Any, premises: Any, *texts: str) -> None:
+def _print_run(trajectory: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", *texts: str) -> None:
     from quakedesign.report.terminal import print_run
 
     print_run(trajectory, fault, premises, console())
@@ -231,7 +233,7 @@ def sampling(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Show effects of sampling on a law, beside the published laws: every scheme, orders of accuracy, sensitivities.
+    """Show effects of sampling on a law and on the published laws: errors by scheme, orders of accuracy, sensitivities.
 
     Runs are on the plant without stick. Errors are evaluated after the first quarter of each run. Runs with noise last
     a sixteenth of the task. Writes results.json and figures.
@@ -383,8 +385,8 @@ def campaign(
     """Simulate many samples of the uncertainty box, disturbances, noise and initial states, and report the worst.
 
     Finished batches are kept in the folder: after an interruption the same command continues and gives the same result.
-    Exit code 0 if all samples have a result (also a diverged one), 1 if a batch failed. Quantities have a unit, as '20
-    MPa', or are numbers in SI units.
+    Exit code 0 if all samples have a result (also a diverged one), 1 if a batch failed. Give quantities with a unit,
+    such as '20 MPa', or as numbers in SI units.
 
     Parameters
     ----------
@@ -445,7 +447,7 @@ def campaign(
     return 1 if done.failures else 0
 
 
-def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
+def _again(done: "Campaign", index: str | None, folder: Path) -> Json:
     """Run one sample again and store it."""
     if index is None:
         return {}
@@ -455,7 +457,7 @@ def _again(done: "Campaign", index: str | None, folder: Path) -> dict[str, Any]:
     return {"rerun": {"index": index, "file": str(path), **entries}}
 
 
-def _print(problem: "CampaignProblem", done: "Campaign", result: dict[str, Any], written: str) -> None:
+def _print(problem: "CampaignProblem", done: "Campaign", result: Json, written: str) -> None:
     from rich.table import Table
 
     from quakedesign.simulation.recorder import Metrics
@@ -485,7 +487,7 @@ def _print(problem: "CampaignProblem", done: "Campaign", result: dict[str, Any],
     out.print(f"written: {written}")
 
 
-def _written(values: dict[str, Any], formats: Sequence[str]) -> str:
+def _written(values: Json, formats: Sequence[str]) -> str:
     """Names of the files in the folder."""
     from quakedesign.report.drawing import file_names
 

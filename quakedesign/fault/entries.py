@@ -21,7 +21,7 @@ from quakedesign.text import nearest_name, shown
 
 _Value = TypeVar("_Value")
 Reader = Callable[[object, str, str], float | Fraction]
-"""Value in an SI unit of an entry, with the entry's name for messages."""
+"""Function (value as in the file, SI unit, name of the entry for messages) that returns the value in this unit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -136,7 +136,7 @@ class Table:
         return values
 
     def table(self, key: str, *, optional: bool = False) -> "Table":
-        """Table inside this one; an invalid or missing one is empty, and its errors are not collected."""
+        """Table inside this one; an invalid or missing one is empty, without errors of its entries."""
         if self._given(key, optional):
             with self.problems.collected():
                 name = self._name(key)

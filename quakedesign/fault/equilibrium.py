@@ -15,7 +15,7 @@ class FaultEquilibrium:
 
     name: str
     coordinates: str  # Coordinates of the plant: beginning of a sentence that its equations complete
-    poles: str  # Equilibrium of the poles in words, a format of the slip rate [m/s]
+    poles: str  # Equilibrium of the poles in words: a format string for the slip rate [m/s]
     messages: Mapping[str, str]  # Message for each quantity that does not apply, by name
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from quakedesign.errors import CertificateError
 from quakedesign.exact import Bound, LowerBound
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.guarantee_files import save_guarantee
 from quakedesign.guarantees.exact.plant_proof import PlantProof
 from quakedesign.guarantees.exact.proof import NoProof
@@ -109,7 +110,7 @@ class Guarantee:
         """Re-check the guarantee in exact arithmetic; UNDECIDED without one."""
         return Verdict(self.proof.check())
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; exact numbers as texts."""
         result = {"verdict": str(self.verdict), "sentence": self.sentence()}
         return result | (self.proof.to_dict() if self.proved else {"reason": self.reason})

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from math import exp
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import AGEINGS
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.limit_theorems import SlidingPush, longest_diffusion
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
@@ -75,7 +75,7 @@ class SlidingGuarantee(Guarantee):
         seen = f"slip error {quantity(self.worst.slip_error, 'm')}, slip rate {exp(self.worst.log_rate or 0):.4g} V"
         return [f"proved: {self.proof.sentence()}", f"worst case found without inertia: {seen}"]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; exact numbers as texts."""
         seen = self.worst and {"log_rate": self.worst.log_rate, "slip_error": self.worst.slip_error}
         return super().to_dict() | ({"worst_found": seen} if self.proved else {})

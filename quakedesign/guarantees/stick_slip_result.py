@@ -8,6 +8,7 @@ from typing import Any
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, rational
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.limit_theorems import smallest_stick_slip_rate
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
@@ -77,7 +78,7 @@ class StickSlipGuarantee(Guarantee):
         parts += self.limit_lines()
         return parts if self.compensation is None else [*parts, self.compensation.sentence()]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; exact numbers as texts."""
         if not self.proved:
             return super().to_dict()

@@ -3,11 +3,11 @@
 from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import LowerBound, UpperBound, exact_text, float_above, shortly
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.limit_theorems import SmallestPeak, smallest_peak
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
@@ -233,7 +233,7 @@ class TrackingGuarantee(Guarantee):
             return True
         return seen.slip_error > claims.slip_error or (seen.slip_rate_error or 0.0) > claims.slip_rate_error
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; exact numbers as texts."""
         if not self.proof.found:
             gain = self.proof.small_gain
@@ -315,7 +315,7 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
     return f"with a pump of at least {UpperBound(pump.rate or 0).quantity('Pa/s')}"
 
 
-def _nearest(name: str, proof: TrackingProof, factor: Fraction | None) -> dict[str, Any]:
+def _nearest(name: str, proof: TrackingProof, factor: Fraction | None) -> Json:
     """Plain values, SI; exact numbers as texts; a list for a box and for limits of a pump."""
     pump, value = proof.held.pump, None
     if name == FACTOR:
@@ -382,7 +382,7 @@ def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
     return None if limit is None else {name: exact_text(getattr(limit, name)) for name in names}
 
 
-def _law(law: LinearLaw) -> dict[str, Any]:
+def _law(law: LinearLaw) -> Json:
     root = law.root
     of_root = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
     matrices = {name: written(getattr(law, name)) for name in ("update", "measured")}

@@ -6,13 +6,14 @@ the intervals. The process decays with time or displacement, whichever has the l
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy import ndarray
 from scipy.linalg import cho_solve_banded, cholesky, cholesky_banded
 from scipy.linalg.lapack import dtrtri
 from scipy.optimize import minimize
+
+from quakedesign.files import Json
 
 _LEAST_GAIN = 3.0  # least gain of the log-likelihood by two parameters: AIC with a margin of 1
 _MOST_DENSE = 1500  # samples whose covariance is factored as a full matrix
@@ -33,7 +34,7 @@ class CorrelatedNoise:
     of_time: bool  # whether `along` is time
     common: ndarray | None = None  # columns: effect of one deviation of each unknown of the load on all samples
 
-    def to_dict(self, noise: float) -> dict[str, Any] | None:
+    def to_dict(self, noise: float) -> Json | None:
         """Size and length with units, from the white noise [-] of one measurement; None without correlated noise."""
         if not self.share:
             return None

@@ -80,7 +80,7 @@ def identified_fault(identification: Identification, fault: Fault) -> Fault:
         Identification of a record that determines every parameter.
     fault : Fault
         Source of everything except friction. If only the identified friction has a state, there is no disturbance, and
-        T_s is chosen for slow sliding; T_s also if that of the fault was assumed.
+        T_s is chosen for slow sliding. If both have a state and T_s of the fault was assumed, T_s is chosen likewise.
 
     Returns
     -------
@@ -137,9 +137,7 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
     law: Any = identification.law
     task, moved = fault.reference, _at_rate_of(fault, law)
     assumed = [remark for remark in fault.assumed if remark.startswith(_OF_TASK)]
-    lines = (
-        [f"assumed with the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
-    )
+    lines = [f"assumed for the friction that is replaced: {'; '.join(assumed)}; set [task] yourself"] if assumed else []
     if moved is not law and moved.reference_rate != law.reference_rate:
         old, new = (quantity(each.reference_rate, "m/s", 4) for each in (law, moved))
         text = f"mu0 = {law.reference_coefficient:.5g} at {old} was converted to {moved.reference_coefficient:.5g}"
@@ -148,7 +146,7 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:
-    """Remark if a record, fitted without a given law, has another law with state than the fault."""
+    """Remark if a record selects another law with state than that of the fault; none if its law was given."""
     named, law = fault.friction, identification.law
     if identification.rival is None or named.equilibrium is not law.equilibrium or named.name == law.name:
         return []
@@ -167,7 +165,7 @@ def next_command(identification: Identification, path: str | Path | None) -> str
     if path is None:
         return "--out FILE writes a fault file for design and guarantee"
     if why := poor_fit(identification):
-        return f"none: {why}. Design refuses the file without --accept-poor-fit"
+        return f"none: {why}. Design rejects the file without --accept-poor-fit"
     if not covers(identification.law) and (wide := _too_wide(identification)):
         return f"none that covers the record: {wide}. Without --spread, design covers the best fit alone"
     spread = "" if covers(identification.law) else f" --spread {_spread(identification)}"
@@ -176,7 +174,7 @@ def next_command(identification: Identification, path: str | Path | None) -> str
 
 
 def _at_rate_of(fault: Fault, law: FrictionLaw) -> Any:
-    """A law at the reference rate and on the working range of a fault.
+    """A law at the reference rate of a fault, with a working range that covers those of law and fault.
 
     Friction is the same, as μ_0 changes by (a − b)·ln of the ratio of rates.
     """
@@ -224,7 +222,7 @@ def save_fault(identification: Identification, fault: Fault, path: str | Path) -
     remarks = [
         f"Friction identified from {identification.record.name!r} as {law.name}; "
         f"from {fault.name}: {other_parts(identification, fault)}.",
-        f"Best fit (95 % alone; box of all together); {text}.",
+        f"Best fit (95 % interval of each parameter alone; box of all parameters together); {text}.",
         *(
             f"  {e.name} = {e.value:.6g} ({e.low:.6g} to {e.high:.6g}; {e.least:.6g} to {e.most:.6g}) {e.unit}".rstrip()
             for e in identification.estimates.values()

@@ -23,9 +23,9 @@ _BESIDE = "delay", "start_rate"  # parameters that may stay undetermined: no oth
 _EXPERIMENTS = {
     "the stiffness of the machine, from loading or unloading: --stiffness": "stiffness",
     "a step to ten times the rate, with ten samples within a critical slip after it": "direct_effect evolution_effect",
-    "longer sliding after the step, until friction stays": "critical_slip second_slip second_effect",
+    "longer sliding after the step, until friction is constant": "critical_slip second_slip second_effect",
     "longer sliding before the step, which fixes the trend, and steps up and down by a factor of 10": "sign",
-    "slip from rest until friction stays": "drop residual",
+    "slip from rest until friction is constant": "drop residual",
 }
 """Experiments that determine open parameters, or the sign of a - b."""
 
@@ -41,12 +41,12 @@ class ParameterEstimate:
     value : float
         Best fit.
     low, high : float
-        Ends for this parameter alone; infinite (or 0) where the record sets no end.
+        Ends for this parameter alone; infinite where the record sets no end.
     least, most : float
         Ends for all parameters jointly: those of the smallest box that contains their joint region.
     profile : tuple of (float, float)
-        Tried values, ascending, and the square roots of the excess of their sums of squares in variances of the noise,
-        minimised over all other parameters.
+        Tried values, ascending, each with the square root of its excess: the sum of squares, minimised over all other
+        parameters, minus the smallest one, divided by the variance of the noise.
     """
 
     name: str
@@ -136,12 +136,12 @@ class Identification:
 
     @property
     def determined(self) -> bool:
-        """Whether every parameter has an interval with both ends."""
+        """Whether every parameter except delays and the initial rate has an interval with both ends."""
         return all(e.identified for e in self.estimates.values() if not e.name.startswith(_BESIDE))
 
     @property
     def identified(self) -> bool:
-        """Whether every parameter has an interval, and the fit explains the record."""
+        """Whether `determined`, and the verdict is not that the fit does not explain the record."""
         return self.determined and self.assessment.verdict != EXPLAINS_NOT
 
     @property

@@ -17,6 +17,7 @@ from scipy import stats
 
 from quakedesign.errors import RecordError
 from quakedesign.fault import FrictionLaw
+from quakedesign.files import Json
 from quakedesign.identification.assessment import Assessment, Check, sign_check
 from quakedesign.identification.experiment import Coordinate, Experiment
 from quakedesign.identification.fitting import Fit, minimised, weighted
@@ -49,7 +50,7 @@ class Steps:
     common: Identification
     probability: float
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """JSON-able facts of the common fit, in SI units, and of every step under `steps`."""
         steps = [{"record": step.record.name, **step.to_dict()} for step in self.steps]
         return {**self.common.to_dict(), "probability": self.probability, "steps": steps}

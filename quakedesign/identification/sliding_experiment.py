@@ -27,7 +27,7 @@ _DIAGONAL = 0.5
 
 
 def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """State after one L-stable step of order 3, and the estimate of its error (that of an embedded order 2).
+    """State after one L-stable step of order 3, and its error as estimated by an embedded step of order 2.
 
     `field` gives dy/dt of y, both CasADi SX columns; time must not enter. Nothing changes in a step of length 0 [s].
     RODAS3 of Sandu, Verwer, Blom, Spee, Carmichael and Potra (1997), Atmos. Environ. 31(20), 3459.
@@ -45,9 +45,9 @@ def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.S
     return y + 2 * first + third + fourth, fourth
 
 
-_MOST_STEPS = 30  # mean number of steps per sample; more mean instability, or samples far too sparse for the law
+_MOST_STEPS = 30  # largest mean number of steps per sample; with more, the block is unstable or the samples too sparse
 _SAFETY = 0.9
-_USABLE_ERROR = 1e3  # error of friction above which, or if not finite, it does not give the next length
+_USABLE_ERROR = 1e3  # largest error of friction that gives the next length; else the length falls by a fixed factor
 _SHORTEST = 1e-8  # share of the time between two samples
 STIFFNESS = "stiffness"
 START_STATE = "start_state"  # logarithm of the ratio of the state at the first sample to that of steady sliding
@@ -56,7 +56,7 @@ START_RATE = "start_rate"  # logarithm of the ratio of the slip rate at the firs
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """Inputs of an experiment between neighbouring samples."""
+    """Inputs of an experiment between neighbouring instants: samples and changes of rate."""
 
     lengths: ndarray  # [s]
     rates: ndarray  # rates of the load point [m/s]
@@ -66,7 +66,7 @@ class Drive:
 
     @cached_property
     def inputs(self) -> ndarray:
-        """Rates, growth and compliance, one column a sample."""
+        """Rates, growth and compliance, one column per interval between neighbouring instants."""
         return np.array([self.rates, self.growth, self.compliance])
 
 
@@ -111,7 +111,7 @@ class SlidingExperiment(Experiment):
         return rates
 
     def growth(self, fitted: ndarray) -> ndarray:
-        """Time derivative of friction [1/s] at every sample, from the spring after a change of rate."""
+        """Time derivative of friction [1/s] just after every sample, from the spring at constant normal load."""
         ends, place = np.flatnonzero(self.measured), [c.name for c in self.coordinates]
         after = np.minimum(ends, len(self.drive.rates) - 1)
         stiffness = self.stiffness if self.stiffness is not None else float(np.exp(fitted[place.index(STIFFNESS)]))
@@ -127,7 +127,7 @@ class SlidingExperiment(Experiment):
         return (f"inertia is neglected: it would matter above {noise / acceleration:.2g} {unit}",)
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
-        """The law with a working range, where it has one, about twice as wide as the slip rates of the experiment."""
+        """The law; its working range, if any, is from half the smallest to twice the largest slip rate."""
         law, rates = Experiment.best_law(self, fitted), self.rates(fitted)
         ends = {"slowest_rate": float(f"{np.min(rates) / 2:.2g}"), "fastest_rate": float(f"{2 * np.max(rates):.2g}")}
         effect = {"evolution_effect": getattr(law, "evolution_effect", 1.0)}
@@ -137,7 +137,8 @@ class SlidingExperiment(Experiment):
         """The same experiment with the steps that an accuracy of friction requires at given coordinates.
 
         By the embedded error estimate; the same steps are then used at other coordinates too, so that friction is a
-        smooth function of them. If no number of steps suffices, because the block is unstable, nothing changes.
+        smooth function of them. If the steps would be too many or too short, for example because the block is
+        unstable, nothing changes.
         """
         q = np.asarray(fitted)
         taken = _steps(self._build["trial"], q, accuracy, self.drive, self._build["start"](q))
@@ -185,7 +186,7 @@ class SlidingExperiment(Experiment):
 def _steps(
     trial: Any, fitted: ndarray, accuracy: float, drive: Drive, start: Any
 ) -> tuple[tuple[float, ...], ...] | None:
-    """Step lengths between all samples from one simulation; None if the steps are too many or too short."""
+    """Step lengths between neighbouring instants, from one simulation; None if the steps are too many or too short."""
     y, length, steps, left = start, float("inf"), [], _MOST_STEPS * len(drive.lengths)
     for whole, between in zip(drive.lengths.tolist(), drive.inputs.T.tolist(), strict=True):
         taken: list[float] = []

@@ -14,7 +14,7 @@ from quakedesign.symbolic.casadi_printer import to_numpy
 from quakedesign.symbolic.plant import x1
 
 START = "start_friction"
-_SMALL_SHARE = 0.3  # share of the noise of friction, which increases it by 4 %
+_SMALL_SHARE = 0.3  # an additional noise of this share of the friction noise increases the total by 4 %
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class _Weakening(Experiment):
         return friction, per_slip
 
     def strength_slopes(self, slip: ndarray, fitted: ndarray) -> ndarray:
-        """Derivatives in the logarithms of its quantities, shape (slips, quantities)."""
+        """Derivatives of `strength` [-] by the logarithms of the quantities of the law, shape (slips, quantities)."""
         rows = self._rows(self._expressions[2:], slip, fitted)
         return np.asarray(np.array(rows).T * np.exp(fitted[: len(self._symbols)]))
 
@@ -61,13 +61,13 @@ class MeasuredSlip(_Weakening):
         return self.strength(self.slip, fitted)[0]
 
     def slopes(self, fitted: ndarray) -> ndarray:
-        """Derivatives by the logarithms, and by the other fitted coordinates."""
+        """Derivatives of `friction` by the logarithms of the quantities of the law, which are all coordinates."""
         return self.strength_slopes(self.slip, fitted)
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """Remark if the noise of the slip, which the fit neglects, affects friction."""
         felt = float(np.max(np.abs(self.strength(self.slip, fitted)[1]))) * self.slip_noise
-        text = f"the slip is known exactly, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}"
+        text = f"the slip is taken as exact, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}"
         return (text,) if felt > _SMALL_SHARE * noise else ()
 
 
@@ -76,8 +76,9 @@ class SpringLoaded(_Weakening):
     """A block at rest until its strength is reached, which then slips until the spring balances friction.
 
     Slip never decreases. With a soft spring, friction falls faster than the spring force and the block jumps. No
-    balance describes this, so the experiment does not exist then. The load point is the displacement since the first
-    sample [m], the normal load in Pa, N or 1. Coordinates: those of the law, the stiffness if not given, `START` last.
+    balance describes this, so slip and friction are NaN then. `load_point` is the displacement of the load
+    point since the first sample [m], `normal` the normal load in Pa, N or 1. Coordinates: those of the
+    law, the stiffness if not given, `START` last.
     """
 
     load_point: ndarray

@@ -11,15 +11,15 @@ from quakedesign.laws.base import BaseGains, Controller, Law
 from quakedesign.laws.loop_field import LoopField
 
 _OF_MATRICES = "sampled", "stick-slip", "user-law"
-"""Laws that are not made of gains in order."""
+"""Laws that are not defined by an ordered list of gains."""
 Subject = str | type[Law] | LoopField
-"""What a claim can be about: the name of a law of the package, a law of the user's own, or a bare closed loop."""
+"""What a claim can be about: the name of a law of the package, a user-defined law, or a bare closed loop."""
 BARE = "custom"
 
 
 @cache
 def laws() -> dict[str, type[Law]]:
-    """Every law of the package by name, including laws for plants other than a fault, which are only proved."""
+    """Every law of the package by name, including laws with proofs only, for plants other than a fault."""
     classes = discovered(__package__, Law)
     return {name: law for name, law in classes.items() if name not in _OF_MATRICES}
 

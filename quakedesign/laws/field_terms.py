@@ -1,4 +1,4 @@
-"""A closed loop as plain data, as in a certificate file, without gains."""
+"""A closed loop as plain data, as in a certificate file, without values of gains."""
 
 import dataclasses
 from collections.abc import Mapping

@@ -101,7 +101,7 @@ def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
 
 
 def root_of(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
-    """w in floats or arrays of them, by bisection down to rounding; exact where the sign holds the end slip at 0."""
+    """w in floats or arrays of them, by bisection down to rounding; exact where the sign keeps the slip error at 0."""
     deadbeat = -slip / step
     after, before = (deadbeat - rate + pulled(terms, way * _TINY, deadbeat) for way in (1, -1))
     first = -rate + pulled(terms, slip, 0 * rate)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign import laws
 from quakedesign.cache import shipped
+from quakedesign.files import Json
 from quakedesign.laws.field_terms import FieldTerms
 from quakedesign.symbolic.terms import Term, plain
 
@@ -57,7 +58,7 @@ def _stored() -> Mapping[str, FieldTerms]:
     return {name: _read(raw) for name, raw in shipped(FILE).items()}
 
 
-def _plain(terms: FieldTerms) -> dict[str, Any]:
+def _plain(terms: FieldTerms) -> Json:
     sums = {part: {name: plain(own) for name, own in getattr(terms, part).items()} for part in _SUMS}
     names = {part: list(getattr(terms, part)) for part in _NAMES}
     return {"states": dict(terms.states), "domain": terms.domain, **names, "roots": dict(terms.roots), **sums}

@@ -52,7 +52,7 @@ class LinearLaw:
     applied : tuple of Fraction
         Change of z⁺ per Pa of (applied pressure − p) under limits; empty if the law has no anti-windup.
     of_reference : tuple of rows
-        Two columns, for r [m] and r′ [m/s]: terms of z⁺, and in the last row of p [Pa]; 0 if empty. A law that
+        Two columns, for r [m] and r′ [m/s]: terms of z⁺ and, in the last row, terms of p [Pa]; 0 if empty. A law that
         measures the slip x1 = e1 + r has the same entries here as in `measured` and `feedback`.
 
     Raises
@@ -264,7 +264,7 @@ class ErrorModel:
     """Sampled model of both errors and of the delayed pressures, under a constant disturbance d [m/s²].
 
     x⁺ = Ax + Bp + (As + B − s)d/b, x = (e1, e2, q), s = (0, 0, σ, …, σ). The constant pressure p = −d/b balances d: x =
-    sp is then a steady state. A law from any coefficients has the same steady state without errors.
+    sp is then a steady state. A law designed with other coefficients has the same steady state, with zero errors.
 
     Attributes
     ----------
@@ -404,11 +404,12 @@ class RestLimit:
     """Limit at rest: lower limit of the pressure relative to all earlier pressures while the fault is at rest.
 
     The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since. A
-    loop whose pressure stays within P of p*, with dp*/dr at most `per_slip`, never reaches a limit with a width of 2P,
-    so that the limit does not affect a guarantee. While friction holds the fault, measurements do not respond to the
-    pressure, and an integral ahead of the reference would lower the pressure without bound. The limit then saturates
-    the pressure, with anti-windup of the law. It ends when the fault moves, for any cause. The proved range of pressure
-    limits the pressure too, at rest and in motion, unless the fault moves faster than is proved.
+    loop whose pressure stays within P of p*, with |dp*/dr| at most `per_slip`, never reaches a limit with a width of
+    2P, so that the limit does not affect a guarantee. While friction holds the fault, measurements do not respond to
+    the pressure, and while the slip is ahead of the reference an integral would lower the pressure without bound. The
+    limit then saturates the pressure, with anti-windup of the law. It ends when the fault moves, for any cause. The
+    proved range of pressure limits the pressure too, at rest and in motion, unless the fault moves faster than is
+    proved.
 
     Attributes
     ----------

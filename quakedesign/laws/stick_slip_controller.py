@@ -118,8 +118,8 @@ class StickSlipController(Controller):
 
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
-        """Raise: gains in order do not make the law."""
-        raise UnsupportedError("a stick-slip law is made of a StickSlipLaw and T_s, not of gains in order")
+        """Raise `UnsupportedError`: a sequence of gains does not define the law."""
+        raise UnsupportedError("a stick-slip controller needs a StickSlipLaw and T_s, not a sequence of gains")
 
     @classmethod
     def loop_field(cls) -> LoopField:

@@ -29,8 +29,8 @@ class StickSlipLaw:
         v = r′ − return_rate·e,   v⁺ = max(v, 0),
         p = −rate_gain·y + target_gain·v − D.
 
-    v is the target slip rate at the next sample. The plant cannot slip backward, so v⁺ is the predicted slip rate
-    there. Without the innovation of the slip, disturbances that change sign within a period could move the fault
+    v is the target slip rate at the next sample. The plant cannot slip backward, so v⁺ is the slip rate predicted for
+    that sample. Without the innovation of the slip, disturbances that change sign within a period could move the fault
     between samples at which it rests. At rest this innovation is limited from below: an early stop must not lower D.
     Noise of the slip would add up in D at rest if rest_slip were less than twice its bound.
 

@@ -19,7 +19,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, ScenarioError, require_known
 from quakedesign.exact import rational, shortly
 from quakedesign.fault.units import exact_value
-from quakedesign.files import read_bytes, write_whole
+from quakedesign.files import Json, read_bytes, write_whole
 from quakedesign.laws.sampled_controller import SampledController
 from quakedesign.laws.sampled_law import MOST_STATES, LinearLaw, Matrix, Row, steady_states
 
@@ -238,7 +238,7 @@ class SampledLaw(SampledController):
     # ------------------------------------------------------------------
     # Files.
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Content of a file of the law: exact numbers as texts, SI."""
         law, inputs = self.law, ["slip_error", "slip_rate_error"]
         rows = [*law.measured, law.feedback]
@@ -386,7 +386,7 @@ def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
 _LARGEST = 1 << 20
 
 
-def _of_json(content: bytes, path: str | Path) -> dict[str, Any]:
+def _of_json(content: bytes, path: str | Path) -> Json:
     try:
         entries = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
@@ -396,7 +396,7 @@ def _of_json(content: bytes, path: str | Path) -> dict[str, Any]:
     return entries
 
 
-def _of_npz(content: bytes, path: str | Path) -> dict[str, Any]:
+def _of_npz(content: bytes, path: str | Path) -> Json:
     """Arrays of a file as lists; rejects pickles, and arrays above the size limit of files."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as folder:

@@ -40,10 +40,10 @@ def slip_limit(loop: FeedbackLoop, rate: Fraction) -> tuple[Fraction, Fraction] 
 
 
 def circle_limit(loop: FeedbackLoop, beta: Fraction, rate: Fraction, least: Fraction) -> float:
-    """Largest s − least [1/s²] that the circle criterion allows for time-varying s ≥ least at a constant β; measured.
+    """Largest s − least [1/s²] that the circle criterion allows for time-varying s ≥ least at a constant β.
 
     1/max Re G(jω) of G(z) = z²/(characteristic polynomial with s = least): for one sector and a constant β no quadratic
-    V does better (Yakubovich, Kalman, Popov).
+    V does better (Yakubovich, Kalman, Popov). Computed in floating point, without proof.
     """
     a3, a2, a1, a0 = (float(c) for c in characteristic(loop.matrix((beta, least, rate)))[1:])
     scale = max(abs(a3), abs(a2) ** 0.5, abs(a1) ** (1 / 3), abs(a0) ** 0.25)
@@ -61,7 +61,7 @@ def circle_limit(loop: FeedbackLoop, beta: Fraction, rate: Fraction, least: Frac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrequencyFacts:
-    """Classical margins at one vertex of the box, measured with python-control in scaled time."""
+    """Classical margins at one vertex of the box, computed with python-control in scaled time."""
 
     # beta, slip, rate: The vertex: β [-], s [1/s²], w [1/s]
     beta: float

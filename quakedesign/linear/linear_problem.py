@@ -188,7 +188,7 @@ class LinearProblem:
     Raises
     ------
     ParameterError
-        For an authority that is not positive, or β below 1 (B0 must be the least, ERRATA 9).
+        For an authority b that is not positive, or β below 1 (βb must be at least b, the smallest authority, ERRATA 9).
     """
 
     stiffness: Fraction  # Nominal k̂ [1/s²]: the nominal plant has s = −k̂
@@ -198,7 +198,7 @@ class LinearProblem:
     def __post_init__(self) -> None:
         if self.sectors.authority <= 0 or self.sectors.beta[0] < 1:
             raise ParameterError(
-                "authority must be positive and the least: beta from 1 upwards. Received "
+                "authority b must be positive and the smallest in the range: beta >= 1. Received "
                 f"b = {float(self.sectors.authority):.4g}, beta from {float(self.sectors.beta[0]):.4g}. "
                 "Take b = min(mu N) (ERRATA 9)."
             )
@@ -306,7 +306,7 @@ class Polytope:
         return list(map(floats, self.vertices.values()))
 
     def slowest(self) -> float:
-        """Largest real part of an eigenvalue of a vertex [1/s]; no V decays faster than its negative."""
+        """Largest real part of an eigenvalue of a vertex [1/s]; no V has V′ ≤ −2aV with a above its negative."""
         return max(float(np.linalg.eigvals(A).real.max()) for A in self.floats())
 
 
@@ -341,7 +341,7 @@ def _row(loop: Loop, state: str, parameters: Mapping[str, Fraction]) -> tuple[Fr
 
 @dataclass(frozen=True, slots=True)
 class ModalScaling:
-    """Real coordinates x = T·z in which the mean of a polytope is block diagonal and its input as large as its poles.
+    """Real coordinates z, x = T·z: the mean of a polytope is block diagonal, the input at most as large as the poles.
 
     The coordinates do not depend on the units of x; the unit of time is 1/pace.
     """

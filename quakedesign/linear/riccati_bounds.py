@@ -7,6 +7,7 @@ from typing import Any
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, float_above, float_below, fraction_of, rational, shortly
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.lyapunov.exact.perturbation_bounds import (
     Sectors,
     least_authority,
@@ -43,7 +44,7 @@ class UncertaintyBounds:
     # zero; only a bounded error can then be certified (ERRATA 8, 11, 24).
     nonvanishing: Fraction
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI."""
         return {
             "g1": float_above(self.sectors.row_bounds[0]),

@@ -19,6 +19,7 @@ from flint import acb, acb_mat, arb_mat, ctx
 from quakedesign.cache import search_once
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault.model import require_positive
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.norms import matrix
 from quakedesign.linear.linear_problem import (
     LinearProblem,
@@ -586,7 +587,7 @@ class HeldLoop:
         """Longer period, unstable for constant parameters [s]; undecided in between."""
         return self.longest.refuted if self.longest else None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; proved periods are floats rounded down."""
         refuted, witness = self.refuted_step, self.runs.witness
         return {

@@ -1,8 +1,8 @@
 """Pressure diffusion between well and fault: exact slow modes, bounded fast modes.
 
 One-dimensional diffusion in a layer with a no-flow boundary at the fault (Carslaw and Jaeger, Conduction
-of Heat in Solids, 1959, sec. 3.4). The first chapter states and proves the truncation error of the modes.
-The second moves this error into the slip-rate error, as a known jump at each pressure step and a smaller
+of Heat in Solids, 1959, sec. 3.4). The first chapter proves a bound of the truncation error of the modes.
+The second includes this error in the slip-rate error, as a known jump at each pressure step and a smaller
 remainder.
 """
 
@@ -92,15 +92,16 @@ class Layer:
 # as those of E, and the errors of ĉ_n and λ̂_n add at most 6Nδ·e^{−λ̂_0·t/2} to |E|, 2/λ̂_0 < τ.
 #
 # - *Zero-order hold at the well*: |Y| ≤ max|Δu_k|·(h/λ̂_N·e^{−λ̂_N·θ} + f·τ) with θ, h and f of the previous section.
-# - *Continuous pressure at the well*: with Y = ∫u′(σ)F(t − σ)dσ there are no jumps, but R = Y′ − A·u′, so that A·u′
-#   is subtracted from v, and |Y| ≤ max|u′|·(|ĉ_N|/λ̂_N² + 6Nδτ²). ∎
+# - *Continuous pressure at the well*: with Y = ∫u′(σ)F(t − σ)dσ there are no jumps, but R = Y′ − A·u′, so that
+#   A·bu′ is subtracted from v, and |Y| ≤ max|u′|·(|ĉ_N|/λ̂_N² + 6Nδτ²). ∎
 
 
 def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
-    """A loop of `held_loop` through a layer, with x2 in place of e2 and Y in place of R times β0.
+    """A loop of `held_loop` through a layer, with x2 in place of e2, and Y in place of β0·R.
 
-    The input ``awaited`` is bY over its bound, so that it is at most the output ``left_out`` (times its weight, with
-    zero-order hold at the well). The sampled input ``awaited_told`` is its share in the measurements of the law.
+    The input ``awaited`` is bY divided by the ratio of its bound to that of bR, so that it is at most the output
+    ``left_out`` (times its weight, with zero-order hold at the well). The sampled input ``awaited_told`` is its share
+    in the measurements of the law.
 
     Parameters
     ----------

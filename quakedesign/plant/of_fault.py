@@ -18,7 +18,7 @@ _LAWS: dict[str, tuple[StateLaw, bool]] = {
     "rate-and-state-slip": ("slip", False),
     "regularised-rate-and-state": ("ageing", True),
 }
-"""Law of the state, unless the friction tells one itself, and whether friction is regularised."""
+"""State law, unless the friction law specifies one itself, and whether friction is regularised."""
 _DIGITS = 12
 _LARGEST_RAMP = Fraction(8, 23)
 
@@ -84,7 +84,7 @@ def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fracti
 
 
 def plant_like(plant: FaultPlant | SlidingPlant, fault: Fault, *, wide: bool = False) -> FaultPlant | SlidingPlant:
-    """Plant of a fault of the same kind as a given one, with its class of disturbances or its stress.
+    """Plant of a fault, of the same kind as a given plant, with the disturbance class or stress of that plant.
 
     In slow sliding the constants of friction are those of the fault, and the ramp of the planned pressure is that of
     the given plant and its law. With `wide` they are as uncertain as the given plant's, with the fault's own ramp.

@@ -7,7 +7,7 @@ Row = tuple[Fraction, ...]
 Matrix = tuple[Row, ...]
 
 MOST = 40
-"""States, measurements, sectors and outputs of a plant."""
+"""Largest number of states, of controls, of measurements, of sectors and of outputs of a plant."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,9 +22,9 @@ class ExactSector:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowLoad:
-    """A load v = control·λ(t), |λ′| ≤ rate, λ(0) = 0, balanced by u = v with x = shift·λ, which is not measured.
+    """A load v = control·λ(t), |λ′| ≤ rate, λ(0) = 0, balanced by u = v with x = shift·λ; C·shift = 0.
 
-    The states of a statement are x − shift·λ.
+    The states in a statement to be proved are x − shift·λ.
     """
 
     control: Row

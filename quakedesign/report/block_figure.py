@@ -1,6 +1,6 @@
 """Figure of a run of several blocks: slip error, slip rate and pressure over time, and slip along the fault."""
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,11 +9,14 @@ from quakedesign.report.drawing import SMALL, clock, figure, finish, scaled
 from quakedesign.simulation.block_run import BlockRun
 from quakedesign.simulation.coupled_sliders import SlidersRun
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _LINES = ("solid", "dashed", "dotted")
 _STAGES = 6
 
 
-def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> Any:
+def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> "Figure":
     """Matplotlib figure of a run; the sentence `proved` is written below it."""
     from matplotlib import colormaps
 

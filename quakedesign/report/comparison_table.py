@@ -1,10 +1,11 @@
 """Comparisons as JSON, as figures, and in notebooks."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.report.figures import figures
@@ -13,11 +14,14 @@ from quakedesign.report.sentences import brief, headline, remarks
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
 from quakedesign.synthesis import Design, assess
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 class Comparison(Compared):
     """Natural behaviour, published and designed controllers of one fault, see `Compared`."""
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Keys of ``design --json``, see docs/reference/json.md."""
         by_origin = {
             o: {e.design.name: e.to_dict() | {"headline": headline(e), "remarks": remarks(e)} for e in self.of(o)}
@@ -37,7 +41,7 @@ class Comparison(Compared):
             "not_applicable": self.left_out,
         }
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> "dict[str, Figure]":
         """Matplotlib figures by name."""
         return figures(self)
 
@@ -98,7 +102,7 @@ def compare(
     setup, laws = setup.with_given(**entered), [one for one in designs if not isinstance(one, Design)]
     if setup != IDEAL and not laws:
         raise ParameterError(
-            f"a loop setup of a comparison is that of given laws. Received {setup!r} without one. Give it to design."
+            f"a loop setup of a comparison needs given laws. Received {setup!r} without one. Give it to design."
         )
     tell = progress or (lambda _what, _done: None)
     how: dict[str, Any] = {

@@ -17,6 +17,9 @@ from quakedesign.files import write_whole
 from quakedesign.laws import control_laws
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Entry
 
@@ -67,7 +70,7 @@ def bar_look(entry: "Entry") -> dict[str, Any]:
 
 def figure(
     rows: int, height: float, columns: int = 1, *, sharex: Any = None, mosaic: Any = None, **more: Any
-) -> tuple[Any, Any]:
+) -> "tuple[Figure, Any]":
     """Figure at printing size and its axes, shape (rows, columns), or by name in a mosaic.
 
     x is shared in a single column by default.
@@ -90,7 +93,7 @@ def figure(
     return drawing, axes
 
 
-def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *, legend: Any = None) -> Any:
+def finish(drawing: "Figure", title: str, runs: Sequence["Shown"], note: str = "", *, legend: Any = None) -> "Figure":
     """Add to a figure its title above, and below it the legend of one axis (three columns) and the run settings."""
     drawing.suptitle(title, fontsize=SMALL + 2)
     whole = "; ".join(part for part in (note, run_settings(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
@@ -104,11 +107,12 @@ def finish(drawing: Any, title: str, runs: Sequence["Shown"], note: str = "", *,
             handles, labels, loc="lower center", bbox_to_anchor=place, ncols=3, fontsize=SMALL, frameon=False
         )
         bottom += 0.08 + 0.17 * -(-len(labels) // 3)
-    drawing.get_layout_engine().set(rect=(0, bottom / height, 1, 1 - bottom / height), w_pad=0.08)
+    layout: Any = drawing.get_layout_engine()
+    layout.set(rect=(0, bottom / height, 1, 1 - bottom / height), w_pad=0.08)
     return drawing
 
 
-def named(axis: Any, title: str) -> None:
+def named(axis: "Axes", title: str) -> None:
     """Set the title of one axis."""
     axis.set_title(title, fontsize=SMALL)
 
@@ -172,7 +176,7 @@ def present(values: np.ndarray | None) -> np.ndarray:
 
 
 # ----------------------------------------------------------------------
-# Figures as files that journals accept: fonts of 8 pt to 9 pt, embedded, no date, page width.
+# Figures as files that journals accept: fonts of 6 pt to 10 pt, embedded, no date, page width.
 
 Format = Literal["svg", "pdf", "png"]
 FORMATS: tuple[Format, ...] = ("svg", "pdf", "png")
@@ -186,7 +190,7 @@ _UNDATED: dict[str, dict[str, Any]] = {
 }
 
 
-def figure_bytes(drawing: Any, kind: str, name: str) -> bytes:
+def figure_bytes(drawing: "Figure", kind: str, name: str) -> bytes:
     """Contents of a file with a figure, the same for the same figure.
 
     Parameters
@@ -233,7 +237,7 @@ _INKS = {"#000000": "var(--ink)", "#444444": "var(--soft)", "#b0b0b0": "var(--li
 _PAPER = "#ffffff"
 
 
-def inline_svg(drawn: str, drawing: Any, name: str, description: str) -> Markup:
+def inline_svg(drawn: str, drawing: "Figure", name: str, description: str) -> Markup:
     """SVG element of a figure, with unique identifiers and a description.
 
     Parameters
@@ -252,7 +256,7 @@ def inline_svg(drawn: str, drawing: Any, name: str, description: str) -> Markup:
 
 
 def _tightened(body: str, name: str) -> str:
-    """Compact SVG: two decimals of a point [1/72 in], colours of the page, unique identifiers, no line breaks."""
+    """Compact SVG: two decimals of a point [1/72 in], colours of the page, unique identifiers, no indentation."""
     body = re.sub(r"<g id=\"figure_1\">\s*<g id=\"patch_1\">.*?</g>", '<g id="figure_1">', body, count=1, flags=re.S)
     body = re.sub(r"<[^>]*>", lambda tag: re.sub(r"-?\d+\.\d{3,}", _shorter, tag[0]), body)
     for colour, ink in _INKS.items():
@@ -266,7 +270,7 @@ def _shorter(number: re.Match[str]) -> str:
     return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
 
 
-def _axes(drawing: Any, height: float) -> list[dict[str, Any]]:
+def _axes(drawing: "Figure", height: float) -> list[dict[str, Any]]:
     """Position in the picture and scales of every axis."""
     axes = []
     for axis in drawing.axes:

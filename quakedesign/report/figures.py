@@ -4,7 +4,7 @@ Cycles and slow sliding are for faults with friction state. Published and design
 figure.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +34,10 @@ from quakedesign.studies.fault_facts import Plane, StabilityRegions, stability_r
 from quakedesign.text import quantity
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import Locator
+
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Compared, Entry
 
@@ -52,7 +56,7 @@ def grid(comparison: "Compared") -> tuple[list[str], list[str], dict[tuple[str, 
     return laws, [o for o in ORIGINS if any(origin == o for _, origin in entries)], entries
 
 
-def states(comparison: "Compared") -> Any:
+def states(comparison: "Compared") -> "Figure":
     """Slip of all laws in the first row, below it the band of the slip rate of each law.
 
     The rate is on a scale that is linear below the largest reference rate and logarithmic beyond it.
@@ -84,7 +88,7 @@ def states(comparison: "Compared") -> Any:
     )
 
 
-def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, float]) -> None:
+def _slips(axis: "Axes", comparison: "Compared", origin: str, sizes: tuple[float, float]) -> None:
     """Draw overlapping slip curves, each narrower than the one below it."""
     divisor, size = sizes
     runs = runs_of(comparison.of(origin))
@@ -97,7 +101,7 @@ def _slips(axis: Any, comparison: "Compared", origin: str, sizes: tuple[float, f
     named(axis, f"{' and '.join(dict.fromkeys(entry.kind for entry, _ in runs))} gains")
 
 
-def _rate(axis: Any, entry: "Entry", comparison: "Compared", divisor: float) -> None:
+def _rate(axis: "Axes", entry: "Entry", comparison: "Compared", divisor: float) -> None:
     run = entry.run
     assert run is not None
     reference, peak = present(run.reference_rate), comparison.uncontrolled.metrics.peak_slip_rate
@@ -116,7 +120,7 @@ def _power_of_ten(value: float) -> float:
     return float(10.0 ** np.ceil(np.log10(value)))
 
 
-def _decades(axis: Any) -> Any:
+def _decades(axis: Any) -> "Locator":
     """Ticks at zero and at powers of ten beyond the linear part, at least two decades apart: at most five."""
     from matplotlib.ticker import FixedLocator
 
@@ -126,7 +130,7 @@ def _decades(axis: Any) -> Any:
     return FixedLocator([*(-power for power in powers), 0.0, *powers])
 
 
-def _time_below(column: Any, drawing: Any, unit: str) -> None:
+def _time_below(column: "Iterable[Axes]", drawing: "Figure", unit: str) -> None:
     """Label the lowest drawn axis of a column, and the ticks of all its axes."""
     drawn = [axis for axis in column if axis in drawing.axes]
     for axis in drawn:
@@ -136,7 +140,7 @@ def _time_below(column: Any, drawing: Any, unit: str) -> None:
     lowest.tick_params(labelbottom=True)
 
 
-def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None" = None) -> Any:
+def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None" = None) -> "Figure":
     """Fluid pressure of every run as a band; with close-ups, each axis has an inset with every step.
 
     Parameters
@@ -166,15 +170,15 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
                 _inset(axis, close_ups[entry.label], shade)
         _time_below(axes[:, column], drawing, unit)
     if close_ups:
-        low, high = drawing.axes[0].get_ylim()
-        drawing.axes[0].set_ylim(low, high + _ROOM * (high - low))
+        bottom, top = drawing.axes[0].get_ylim()
+        drawing.axes[0].set_ylim(bottom, top + _ROOM * (top - bottom))
     note = "bands between the extremes of 10 kept samples" + (
         "; insets: Δp about its mean, every step" if close_ups else ""
     )
     return finish(drawing, f"{comparison.fault.name}: fluid pressure", runs, with_diverged(comparison.entries, note))
 
 
-def _inset(axis: Any, run: "Trajectory", shade: str) -> None:
+def _inset(axis: "Axes", run: "Trajectory", shade: str) -> None:
     """The last quarter of a short run, about its mean, in an inset with its own units."""
     late = slice(-(len(run.time) // 4 or 1), None)
     time, values = run.time[late], run.pressure[late] - run.pressure[late].mean()
@@ -196,7 +200,7 @@ _BANDS = 600  # about the largest number of bands of a run: more are invisible, 
 _PER_BAND = 16  # smallest number of instants of a band: those of four sampling periods
 
 
-def state_figures(comparison: "Compared") -> dict[str, Any]:
+def state_figures(comparison: "Compared") -> "dict[str, Figure]":
     """``cycle``, if it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law with a run."""
     drawn = {} if comparison.uncontrolled.failed else {"cycle": cycle(comparison)}
     for one in runs_of(comparison.entries)[:1]:
@@ -204,7 +208,7 @@ def state_figures(comparison: "Compared") -> dict[str, Any]:
     return drawn
 
 
-def cycle(comparison: "Compared") -> Any:
+def cycle(comparison: "Compared") -> "Figure":
     """Slip and slip rate without control."""
     run, fault = comparison.uncontrolled, comparison.fault
     drawing, ((slip,), (rate,)) = figure(2, 3.6)
@@ -221,7 +225,7 @@ def cycle(comparison: "Compared") -> Any:
     return finish(drawing, f"{fault.name} without control", [], made, legend=rate)
 
 
-def slow_sliding(entry: "Entry", run: "Trajectory") -> Any:
+def slow_sliding(entry: "Entry", run: "Trajectory") -> "Figure":
     """Slip, slip rate, pressure and state of a law that stabilises slow sliding."""
     fault, shade = entry.design.fault, colour(entry.design.name)
     drawing, ((slip,), (rate,), (pressure,), (state,)) = figure(4, 6.6)
@@ -251,7 +255,7 @@ def slow_sliding(entry: "Entry", run: "Trajectory") -> Any:
     return finish(drawing, f"{fault.name} held in slow sliding", [run], note, legend=rate)
 
 
-def errors(entry: "Entry", run: "Trajectory") -> Any:
+def errors(entry: "Entry", run: "Trajectory") -> "Figure":
     """Slip and slip rate minus their references."""
     drawing, axes = figure(2, 3.6)
     divisor, unit = clock(float(run.time[-1]))
@@ -265,7 +269,7 @@ def errors(entry: "Entry", run: "Trajectory") -> Any:
     return finish(drawing, f"{entry.design.fault.name}: tracking errors", [run], note)
 
 
-def _filled(axis: Any, time: "np.ndarray", values: "np.ndarray", shade: str) -> None:
+def _filled(axis: "Axes", time: "np.ndarray", values: "np.ndarray", shade: str) -> None:
     middle, low, high = band(time, values, _width(time))
     axis.fill_between(middle, low, high, color=shade, linewidth=0.8)
 
@@ -279,7 +283,7 @@ def _width(time: "np.ndarray") -> int:
 # Figures of a comparison: one idea each, axes with units.
 
 
-def figures(comparison: "Compared") -> dict[str, Any]:
+def figures(comparison: "Compared") -> "dict[str, Figure]":
     """Figures by name.
 
     ``overview``, ``uncontrolled``, ``states``, ``pressure``, ``errors``, ``metrics``; with a state ``overview``,
@@ -298,13 +302,13 @@ def figures(comparison: "Compared") -> dict[str, Any]:
     return drawn
 
 
-def overviews(comparison: "Compared") -> dict[str, Any]:
+def overviews(comparison: "Compared") -> "dict[str, Figure]":
     """``overview``, if there are both a natural earthquake and a controlled run."""
     failed = comparison.uncontrolled.failed
     return {} if failed or not runs_of(comparison.of("designed")) else {"overview": overview(comparison)}
 
 
-def overview(comparison: "Compared") -> Any:
+def overview(comparison: "Compared") -> "Figure":
     """Slip rate and slip with and without control over logarithmic time, with the proved bound and limits."""
     free = comparison.uncontrolled
     best, own = min(
@@ -376,7 +380,7 @@ def _largest(time: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.
     return time[inside][starts], np.maximum.reduceat(values[inside], starts)
 
 
-def uncontrolled(comparison: "Compared") -> Any:
+def uncontrolled(comparison: "Compared") -> "Figure":
     """Slip and slip rate of the natural earthquake, and the rest slip from statics."""
     run, fault = comparison.uncontrolled, comparison.fault
     drawing, ((slip,), (rate,)) = figure(2, 3.2)
@@ -401,7 +405,7 @@ def end(*runs: "Trajectory") -> float:
     return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])
 
 
-def error_figure(comparison: "Compared") -> Any:
+def error_figure(comparison: "Compared") -> "Figure":
     """Envelopes of the absolute values of both tracking errors over time."""
     drawing, ((slip,), (rate,)) = figure(2, 3.9)
     runs = runs_of(comparison.entries)
@@ -419,7 +423,7 @@ def error_figure(comparison: "Compared") -> Any:
     return finish(drawing, title, runs, with_diverged(comparison.entries, "largest of 40 kept samples"), legend=slip)
 
 
-def _proved_bounds(slip: Any, rate: Any, entries: "Sequence[Entry]") -> None:
+def _proved_bounds(slip: "Axes", rate: "Axes", entries: "Sequence[Entry]") -> None:
     """Lines at the proved bounds of both errors; laws with the same bounds share a line."""
     bounds: dict[tuple[float, float], tuple[str, str]] = {}
     for entry in entries:
@@ -443,7 +447,7 @@ _SHOWN = {
 }
 
 
-def metrics(comparison: "Compared") -> Any:
+def metrics(comparison: "Compared") -> "Figure":
     """Bars of four metrics in their units."""
     from matplotlib.ticker import NullFormatter
 
@@ -476,7 +480,9 @@ def metrics(comparison: "Compared") -> Any:
 _COLOURS = {"unstable": "#F3C6B2", "stable": "#BFD9EC"}
 
 
-def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True) -> Any:
+def stability_map(
+    fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True
+) -> "Figure":
     """Draw the stable and the unstable region of a fault, bounded by its symbolic stability conditions.
 
     The left panel varies the effective normal stress σ' at the given pressure, the right one the pressure p at the
@@ -525,7 +531,7 @@ def stability_map(fault: Fault, *, pressure: float = 0, loading_rate: float | No
     return drawing
 
 
-def _region(axis: Any, plane: Plane, size: float, stiffness: np.ndarray, high: float) -> None:
+def _region(axis: "Axes", plane: Plane, size: float, stiffness: np.ndarray, high: float) -> None:
     """Colour both regions of a panel; draw the critical stiffness and the values at which damping alone decides."""
     across, critical = plane.across / size, np.where(plane.critical > 0, plane.critical, np.nan) / high
     levels = [-0.5, 0.5, 1.5]

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from quakedesign.errors import OutputError
 from quakedesign.fault import fault_toml
-from quakedesign.files import require_writable, whole_folder, write_whole
+from quakedesign.files import Json, require_writable, whole_folder, write_whole
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.lyapunov import certificate_text
 from quakedesign.report.comparison_table import Comparison
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Reject early a folder that cannot be written or that contains results."""
+    """Reject early a folder that cannot be written or exists; with `force`, an existing one without results."""
     if os.path.exists(out) and not force:
         raise OutputError(
             f"output folder must be new. Received {out}, which exists. Give another --out, or --force to replace it."
@@ -36,7 +36,7 @@ def prepare(out: Path, *, force: bool) -> None:
     require_writable(out)
 
 
-def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
+def results(comparison: Comparison, *, stored: bool = True) -> Json:
     """JSON-able facts of a comparison, with the keys of ``--json`` and the versions of all libraries.
 
     Parameters
@@ -60,7 +60,7 @@ def results(comparison: Comparison, *, stored: bool = True) -> dict[str, Any]:
     return results
 
 
-def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> dict[str, Any]:
+def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> Json:
     """Results of the comparison, and of a study: ``induced``, ``figures``, ``numbers`` and ``printed``."""
     induced = study.induced
     induced_values = induced and {

@@ -3,20 +3,24 @@
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from quakedesign.files import whole_folder, write_whole
+from quakedesign.files import Json, whole_folder, write_whole
 from quakedesign.laws import LoopField, law
 from quakedesign.lyapunov.maps.gain_map import GainMap, Place
 from quakedesign.report.drawing import SMALL, WIDTH, write_figures, write_results
 from quakedesign.report.tables import csv_text
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 _FAILED = "#D55E00"
 
 
-def gain_map_figure(drawn: GainMap) -> Any:
+def gain_map_figure(drawn: GainMap) -> "Figure":
     """Draw a map: shades are levels screened in floating point, markers are exactly proved points."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
@@ -70,9 +74,9 @@ def _patch(shade: Any, label: str) -> Any:
     return Patch(facecolor=shade, edgecolor="#999999", linewidth=0.5, label=label)
 
 
-def _markers(axis: Any, drawn: GainMap, first: np.ndarray, second: np.ndarray) -> list[Any]:
+def _markers(axis: "Axes", drawn: GainMap, first: np.ndarray, second: np.ndarray) -> list[Any]:
     """Markers of all tried points, and their legend entries."""
-    looks = {
+    looks: dict[str, dict[str, Any]] = {
         "edge": {"marker": "s", "s": 5, "color": "black", "label": "proved, at the edge of a level"},
         "interior": {"marker": "o", "s": 7, "facecolors": "none", "edgecolors": "black", "linewidths": 0.5,
                      "label": "proved, inside (drawn at random)"},
@@ -104,7 +108,7 @@ def _borders_of(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
 
 
-def _ticks(axis: Any, first: np.ndarray, second: np.ndarray) -> None:
+def _ticks(axis: "Axes", first: np.ndarray, second: np.ndarray) -> None:
     """Set plain numbers on logarithmic axes."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -167,7 +171,7 @@ def gain_map_units(drawn: GainMap) -> dict[str, str]:
     return dict(model.gain_units)
 
 
-def gain_map_values(drawn: GainMap) -> dict[str, Any]:
+def gain_map_values(drawn: GainMap) -> Json:
     """Numbers of a map; exact quantities are texts."""
     sheet, top = drawn.sheet, len(drawn.sheet.levels)
     return {
@@ -201,7 +205,7 @@ def gain_map_lines(drawn: GainMap) -> list[str]:
     return lines
 
 
-def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
+def write_gain_map(drawn: GainMap, folder: Path, formats: Sequence[str] = ("png",)) -> Json:
     """Write the figure ``map``, ``map.csv``, ``results.json`` and all certificates into a folder, whole or not at all.
 
     Returns

@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy import ndarray
@@ -18,6 +18,10 @@ from quakedesign.identification.several_steps import Steps
 from quakedesign.report.drawing import FORMATS, NATURAL, SMALL, figure, figure_bytes, finish
 from quakedesign.text import PREFIXES, plain, power_of, quantity
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _DASHED = 0, (4, 2)
 _MOST_OUTLIERS = 8
@@ -26,7 +30,7 @@ _SHOWN = 12.0  # shown range after a step, in critical slips
 _LAGS = 40
 _SMALL_EFFECT = 0.1  # friction below which values are written in thousandths
 _SYMBOLS = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "$D_c$"}
-_SHORT, _LONG = 2e-7, 0.01  # range of D_c [m] of laboratory gouges
+_SHORT, _LONG = 2e-7, 0.01  # range of D_c [m] without a warning
 
 
 def identification_lines(result: Identification | Steps, *, verbose: bool = False) -> list[str]:
@@ -49,7 +53,7 @@ def identification_lines(result: Identification | Steps, *, verbose: bool = Fals
         summary += f" Friction {does} with rate: a - b = {value} ({ends})."
     but = [f"But {each}." for each in assessment.cautions]
     more = [f"open too: {each}" for each in assessment.open[1:4] if unclear]
-    more += [f"would tell: {each}" for each in assessment.experiments if unclear]
+    more += [f"would decide: {each}" for each in assessment.experiments if unclear]
     more += [*(f"- {each}" for each in result.undetermined()), f"try: {'; '.join(result.to_try())}"] if refused else []
     failed = [check.sentence for check in assessment.checks if not check.passed]
     more += [f"not passed: {each}" for each in failed if each not in (*assessment.open, *assessment.cautions)]
@@ -129,7 +133,7 @@ def _warnings(identification: Identification) -> list[str]:
     if (correlated := identification.fit.correlated) is not None and correlated.share:
         size = identification.fit.noise * correlated.share**0.5
         length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
-        notes.append(f"noise that neighbours share: {size:.2g} of friction, fading over {length}; regions include it")
+        notes.append(f"noise correlated over {length}: {size:.2g} of friction; the confidence regions include it")
     outliers = identification.outliers
     if outliers:
         largest = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in outliers[:_MOST_OUTLIERS])
@@ -138,7 +142,7 @@ def _warnings(identification: Identification) -> list[str]:
     return notes
 
 
-def steps_figure(steps: Steps) -> Any:
+def steps_figure(steps: Steps) -> "Figure":
     """One panel per step with its own and the common fit, and the regions of a and b of all steps."""
     joint: Any = steps.common.fit.experiment
     at, count = steps.common.fit.fitted, len(steps.steps)
@@ -157,10 +161,10 @@ def steps_figure(steps: Steps) -> Any:
     _region(axes["region"], steps.common, "all", "black")
     axes["region"].legend(fontsize=SMALL - 1, frameon=False, ncols=4)
     title = next(check.sentence for check in steps.common.assessment.checks if check.name == "common")
-    return finish(drawing, title, [], "regions of 95 % of two parameters", legend=axes["step 0"])
+    return finish(drawing, title, [], "95 % confidence regions of two parameters", legend=axes["step 0"])
 
 
-def identification_figure(identification: Identification) -> Any:
+def identification_figure(identification: Identification) -> "Figure":
     """Friction with fit and trend, load-point rate, every step, residuals, their correlation, and a joint region."""
     record, used, fit = identification.record, identification.used, identification.fit
     way = record.time[used] if record.path is None else record.path[used] * 1e6
@@ -224,8 +228,8 @@ def identification_figure(identification: Identification) -> Any:
         _profile(axis, each, fit)
         axis.tick_params(labelleft=i == 0)
         axis.set_ylabel("" if i else "distance [deviations]", fontsize=SMALL)
-    note = f"dashed: twice the noise, {fit.noise:.3g}; crosses at the edge: beyond eight times the noise; profiles: "
-    note += "dashed at 95 % of one parameter, dotted of all at once"
+    note = f"residual: dashed at twice the noise of {fit.noise:.3g}, crosses at the edge beyond eight times; profiles: "
+    note += "95 % threshold of one parameter dashed, of all parameters jointly dotted"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
     return finish(drawing, title, [], note, legend=axes["friction"])
 
@@ -237,7 +241,7 @@ def _steps(rates: ndarray) -> list[int]:
     return [int(part[0]) for part in np.split(changed, np.flatnonzero(np.diff(changed) > 2) + 1) if len(part)]
 
 
-def _friction(axis: Any, identification: Identification, way: ndarray, part: slice) -> None:
+def _friction(axis: "Axes", identification: Identification, way: ndarray, part: slice) -> None:
     fit = identification.fit
     simulated = fit.measured - fit.residuals
     axis.plot(way[part], fit.measured[part], ".", color=_MEASURED, markersize=2, label="measured")
@@ -252,7 +256,7 @@ def _friction(axis: Any, identification: Identification, way: ndarray, part: sli
     axis.set_ylabel("friction [-]", fontsize=SMALL)
 
 
-def _correlation(axis: Any, fit: Fit) -> None:
+def _correlation(axis: "Axes", fit: Fit) -> None:
     """Autocorrelation of residuals, and of residuals minus their prediction from the neighbours."""
     for left, colour, label in (
         ((fit.residuals * np.sqrt(fit.counts))[fit.used], _MEASURED, "residuals"),
@@ -268,7 +272,7 @@ def _correlation(axis: Any, fit: Fit) -> None:
     axis.legend(fontsize=SMALL - 1, frameon=False)
 
 
-def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:
+def _profile(axis: "Axes", estimate: ParameterEstimate, fit: Fit) -> None:
     """Square root of the excess at the tried values, with the thresholds for one parameter and for all."""
     alone, jointly = (math.sqrt(fit.threshold(count)) for count in (1, len(fit.fitted)))
     small = not estimate.unit and abs(estimate.value) < _SMALL_EFFECT
@@ -284,13 +288,13 @@ def _profile(axis: Any, estimate: ParameterEstimate, fit: Fit) -> None:
 
 
 def _pair(fit: Fit) -> list[str]:
-    """Indices of the two parameters whose region is drawn."""
+    """Names of the two parameters whose region is drawn."""
     names = [c.name for c in fit.experiment.coordinates]
     pair: list[str] = [name for name in ("direct_effect", "evolution_effect") if name in names]
     return pair if len(pair) == 2 else names[:2]
 
 
-def _region(axis: Any, identification: Identification, label: str = "", colour: str = _FITTED) -> None:
+def _region(axis: "Axes", identification: Identification, label: str = "", colour: str = _FITTED) -> None:
     """95 % region of two parameters, from the slopes of the fit."""
     fit, pair = identification.fit, _pair(identification.fit)
     places = [[c.name for c in fit.experiment.coordinates].index(name) for name in pair]
@@ -307,8 +311,9 @@ def _region(axis: Any, identification: Identification, label: str = "", colour: 
     axis.plot(x, y, color=colour, linewidth=1.0, label=label)
     axis.plot(*(identification.estimates[name].value for name in pair), "+", color=colour)
     axis.locator_params(axis="x", nbins=4)
-    for name, set_label in zip(pair, (axis.set_xlabel, axis.set_ylabel), strict=True):
-        set_label(f"{name} [{identification.estimates[name].unit or '-'}]", fontsize=SMALL)
+    across, upward = (f"{name} [{identification.estimates[name].unit or '-'}]" for name in pair)
+    axis.set_xlabel(across, fontsize=SMALL)
+    axis.set_ylabel(upward, fontsize=SMALL)
 
 
 def require_format(path: Path) -> None:

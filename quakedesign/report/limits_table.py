@@ -3,18 +3,21 @@
 from collections.abc import Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational
-from quakedesign.files import whole_folder
+from quakedesign.files import Json, whole_folder
 from quakedesign.guarantees import SlidingProof
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.report.drawing import NATURAL, figure, finish, write_figures, write_results
 from quakedesign.studies import Limits
 from quakedesign.studies.performance_limits import SlidingLimits
 from quakedesign.text import quantity
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
 
@@ -57,7 +60,7 @@ def _meaning(limits: Limits) -> list[str]:
         "stated size, which may jump",
         f"slip-rate error: for controllers that keep the slip error {within}, on the plant without stick, "
         f"even for one that {signals} up to each sample",
-        "proved, slip-rate error: the smaller of the designs for the objectives tracking and peak, on the plant "
+        "proved, slip-rate error: the smaller bound of the designs for the objectives tracking and peak, on the plant "
         "without stick",
     ]
     if (least := limits.stick_slip_rate) is not None:
@@ -102,8 +105,8 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
         f"needs no longer stops them; D = {float(limits.diffusivity):g} m^2/s",
         "proved: no design"
         if limits.guarantee is None
-        else f"proved: of an e-LQR designed for this table{_path(limits.guarantee)}, {_constants(limits.guarantee)}, "
-        "on the fault itself with inertia; another design has other bounds; pressure at the fault",
+        else f"proved: bounds of an e-LQR for this table{_path(limits.guarantee)}, {_constants(limits.guarantee)}, "
+        "on the fault itself with inertia; another design has other bounds; the pressure is that at the fault",
     ]
 
 
@@ -111,7 +114,7 @@ def _constants(proof: SlidingProof) -> str:
     """Whether the design is for a spread of a, b and D_c."""
     low, high = proof.task.ranges["direct_effect"]
     spread = LowerBound((high - low) / (high + low))  # a covered range: rounded inward
-    return f"for a, b and D_c within {spread:.3g} of their values" if spread else "for a, b and D_c as they are given"
+    return f"for a, b and D_c with relative spreads of {spread:.3g}" if spread else "for a, b and D_c as they are given"
 
 
 def _box(limits: Limits) -> str:
@@ -147,7 +150,7 @@ def _shown(bound: Bound | None, unit: str) -> str:
     return "-" if bound is None else bound.quantity(unit)
 
 
-def limits_figure(limits: Limits) -> Any:
+def limits_figure(limits: Limits) -> "Figure":
     """Slip-rate errors over T_s: infeasible, proved, and the natural earthquake's slip rate."""
     drawing, axes = figure(1, 4.2)
     axis, natural = axes[0, 0], limits.natural_peak
@@ -162,7 +165,7 @@ def limits_figure(limits: Limits) -> Any:
         if limits.sensing.noisy:
             exact = [float(peak) for _, peak in limits.smallest_peaks(measured=False)]
             axis.fill_between(
-                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"and with measurements of {limits.sensing.summary()}"
+                steps, exact, peaks, color=_HIDDEN, lw=0, label=f"infeasible when measuring {limits.sensing.summary()}"
             )
         axis.set(xlim=(steps[0], (1 if last is None else 2) * steps[-1]), ylim=(peaks[0] / 3, top))
     if limits.achieved:
@@ -175,7 +178,7 @@ def limits_figure(limits: Limits) -> Any:
     return finish(drawing, f"{limits.fault.name}: limits with zero-order hold", [], note, legend=axis)
 
 
-def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
+def write_limits(limits: Limits, folder: Path, formats: Sequence[str] = ("png",)) -> Json:
     """Write the figure ``limits`` and ``results.json`` into a folder, whole or not at all; return the results."""
     values = limits.to_dict()
     with whole_folder(folder) as partial:

@@ -21,6 +21,7 @@ from markupsafe import Markup, escape
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.fault_toml import DISTURBANCE, PLANT, TASK, WIDTHS
+from quakedesign.files import Json
 from quakedesign.laws import LinearLaw
 from quakedesign.laws.stick_slip_controller import StickSlipController
 from quakedesign.laws.stick_slip_law import StickSlipLaw
@@ -93,7 +94,7 @@ def mathml(latex: str, *, display: str = "block") -> Markup:
 
 _SHOWN_STATES = 4  # largest number of states of a law whose matrices are shown
 ASKED = {
-    "sampling_time": "the pressure is renewed at least this often",
+    "sampling_time": "the pressure is updated at least as often as certified",
     "delay": "the time from the measurement to the pressure is not longer than certified",
     "control_coefficient": "the input gain β stays in the certified range",
     "friction_slope": "friction changes with slip no faster than certified",
@@ -186,8 +187,8 @@ def _slowly(entry: "Entry") -> list[str]:
         return []
     cells = "one cell" if len(proof.cells) == 1 else f"{len(proof.cells)} cells"
     return [
-        "The pressure at the well is p plus a plan: what the nominal fault needs along its reference, kV/(μ*A) per "
-        "second.",
+        "The pressure at the well is p plus a plan: what the nominal fault needs along its reference, which grows at "
+        "the rate kV/(μ*A).",
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
         "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
         "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
@@ -209,7 +210,8 @@ def _at_samples(entry: "Entry") -> list[str]:
         return []
     root = " (within the proved errors, where the implicit step of the sliding mode is deadbeat)" if law.pull else ""
     return [
-        f"the equations with the index k are what runs{root}: x and y are the measured slip [m] and slip rate [m/s], r "
+        f"the equations with the index k are the law that runs{root}: x and y are the measured slip [m] and slip rate "
+        "[m/s], r "
         "the reference, v the target slip rate, i the innovation of the slip, D the estimate of the disturbance [Pa]; "
         "D, v+, x and y are 0 before the first sample"
     ]
@@ -319,7 +321,7 @@ def parameter_rows(fault: Fault) -> list[Row]:
         for name in WIDTHS
     ]
     rows += [
-        _parameter_row(name, getattr(fault, name), unit, "follows", symbol) for name, (symbol, unit) in _DERIVED.items()
+        _parameter_row(name, getattr(fault, name), unit, "derived", symbol) for name, (symbol, unit) in _DERIVED.items()
     ]
     return [row for row in rows if row[2] is not None]
 
@@ -378,12 +380,13 @@ CAPTIONS = {
     "for that controller.",
     "uncontrolled": "Natural earthquake without control: slip and slip rate. Dotted: the slip at which the fault comes "
     "to rest according to statics.",
-    "cycle": "Without control, loaded from afar at the operating rate of the friction law: slip and slip rate. Dotted: "
-    "the loading rate.",
-    "slow-sliding": "Held in slow sliding. The stress is a sine with the amplitude that the guarantee allows. Slip and "
+    "cycle": "Without control, loaded by the far end of the spring at the reference rate of the friction law: slip and "
+    "slip rate. Dotted: the loading rate.",
+    "slow-sliding": "Controlled fault in slow sliding. The stress is a sine with the amplitude that the guarantee "
+    "allows. Slip and "
     "its reference, slip rate and its proved bound, fluid pressure in the fault, and friction state divided by its "
     "value in steady sliding.",
-    "sliding-errors": "How far slip and slip rate are from their references in that run.",
+    "sliding-errors": "How far slip and slip rate are from their references in the run of slow sliding.",
     "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "
     "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",
     "pressure": "Fluid pressure that every law commands; below zero fluid is withdrawn.",
@@ -417,8 +420,8 @@ REST_LIMITS = (
 )
 _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "a diffusion path of L^2/D ="}
 SLIDING_LIMITS = (
-    "the fault slides at the rate of its task from the start, and its far end rests: how it came to slide is not part "
-    "of the run nor of the proof",
+    "the fault slides at the rate of its task from the start, and the far end of its spring is at rest: how it came to "
+    "slide is part neither of the run nor of the proof",
     "the stress disturbance of the run is a sine, which need not be the worst; its period is that of the largest tide, "
     "or a quarter of the duration of a short run; the worst case found is reported with the guarantee",
 )
@@ -512,7 +515,7 @@ def _loop_stages(comparison: "Compared") -> str:
     return f"the pressure in the runs acts {'through ' + ', '.join(stages) if stages else 'without delay'}"
 
 
-def _tables(comparison: "Compared") -> dict[str, Any]:
+def _tables(comparison: "Compared") -> Json:
     """Columns and rows of both tables."""
     first = (SUMMARY_COLUMNS, summary_cells(summary(comparison).rows))
     return {"summary": first, "numbers": (COLUMNS, rows(comparison))}

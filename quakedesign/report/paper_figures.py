@@ -29,6 +29,9 @@ from quakedesign.report.figures import end, figures, pressure
 from quakedesign.studies.paper import BARS, PaperRuns, baseline, friction_curve, paper_runs, relative
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from quakedesign.simulation import Trajectory
     from quakedesign.studies.comparison import Compared, Entry
 
@@ -51,7 +54,7 @@ PAPER = {
 """Corresponding figures of the paper, by name of our figure."""
 
 
-def paper_figures(study: "PaperRuns") -> dict[str, Any]:
+def paper_figures(study: "PaperRuns") -> "dict[str, Figure]":
     """Figures of a study by name: those of a comparison, and the paper's (`PAPER`).
 
     Closed-loop figures need a run, the bars a run of an e-LQR. Friction with a state has other figures.
@@ -72,7 +75,7 @@ def paper_figures(study: "PaperRuns") -> dict[str, Any]:
     return drawn
 
 
-def peak_against_tracking(study: "PaperRuns") -> Any:
+def peak_against_tracking(study: "PaperRuns") -> "Figure":
     """Simulated errors over the guaranteed slip-rate error, one point a design."""
     claims = [point.guarantee.claims for point in study.front]
     drawing, axes = figure(1, 3.2, 2)
@@ -89,12 +92,12 @@ def peak_against_tracking(study: "PaperRuns") -> Any:
         axis.set(xlabel=f"guaranteed slip-rate error [{unit}]", ylim=(0, 1.15 * max(seen) / divisor))
         axis.set_ylabel(f"{'slip' if base == 'm' else 'slip-rate'} error seen [{name}]")
         axis.margins(x=0.12)
-    note = "peak: smallest slip-rate error, plant without stick; numbers: how many times that tracking may spend"
+    note = "peak: smallest slip-rate error, plant without stick; numbers: allowed multiple of it for tracking"
     title = f"{study.comparison.fault.name}: peak against tracking of the e-LQR"
     return finish(drawing, title, [point.run for point in study.front], note)
 
 
-def friction_law(comparison: "Compared") -> Any:
+def friction_law(comparison: "Compared") -> "Figure":
     """Friction coefficient against slip, and the slope at which the spring unloads."""
     fault, run = comparison.fault, comparison.uncontrolled
     slips, values, spring = friction_curve(fault, 1.1 * max(float(run.slip.max()), fault.reference.target_slip))
@@ -109,7 +112,7 @@ def friction_law(comparison: "Compared") -> Any:
     return finish(drawing, f"{fault.name}: friction law of the simulations", [], "from the law itself, not from a run")
 
 
-def earthquakes(comparison: "Compared", induced: "Trajectory") -> Any:
+def earthquakes(comparison: "Compared", induced: "Trajectory") -> "Figure":
     """Slip and slip rate of the natural and of the induced earthquake."""
     fault, natural = comparison.fault, comparison.uncontrolled
     drawing, ((slip,), (rate,)) = figure(2, 4.4)
@@ -130,7 +133,7 @@ def earthquakes(comparison: "Compared", induced: "Trajectory") -> Any:
     return finish(drawing, f"{fault.name}: natural and induced earthquake", [natural, induced])
 
 
-def friction_coefficient(comparison: "Compared") -> Any:
+def friction_coefficient(comparison: "Compared") -> "Figure":
     """Friction coefficient over time in closed loop; laws that track the reference share one curve."""
     drawing, ((axis,),) = figure(1, 3.2)
     runs = runs_of(comparison.entries)
@@ -151,7 +154,7 @@ def friction_coefficient(comparison: "Compared") -> Any:
     return finish(drawing, title, runs, with_diverged(comparison.entries), legend=axis)
 
 
-def errors_and_power(comparison: "Compared") -> Any:
+def errors_and_power(comparison: "Compared") -> "Figure":
     """Mean squared and largest errors and RMS pressure over those of the e-LQR, in five panels."""
     basis = baseline(comparison)
     assert basis is not None
@@ -170,7 +173,7 @@ def errors_and_power(comparison: "Compared") -> Any:
     )
 
 
-def _bars(axis: Any, shown: "list[tuple[Entry, dict[str, Any]]]", name: str, title: str) -> None:
+def _bars(axis: "Axes", shown: "list[tuple[Entry, dict[str, Any]]]", name: str, title: str) -> None:
     """Draw one panel; on a logarithmic axis bars start at 1, so that better and worse values have different sides."""
     values = [entry_ratios[name] for _, entry_ratios in shown]
     logarithmic = name != "rms_pressure" and min(values) > 0
@@ -191,7 +194,7 @@ def _bars(axis: Any, shown: "list[tuple[Entry, dict[str, Any]]]", name: str, tit
         axis.set_xlim(0, 1.4 * max(*values, 1.0))
 
 
-def _notes(axis: Any, basis: "Entry") -> None:
+def _notes(axis: "Axes", basis: "Entry") -> None:
     """Write the reference values of the ratios into the free panel."""
     run = basis.run
     assert run is not None
@@ -218,12 +221,12 @@ class PaperStudy(PaperRuns):
 
     comparison: Comparison
 
-    def figures(self) -> dict[str, Any]:
+    def figures(self) -> "dict[str, Figure]":
         """Matplotlib figures by name, drawn once."""
         return self._drawn
 
     @cached_property
-    def _drawn(self) -> dict[str, Any]:
+    def _drawn(self) -> "dict[str, Figure]":
         return paper_figures(self)
 
 

@@ -5,6 +5,7 @@ from fractions import Fraction
 from typing import Any
 
 from quakedesign.errors import ParameterError
+from quakedesign.files import Json
 from quakedesign.studies.scaling import SCALED
 
 # ----------------------------------------------------------------------
@@ -17,7 +18,7 @@ _KEYS = {"scale_factors", "title", "from", "to", "source_gains", "gains", "publi
 def scale_lines(result: Mapping[str, Any]) -> list[str]:
     """The result of `scale_answer` as lines of text."""
     if lacking := _KEYS - result.keys():
-        raise ParameterError(f"answer must be one of scale_answer. Received one without {', '.join(sorted(lacking))}.")
+        raise ParameterError(f"result must be that of scale_answer. Received one without {', '.join(sorted(lacking))}.")
     factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in result["scale_factors"].items())
     lines = [f"{result['title']}: {result['from']} → {result['to']}"]
     lines += _gain_lines(result["source_gains"], result["gains"], result["published"], result["exponents"])
@@ -26,7 +27,7 @@ def scale_lines(result: Mapping[str, Any]) -> list[str]:
         before = "" if same else f" (source: {_short(result['source_divisor'])})"
         lines.append(f"with λ = {_short(result['scale'])} and divisor μ0N̂0 = {_short(result['divisor'])} m²/kg{before}")
     if _rounded(result["published"]):
-        lines.append("where a printed gain is off, gains were rounded in print (ERRATA 25)")
+        lines.append("deviations from printed gains are due to their rounding for print (ERRATA 25)")
     if result["unrounded"]:
         more = result["unrounded"]
         lines.append("from the laboratory gains before they were rounded for print (ERRATA 25):")
@@ -76,7 +77,7 @@ def _short(text: str) -> str:
     return f"{float(Fraction(text)):.6g}"
 
 
-def export_lines(result: dict[str, Any]) -> list[str]:
+def export_lines(result: Json) -> list[str]:
     """The result of `export_result` as lines of text."""
     measured = ", ".join(f"{name} [{unit}]" for name, unit in result["measurement"].items())
     lines = [

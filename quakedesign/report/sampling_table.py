@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
 
+from rich.console import Console
 from rich.table import Table
 
-from quakedesign.files import whole_folder
+from quakedesign.files import Json, whole_folder
 from quakedesign.report.drawing import write_figures, write_results
 from quakedesign.report.terminal import table
 from quakedesign.simulation import Study
@@ -42,7 +42,7 @@ FOOTNOTE = (
 )
 
 
-def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] = ("png",)) -> dict[str, Any]:
+def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] = ("png",)) -> Json:
     """Write ``results.json`` and a folder ``figures`` into a folder, whole or not at all; return the results."""
     values = report.to_dict()
     with whole_folder(folder) as partial:
@@ -52,7 +52,7 @@ def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] 
     return values
 
 
-def print_sampling(report: SamplingReport, console: Any) -> None:
+def print_sampling(report: SamplingReport, console: Console) -> None:
     """Print a table of the schemes, and one of every study."""
     console.print(report.fault.name, style="bold", end=", ")
     console.print(f"T_s = {report.fault.sampling_time:g} s, plant without stick")

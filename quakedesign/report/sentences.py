@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, SlidingReference
+from quakedesign.files import Json
 from quakedesign.guarantees import ContinuousProof, NoProof, TrackingProof
 from quakedesign.laws import control_laws
 from quakedesign.linear.robust_stability import Analysis
@@ -74,7 +75,7 @@ def _bounded(entry: "Entry", premise: Premise) -> bool:
 def _failing(premise: Premise) -> str:
     if premise.ratio is None or not premise.proved:
         return f"{premise.name} fails (nothing is certified)"
-    return f"{premise.name} fails: {premise.ratio:.3g} times what is certified"
+    return f"{premise.name} fails: requires {premise.ratio:.3g} times the certified value"
 
 
 def _hold_gaps(entry: "Entry") -> list[str]:
@@ -168,7 +169,7 @@ def hold_sentences(stability: HeldLoop) -> list[str]:
         return [f"UNSTABLE {over} ({_near(stability.runs.witness)})", _proved_up_to(stability)]
     if stability.runs.verdict is Verdict.UNDECIDED:
         return [f"undecided {over}", _proved_up_to(stability)]
-    course = "any course of the parameters, integrals summed over the samples"
+    course = "any time history of the parameters, with integrals as sums over the samples"
     return [f"stable {over}, proved for {course}", _proved_up_to(stability)]
 
 
@@ -183,7 +184,9 @@ def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
     """Largest slip rate in continuous time, for every requested class of disturbances."""
     lines = [
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
-        + {"amplitude": "any disturbance of the fault's amplitude", "rate": "any of its amplitude and rate"}[name]
+        + {"amplitude": "any disturbance of the fault's amplitude", "rate": "any of the fault's amplitude and rate"}[
+            name
+        ]
         for name, proved in peaks.items()
         if proved.found
     ]
@@ -256,7 +259,7 @@ def _longest_step_and_delay(entry: "Entry") -> list[str]:
     step, delay = (LowerBound(Fraction(certified[name])) for name in ("sampling_time", "delay"))
     law = entry.design.controller
     own = f"at T_s = {law.sampling_time:.6g} s" if law and law.sampling_time else "at the fault's own T_s"
-    late = f"for delays up to at least {delay:.3g} s" if delay else "none was found with a delay"
+    late = f"for delays up to at least {delay:.3g} s" if delay else "no guarantee was found with a delay"
     return [f"designs have a guarantee for T_s up to at least {step:.3g} s, and {own} {late}"]
 
 
@@ -394,9 +397,9 @@ def domain_sentence(domain: Domain) -> str:
     if domain.level == 0:
         return f"{which}: empty, because of {domain.limited_by or 'the control itself'} (ERRATA 16)"
     return (
-        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; it admits a start with "
-        f"|e1| <= {domain.start_slip_error:.2g} m, |e2| <= {domain.start_slip_rate_error:.2g} m/s or "
-        f"|h(0)| <= {domain.start_perturbation:.2g} m/s², the other two zero; limited by {domain.limited_by}"
+        f"{which}: |e1| <= {domain.slip_error:.2g} m, |e2| <= {domain.slip_rate_error:.2g} m/s; admissible initial "
+        f"conditions: |e1| <= {domain.start_slip_error:.2g} m or |e2| <= {domain.start_slip_rate_error:.2g} m/s or "
+        f"|h(0)| <= {domain.start_perturbation:.2g} m/s², each with the other two zero; limited by {domain.limited_by}"
     )
 
 
@@ -457,7 +460,7 @@ FASTEST_PLATE = 1e-8
 _LABORATORY = 10.0  # length of a fault [m] below which a machine loads it
 
 
-def state_run_lines(result: dict[str, Any]) -> list[str]:
+def state_run_lines(result: Json) -> list[str]:
     """Lines of text, from the JSON of `run_state`: outcome, cycle, events."""
     outcome, cycle, events = result["outcome"], result["cycle"], result["slip_events"]
     least, largest = (p / 1e6 for p in result["pressure"])
@@ -559,7 +562,7 @@ def exceeded_line(metrics: "Metrics", least: Bound, largest: Bound) -> str:
     return f"its pressure EXCEEDS the proved range: {ran}, proved {least.quantity('Pa')} to {largest.quantity('Pa')}"
 
 
-def sliding_run_lines(result: dict[str, Any]) -> list[str]:
+def sliding_run_lines(result: Json) -> list[str]:
     """Lines of text, from the JSON of `run_sliding`: outcome, errors, pressure, and guarantee."""
     outcome, metrics = result["outcome"], result["metrics"]
     least, largest = (p / 1e6 for p in result["pressure"])
@@ -580,7 +583,7 @@ def sliding_run_lines(result: dict[str, Any]) -> list[str]:
     ]
 
 
-def _event_line(number: int, event: dict[str, Any]) -> str:
+def _event_line(number: int, event: Json) -> str:
     nucleation = "" if event["nucleation"] is None else f"nucleation from {event['nucleation']:.6g} s, "
     arrest = "not over at the end of the run" if event["arrest"] is None else f"arrest {event['arrest']:.6g} s"
     return f"event {number}: {nucleation}onset {event['onset']:.6g} s, {arrest}, peak {event['peak_slip_rate']:.3g} m/s"

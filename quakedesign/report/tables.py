@@ -2,7 +2,9 @@
 
 import csv
 import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from quakedesign.files import Json
 
 if TYPE_CHECKING:
     from quakedesign.simulation import Trajectory
@@ -34,7 +36,7 @@ _METRICS = (
 
 
 def rows(comparison: "Compared") -> list[tuple[str, ...]]:
-    """One row a controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
+    """One row per controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
 
     Largest errors, RMS and total variation (path) of the pressure and the share at rest are evaluated after a quarter
     of the task, the least and the largest pressure over the whole task.
@@ -50,7 +52,7 @@ def _cells(run: "Trajectory | None") -> tuple[str, ...]:
     )
 
 
-def csv_text(rows: list[dict[str, Any]]) -> str:
+def csv_text(rows: list[Json]) -> str:
     """Rows as CSV with a header line; inapplicable cells are empty."""
     heads = list(dict.fromkeys(name for row in rows for name in row))
     stream = io.StringIO()

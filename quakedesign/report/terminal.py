@@ -1,10 +1,12 @@
 """Comparisons and runs on a terminal."""
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from rich.console import Console
 from rich.table import Table
 
+from quakedesign.files import Json
 from quakedesign.report.comparison_table import Comparison
 from quakedesign.report.sentences import (
     FEEDFORWARD_COLUMNS,
@@ -31,7 +33,7 @@ if TYPE_CHECKING:
     from quakedesign.studies.comparison import Entry
 
 
-def print_comparison(comparison: Comparison, console: Any, *, whole: bool = True) -> None:
+def print_comparison(comparison: Comparison, console: Console, *, whole: bool = True) -> None:
     """Print the summary; with `whole` also fault, gains, verdicts with premises, and tables."""
     for line in summary_lines(summary(comparison)):
         console.print(line)
@@ -74,15 +76,15 @@ def _whole(entry: "Entry") -> list[str]:
         *without_stated_reason([headline(entry), *remarks(entry)], entry),
         _gains(entry),
         *map(_line, entry.design.conditions),
-        *(["of the certificate of its base gains, in continuous time:"] if others else []),
+        *(["premises of the certificate of its base gains, in continuous time:"] if others else []),
         *map(_line, others),
         *([domain_sentence(entry.design.domain)] if entry.design.domain is not None else []),
     ]
 
 
 _OF_SLIDING = (
-    "; pressure over the measured slip error (k1) and slip rate (k2: not used), and over what the law predicts, "
-    "scaled: slip error, state of friction, diffusion modes, and the level of the unknown disturbance"
+    "; pressure per unit of the measured slip error (k1) and slip rate (k2: not used), and per unit of the scaled "
+    "predictions of the law: slip error, state of friction, diffusion modes, and level of the unknown disturbance"
 )
 
 
@@ -114,7 +116,7 @@ def _line(premise: "Premise") -> str:
     return f"premise {premise.name} {sign}: required {required}, certified {certified}, {ratio}"
 
 
-def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", console: Any) -> None:
+def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", console: Console) -> None:
     """Print outcome, pressure, metrics with units, events and premises of one run."""
     console.print(run.name, style="bold")
     for sentence in run_sentences(run, fault):
@@ -142,7 +144,7 @@ LABORATORY = (
 )
 
 
-def printed_lines(rows: list[dict[str, Any]], fault: str = "") -> list[str]:
+def printed_lines(rows: list[Json], fault: str = "") -> list[str]:
     """Printed numbers of the paper with ours and our plant; empty if the paper has none for the fault."""
     if not rows:
         return ["", *LABORATORY] if fault == "lab-fault" else []

@@ -63,7 +63,7 @@ def in_integers(
     Parameters
     ----------
     constraints : int, optional
-        Factor of the constraints; if given, the polynomial must have integers and is not scaled.
+        Factor of the constraints; if given, the polynomial must have integer coefficients and is not scaled.
     """
     common = clearing(statement) if constraints is None else constraints
     grams = [_over_wholes(square, common) for square in squares]

@@ -178,7 +178,7 @@ def _attraction(raw: object) -> Iterator[str]:
 
 
 def _everywhere(numbers: Sequence[int]) -> Iterator[str]:
-    """Theorem that all questions hold, each on its set."""
+    """Theorem that the polynomial of every question is non-negative on its set."""
     yield f"Definition questions : list question := {gallina.listed(f'asked_{n}' for n in numbers)}."
     holds = "Forall (fun q => forall x, within x q -> (0 <= at_point x (target q))%R)"
     yield f"Theorem certificate : {holds} questions.\nProof. exact ({_all(numbers)}). Qed."

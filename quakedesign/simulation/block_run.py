@@ -14,6 +14,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
 from quakedesign.fault import BlockChain, SlidingReference
 from quakedesign.fault.block_chain import add_springs
+from quakedesign.files import Json
 from quakedesign.plant.block_plant import measured_by
 from quakedesign.symbolic.casadi_printer import to_casadi
 
@@ -55,7 +56,7 @@ class BlockRun:
     reversed: bool
     opened: bool
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Summary figures of the run, in SI units."""
         return {
             "max_slip_error": self.slip_error.tolist(),

@@ -1,7 +1,7 @@
 """Compilation of CasADi functions to portable C with bitwise reproducible results.
 
-Chapters: elementary functions from IEEE 754 operations (errors below 1 ulp; other powers 1.5, tanh 2);
-instructions of a CasADi function; fixed C files; portable C operations; repeated steps in machine code
+Chapters: elementary functions from IEEE 754 operations (errors below 1 ulp; powers other than cube roots
+1.5, tanh 2); instructions of a CasADi function; fixed C files; portable C operations; repeated steps in machine code
 where a compiler is available; many vectors at once, with inner loops for vectorisation.
 """
 
@@ -164,7 +164,7 @@ def _scaled(x: ca.SX, exponent: ca.SX) -> ca.SX:
 
 
 def _grown(first: ca.SX, r: ca.SX, rest: ca.SX) -> ca.SX:
-    """First + e^(r + rest) − 1 for |r| ≤ ln2/2 and a small rest; |first| ≥ |r| or 0."""
+    """`first` + e^(r + rest) − 1 for |r| ≤ ln2/2 and a small rest; |first| ≥ |r| or 0."""
     tail = rest + r * r * _polynomial(r, _EXP)
     total = first + r
     return total + (((first - total) + r) + tail)
@@ -202,7 +202,8 @@ def _parted(x: ca.SX) -> tuple[ca.SX, ca.SX]:
 def exponent_and_mantissa(x: ca.SX) -> tuple[ca.SX, ca.SX]:
     """As `_parted`, for x ≥ 2⁻¹⁰²²; exact for every rounding of the C library's logarithm.
 
-    The logarithm only selects a whole number, the exponent of a power of two below x; next to a change both are right.
+    The logarithm only selects a whole number, the exponent of a power of two near x; where its rounding decides between
+    two exponents, both give the same result.
     """
     if _in_bits.get():
         return ca.log(x), ca.log1p(x)
@@ -313,7 +314,7 @@ def _sine_and_cosine(r: ca.SX, rest: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def sin(x: ca.SX) -> ca.SX:
-    """Sine; beyond |x| = 2³¹ of an argument within one unit in the last place of x, beyond 2⁵² of 0."""
+    """Sine of x; for |x| > 2³¹, of a number within one unit in the last place of x; for |x| ≥ 2⁵², of 0."""
     turns, r, rest = _by_half_pi(x)
     sine, cosine = _sine_and_cosine(r, rest)
     size = ca.fabs(turns)
@@ -365,14 +366,14 @@ FUNCTIONS: dict[int, Callable[..., ca.SX]] = {
     ca.OP_FMIN: fmin,
     ca.OP_FLOOR: floor,
 }
-"""Names of the portable functions that replace CasADi's operations, by their codes."""
+"""Portable functions that replace CasADi's operations, by the codes of the operations."""
 
 
 # ----------------------------------------------------------------------
 # Instructions of CasADi Functions of scalar operations, and the functions that they call.
 
 _WRITTEN_OUT = 60
-"""Instructions of an elementary function, averaged over a step."""
+"""Mean number of instructions of an elementary function in a step."""
 
 
 class NotPortableError(ValueError):
@@ -402,8 +403,8 @@ class Called:
     """Function that an instruction calls."""
 
     function: ca.Function  # casadi.Function: Of scalar operations, one vector in and one out
-    # Number of calls, each on the last result; 0: a branch, one call with the arguments after the first if the first is
-    # not zero, else the result is 0
+    # Number of calls, each on the last result. 0 means a branch: if the first argument is not zero, one call with the
+    # other arguments; else the result is 0
     times: int
 
     def __call__(self, function: ca.Function, arguments: list[ca.SX]) -> ca.SX:

@@ -10,6 +10,7 @@ from typing import Any
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Disturbance, Fault
+from quakedesign.files import Json
 from quakedesign.loop import simulation_scheme
 from quakedesign.simulation.integrators import integrator
 from quakedesign.simulation.recorder import Recorder
@@ -143,7 +144,7 @@ class Waiting:
     # run; None for a fault that has not moved forward
     onset: float | None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values in SI units."""
         return asdict(self)
 

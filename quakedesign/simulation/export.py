@@ -20,7 +20,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.fault import BlockChain, Fault
 from quakedesign.fault.model import require_positive
-from quakedesign.files import require_writable, temporary_folder, whole_folder, write_whole
+from quakedesign.files import Json, require_writable, temporary_folder, whole_folder, write_whole
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme, simulation_scheme
 from quakedesign.loop.schemes import scheme_of_run
@@ -104,7 +104,7 @@ class ControllerStep:
         count = self.function.size1_out(1)
         return ("pressure",) if self.limited else tuple(f"pressure_{i + 1}" for i in range(count))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Return the data of the step in JSON types."""
         return {
             "step": self.step,

@@ -555,7 +555,7 @@ def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
 
 
 def _linear(system: Any, names: tuple[str, ...]) -> Any:
-    """StateSpace of a linear system from its first inputs, by name, to the pressure, computed from unit vectors."""
+    """StateSpace of a linear system from its first inputs, given by name, to its outputs, from unit vectors."""
     import control
 
     n, seen = system.nstates, system.ninputs
@@ -572,6 +572,8 @@ def _linear(system: Any, names: tuple[str, ...]) -> Any:
         np.abs(twice - 2 * once).max() <= _LINEAR * size and np.abs(mixed - once.sum(axis=1)).max() <= _LINEAR * size
     )
     if not straight:
-        raise UnsupportedError(f"a loop transfer function needs a linear law. Received {system.name}. Simulate it.")
+        raise UnsupportedError(
+            f"a loop transfer function needs a linear law and linear stages. Received {system.name}. Simulate it."
+        )
     A, B, C, D = once[:n, :n], once[:n, n : n + len(names)], once[n:, :n], once[n:, n : n + len(names)]
     return control.ss(A, B, C, D, system.dt or 0, inputs=list(names), outputs=system.output_labels, name=system.name)

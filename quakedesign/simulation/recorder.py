@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from quakedesign.arguments import checked_dataclass
+from quakedesign.files import Json
 from quakedesign.loop import Scheme
 from quakedesign.loop.schemes.base import Stepped
 from quakedesign.simulation.closed_loop import WORKS, ClosedLoop, EnergyBudget, Meter, Number
@@ -274,7 +275,7 @@ class Metrics:
     steps: int
     seconds: float = field(metadata={"unit": "s"})
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Return the metrics by name, in JSON types."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 

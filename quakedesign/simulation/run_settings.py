@@ -189,9 +189,10 @@ def designed_path(
 def with_aperiodic_clock(
     controller: Controller | None, scheme: str | Scheme, step: float | None, numbers: dict[str, Any]
 ) -> tuple[float | None, dict[str, Any]]:
-    """Step [s] and numbers of a run; with aperiodic sampling a fraction of the shortest interval, and the intervals.
+    """Step [s] and numbers of a run; with aperiodic sampling, a shorter step, and the clock in the numbers.
 
-    A `Scheme` has its own intervals, or is periodic.
+    `step` is then the shortest interval, which is divided into whole steps. A `Scheme` has its own intervals, or is
+    periodic.
     """
     sampling = controller.sampling if controller else None
     clock = getattr(scheme, "clock", None)

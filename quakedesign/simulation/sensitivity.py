@@ -190,7 +190,7 @@ def noise_sensitivity(
     duration : float, optional
         [s]; the operation time unless given.
     plant : str, optional
-        As of `simulate`.
+        As in `simulate`.
     """
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     exact = Measurement(seed=seed)
@@ -216,8 +216,8 @@ def gain_sensitivity(
 ) -> Study:
     """Errors against the true input gain, over the whole range of β = μN̂/(μ0N̂0) in the fault's box.
 
-    At every level, N̂ is chosen such that β at rest is the level times the geometric mean of the box, which the
-    scheme ``compensated`` assumes. In the run β decreases further as friction weakens.
+    At every level, N̂ is chosen such that β at rest is the level times the geometric mean of the ends of the
+    range of β, which the scheme ``compensated`` assumes. In the run β decreases further as friction weakens.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def gain_sensitivity(
     duration : float, optional
         [s]; the operation time unless given.
     plant : str, optional
-        As of `simulate`.
+        As in `simulate`.
     """
     width = float(fault.box.authority)
     if not width or points < 2:

@@ -149,7 +149,7 @@ class SmoothProblem:
 
     rates: ca.Function
     scales: "np.ndarray"  # Size of each variable below which its tolerance is absolute
-    # Index of the variable whose upward crossings of `level` are detected, or slice of variables with the largest used
+    # Index of the variable whose upward crossings of `level` are detected, or a slice whose largest variable counts
     watched: int | slice
     level: float
 

@@ -181,7 +181,7 @@ class SpringSlider:
         return found
 
     def _balanced(self, y: "np.ndarray", pressure: float) -> float:
-        """Logarithm of the rate next to that of y at which the forces balance, with a stable crossing."""
+        """Logarithm of the rate at which the forces balance, next to that of y in the direction of its acceleration."""
         from scipy.optimize import brentq
 
         def excess(logarithm: float) -> float:

@@ -176,7 +176,7 @@ def march(
     progress: ProgressReport | None,
     checkpoint: Checkpoint | None = None,
 ) -> "np.ndarray":
-    """Vectors at the instants `kept`, one a column; ends early once the entry `diverged_at` is set.
+    """Vectors at the instants `kept`, one per column; ends early once the entry `diverged_at` is set.
 
     Python runs between two calls, so that the user can interrupt and sees the progress. The vectors stored so far are
     in the checkpoint, if there is one, from which the next march resumes.
@@ -219,7 +219,7 @@ def run_key(
 
 
 def recall_run(key: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
-    """Cached vectors, one a column, and backend with its reason as in the provenance of a run; None if not cached."""
+    """Cached vectors, one per column, and backend with its reason as in the provenance of a run; None if not cached."""
     if not key or (content := cache.load("run", *key)) is None:
         return None
     with np.load(BytesIO(content), allow_pickle=False) as kept:

@@ -7,6 +7,7 @@ from typing import Any
 
 from quakedesign.exact import UpperBound, rational
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.plant_proof import PlantProof
 from quakedesign.loop.loop_setup import LoopSetup
@@ -57,12 +58,12 @@ class BlocksResult:
             )
         return parts
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI."""
         rows = []
         for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
-            entry: dict[str, Any] = {"blocks": blocks, "verdict": "proved" if one.found else "undecided"}
+            entry: Json = {"blocks": blocks, "verdict": "proved" if one.found else "undecided"}
             entry |= {"reason": None if one.found else one.reason}
             entry |= {"slip_error": ends and ends[0].exact, "slip_rate_error": ends and ends[1].exact}
             rows.append(entry)

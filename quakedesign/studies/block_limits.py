@@ -4,19 +4,19 @@
 unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). Let φ be constant, of size H
 and with the signs of ℓ. Then, as long as friction weakens at this slope, z grows from 0 unless Σ_j|ℓ·βb_j||P_j − P*_j|
 reaches HΣ|ℓ_i|: every controller needs pressures this far from balance, with the largest β. A mode that no well reaches
-grows. For diffusing pressures q, q′ = Fq + G(P − P*) from q = 0, S(p) = (pI − F)⁻¹G replaces S: unless the
-integral of e^{−pt}ℓ·(φ + βbq) is 0, z grows, and that of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
+grows. For diffusing pressures q, q′ = Fq + G(P − P*) from q = 0, S(p) = (pI − F)⁻¹G replaces S: z grows
+unless the integral of e^{−pt}ℓ·(φ + βbq) is 0; the integral of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
 
-Blocks in slow sliding are linearised as one block (`limit_theorems`): S_iy_i = −ΣK_ijx_j − W_iz_i + μ_iΣs_ijq_j + d_i,
-s the shares, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i). Theorem 2 there holds for ζ = ℓ·(x, z) of each mode with a real
-pole, with Σ_i|ℓ·e_i| and Σ_j|ℓ·b_j| in place of the gains of stress and pressure, if diffusion paths of one diffusion
-time precede all wells; theorem 1 holds for each y_i, with stresses that change sign on all blocks.
+Blocks in slow sliding are linearised like a single block (`limit_theorems`): S_iy_i = −ΣK_ijx_j − W_iz_i +
+μ_iΣs_ijq_j + d_i, s the shares, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i). Theorem 2 there holds for ζ = ℓ·(x, z) of each
+mode with a real pole, with Σ_i|ℓ·e_i| and Σ_j|ℓ·b_j| in place of the gains of stress and pressure, if all wells act
+through diffusion paths of one diffusion time; theorem 1 holds for each y_i, with stresses that change sign on all
+blocks.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 from scipy.linalg import expm
@@ -25,6 +25,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import BlockChain
 from quakedesign.fault.block_chain import add_springs
 from quakedesign.fault.model import require_positive
+from quakedesign.files import Json
 from quakedesign.guarantees.search.lqg import mean_rate, sliding_model
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation.coupled_sliders import CoupledSliders
@@ -86,7 +87,7 @@ class ChainLimits:
         if chain.has_state:
             V = quantity(float(mean_rate(chain.fault)), "m/s")
             assumed = [f"(linearised about steady sliding of every block at {V} and the pressure 0,"]
-            assumed += [f"without inertia, constants as they are, T_s = {chain.fault.sampling_time:g} s)"]
+            assumed += [f"without inertia, all constants as given, T_s = {chain.fault.sampling_time:g} s)"]
         if self.stress is not None:
             assumed[-1] = assumed[-1].replace(")", ";")
             assumed += [f"for stress of {quantity(self.stress, 'Pa')} on every block, pressures within"]
@@ -96,7 +97,7 @@ class ChainLimits:
             f"{counted(len(chain.wells), 'well')}",
             *assumed,
             "",
-            f"{'mode':>4}{'pole [1/s]':>12}{'from equilibrium':>21}"
+            f"{'mode':>4}{'pole [1/s]':>12}{'pressure deviation':>21}"
             + (f"{'T_s up to':>10}{'well in':>10}" if self.stress is not None else "")
             + "  slips of the blocks",
             *(f"{place:4}{mode.row()}" for place, mode in enumerate(self.modes, 1)),
@@ -115,8 +116,8 @@ class ChainLimits:
             parts += [f"closer to the blocks; the pressure diffuses along the fault with {chain.diffusivity:g} m^2/s"]
         return parts if self.modes else [*parts, "", "no mode is unstable"]
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, SI; null if no well reaches a mode, if it oscillates, or without a stress."""
+    def to_dict(self) -> Json:
+        """Plain values, SI; limits of a mode are null if no well reaches it, if it oscillates, or without a stress."""
         modes, values = [asdict(mode) for mode in self.modes], {"fault": self.chain.name, "feasible": self.feasible}
         if not self.chain.has_state:
             shown = ("pole", "shape", "reached", "pressure")
@@ -214,7 +215,7 @@ def _steepest(chain: BlockChain) -> tuple[np.ndarray, np.ndarray, np.ndarray, fl
 def _sliding(chain: BlockChain) -> tuple[np.ndarray, ...]:
     """A, stress entries and B about slow sliding; states are slip errors over D of block 1 and log states.
 
-    Then the rows of ln(v/V) over these states, and over the stresses.
+    The last two matrices give ln(v/V) as a function of these states and of the stresses.
     """
     if any(block.friction.stress_exponents[0] for block in chain.blocks):
         raise ParameterError("limits of slow sliding need stress_sensitivity 0. Received another. Simulate this fault.")

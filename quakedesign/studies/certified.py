@@ -10,6 +10,7 @@ from typing import Any
 from quakedesign.errors import CertificateError, ParameterError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import Controller
 from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.domain import certified_lipschitz
@@ -122,7 +123,7 @@ def _results(
     return _at(name, gains, str(lipschitz), ends, decay=maximize == "decay")
 
 
-def _values(bound: Fraction | None, ends: "Ends", **values: Any) -> dict[str, Any]:
+def _values(bound: Fraction | None, ends: "Ends", **values: Any) -> Json:
     """Facts of every verdict; missing values are unknown."""
     empty: dict[str, Any] = {"decay": None, "settling": None, "limit": None, "counterexample": "none", "dual": []}
     return {"lipschitz": _text(bound), "gain_range": [str(v) for v in ends], **empty, **values}
@@ -246,7 +247,7 @@ def _limit_line(limit: Fraction | None) -> str:
     return f"necessary limit: no certificate of these gains exists for a bound |h'| >= {UpperBound(limit)}"
 
 
-def _settling_values(settling: Settling | None) -> dict[str, Any] | None:
+def _settling_values(settling: Settling | None) -> Json | None:
     if settling is None:
         return None
     exact = {"factor": str(settling.factor), "power": str(settling.power), "start": str(settling.start)}

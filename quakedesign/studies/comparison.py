@@ -15,6 +15,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import Enclosure, rational
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.equilibrium import STEADY_SLIDING
+from quakedesign.files import Json
 from quakedesign.guarantees import (
     CLASSES,
     ContinuousProof,
@@ -104,7 +105,7 @@ class Entry:
         proof = self.guarantee.proof if self.guarantee else None
         return proof if proof is not None and proof.found else None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None if a report fills it."""
         design = self.design
         return {

@@ -8,9 +8,9 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from time import perf_counter
 from types import ModuleType
-from typing import Any
 
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
+from quakedesign.files import Json
 
 KINDS = ("symbolic identity", "counterexample", "numeric reproduction")
 
@@ -77,7 +77,7 @@ def errata_rows() -> tuple[ErrataRow, ...]:
     numbers = [row.number for row in rows]
     if len(set(numbers)) != len(numbers):
         twice = sorted({n for n in numbers if numbers.count(n) > 1})
-        raise ParameterError(f"every erratum must have one row. Received {twice} twice. Rename one of them.")
+        raise ParameterError(f"every erratum must have one row. Received {twice} twice. Renumber one of them.")
     return tuple(rows)
 
 
@@ -94,7 +94,7 @@ def _load(path: Path) -> ModuleType:
 
 
 def find_rows(numbers: Iterable[int | str] = ()) -> tuple[ErrataRow, ...]:
-    """Rows of given numbers in the given order, each once; all rows without numbers.
+    """Rows of given numbers in the given order, each once; all rows if no number is given.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def find_rows(numbers: Iterable[int | str] = ()) -> tuple[ErrataRow, ...]:
     return tuple(rows[n] for n in wanted) if wanted else errata_rows()
 
 
-def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:
+def run_rows(numbers: Iterable[int | str] = ()) -> list[Json]:
     """Run the checks of some rows, or of all.
 
     Parameters
@@ -134,7 +134,7 @@ def run_rows(numbers: Iterable[int | str] = ()) -> list[dict[str, Any]]:
     return [_run(row) for row in find_rows(numbers)]
 
 
-def _run(row: ErrataRow) -> dict[str, Any]:
+def _run(row: ErrataRow) -> Json:
     began = perf_counter()
     finding = row.check()
     return {

@@ -20,6 +20,7 @@ from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, mean_rate, sliding_step
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.lqg import sliding_model, sliding_poles
 from quakedesign.laws import Controller, Signals
@@ -259,7 +260,7 @@ class SamplingAdequacy:
         """Largest adequate T_s [s]; None if every T_s is adequate."""
         return LARGEST_PRODUCT / self.pole if self.pole else None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Keys of ``--json``, with the pole [1/s], the limit [-] and the largest adequate step [s]."""
         return {
             "step": self.step,
@@ -313,7 +314,7 @@ SHEAR_SPEEDS = 500.0, 6000.0  # shear-wave speeds of soft sediments and of the m
 IN_A_LABORATORY = 10.0  # m; a shorter fault need not be rock
 
 
-def fault_dict(fault: Fault) -> dict[str, Any]:
+def fault_dict(fault: Fault) -> Json:
     """Keys of ``fault --json``; SI, eigenvalues as [real, imaginary] in 1/s.
 
     ``equilibrium_pressure`` is the range [Pa] that the task needs, and ``needs`` says whether this is withdrawal,

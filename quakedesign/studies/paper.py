@@ -9,13 +9,13 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib.resources import files
 from math import pi
-from typing import Any
 
 import numpy as np
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.fault import Fault
 from quakedesign.fault.equilibrium import by_equilibrium
+from quakedesign.files import Json
 from quakedesign.guarantees import TrackingProof, design_held
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
@@ -58,8 +58,8 @@ def relative(run: Trajectory | None, basis: Trajectory | None) -> dict[str, floa
     return ratios
 
 
-def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> list[dict[str, Any]]:
-    """One row a run: its identification, metrics in SI units, the five ratios, and settings.
+def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> list[Json]:
+    """One row for each run: its name, law and origin, metrics in SI units, the five ratios, and settings.
 
     Parameters
     ----------
@@ -79,12 +79,12 @@ def table(comparison: Compared, more: dict[str, Trajectory] | None = None) -> li
     ]
 
 
-def _outcome(run: Trajectory) -> dict[str, Any]:
+def _outcome(run: Trajectory) -> Json:
     outcome = run.outcome
     return {"outcome": outcome.kind, "share_of_natural": outcome.share_of_natural}
 
 
-def printed(comparison: Compared) -> list[dict[str, Any]]:
+def printed(comparison: Compared) -> list[Json]:
     """Printed numbers of the paper and ours for these runs, their ratio, our plant, and the reason of differences."""
     data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
     runs: dict[str, Trajectory | None] = {"uncontrolled": comparison.uncontrolled}

@@ -10,6 +10,7 @@ from quakedesign.errors import ParameterError, require_known
 from quakedesign.exact import Bound, LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.equilibrium import by_equilibrium
+from quakedesign.files import Json
 from quakedesign.guarantees import (
     NoProof,
     SlidingProof,
@@ -220,7 +221,7 @@ class Limits:
         """Slip rate [m/s] of the simulated natural earthquake; None without one."""
         return natural_peak(self.fault)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; proved bounds are decimal texts, rounded outwards."""
         return {
             "fault": self.fault.name,
@@ -288,7 +289,7 @@ class SlidingLimits(Limits):
         """None: it needs a simulated cycle."""
         return None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI; proved bounds are decimal texts, rounded outwards."""
         return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
 

@@ -8,6 +8,7 @@ from typing import Any
 from quakedesign.errors import ParameterError
 from quakedesign.exact import rational
 from quakedesign.fault import Fault
+from quakedesign.files import Json
 from quakedesign.laws import Controller, published
 from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.simulation import Study, Trajectory, accuracy, gain_sensitivity, noise_sensitivity, simulate
@@ -37,7 +38,7 @@ class SchemeRow:
     # bound
     premise: Premise | None
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """JSON-able facts, SI."""
         law, energy = self.controller, self.run.energy
         return {
@@ -66,7 +67,7 @@ class SamplingReport:
     # ``orders`` (of a sliding mode without feed-forward), ``slip_noise``, ``rate_noise``, ``input_gain``
     studies: dict[str, Study]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """JSON-able facts, SI; exact quantities are texts, null means diverged or not applicable."""
         entries = {name: study.to_dict() for name, study in self.studies.items()}
         if "orders" in entries:

@@ -7,6 +7,7 @@ from typing import Any
 from quakedesign.exact import rational
 from quakedesign.fault import Fault, load_fault
 from quakedesign.fault.similarity import TOLERANCE, GroupComparison, Radical, Scales, similarity
+from quakedesign.files import Json
 from quakedesign.laws import Controller, control_law
 from quakedesign.laws import published as published_controllers
 from quakedesign.laws.gain_scaling import (
@@ -113,7 +114,7 @@ def _product_text(form: Form, output: str) -> str:
     return "·".join(word if power == 1 else f"{word}^({power})" for word, power in powers) or "1"
 
 
-def _group(comparison: GroupComparison) -> dict[str, Any]:
+def _group(comparison: GroupComparison) -> Json:
     return {
         "group": comparison.group.name,
         "formula": comparison.group.formula,
@@ -123,7 +124,7 @@ def _group(comparison: GroupComparison) -> dict[str, Any]:
     }
 
 
-def _published(target: Fault, carried: CarriedGains) -> dict[str, Any] | None:
+def _published(target: Fault, carried: CarriedGains) -> Json | None:
     """Printed gains of the target, if they exist for the same λ and divisor."""
     printed = published_controllers(target.name).get(carried.law.name)
     if printed is None or any(
@@ -140,7 +141,7 @@ def _published(target: Fault, carried: CarriedGains) -> dict[str, Any] | None:
     }
 
 
-def _unrounded(source: Fault, target: Fault, law: Controller, scales: Scales) -> dict[str, Any] | None:
+def _unrounded(source: Fault, target: Fault, law: Controller, scales: Scales) -> Json | None:
     """Scaled gains from the unrounded gains of the paper (ERRATA 25), if these are known."""
     values = UNROUNDED.get((source.name, law.name))
     if values is None:

@@ -13,6 +13,7 @@ import numpy as np
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import BlockChain, Disturbance, SlidingReference
+from quakedesign.files import Json
 from quakedesign.guarantees import NoProof
 from quakedesign.guarantees.exact.guarantee_files import load_guarantee
 from quakedesign.guarantees.exact.plant_loop import MatrixLaw
@@ -69,7 +70,7 @@ def chain_lines(chain: BlockChain) -> list[str]:
     return lines
 
 
-def chain_dict(chain: BlockChain) -> dict[str, Any]:
+def chain_dict(chain: BlockChain) -> Json:
     """The same facts as plain values, SI."""
     blocks = [
         {"length": b.length, "effective_normal_stress": b.effective_normal_stress, "friction": b.friction.name}
@@ -188,7 +189,7 @@ class ChainRun:
             ends.append((LowerBound(low - error), UpperBound(high + error)))
         return ends
 
-    def proved_values(self) -> dict[str, Any]:
+    def proved_values(self) -> Json:
         """Proved slip rates of blocks [m/s] and pressures of wells [Pa], and the peak without control [m/s]."""
         ends = self.proved_pressures
         return {
@@ -244,7 +245,7 @@ class ChainRun:
                 parts += [f"{event}: the run is outside the model"] if happened else []
         return parts
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Values of the run, SI."""
         assert self.run is not None
         return self.run.to_dict()
@@ -399,7 +400,7 @@ class SlidingChainRun:
         """Conditions of the proof, and the run."""
         return [*conditions, "", *self.lines()]
 
-    def proved_values(self) -> dict[str, Any]:
+    def proved_values(self) -> Json:
         """Empty: the bounds of the blocks are those of the guarantee."""
         return {}
 
@@ -443,11 +444,11 @@ class SlidingChainRun:
             parts.append(f"recurrence interval {lasting(main[-1] - main[-2])}{small}")
         return parts
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Plain values, SI."""
         run = self.run
         assert run is not None
-        entries: dict[str, Any] = {
+        entries: Json = {
             "plant": "smooth" if self.inertia else "quasi-dynamic",
             "duration": float(run.times[-1]),
             "steps": len(run.times),

@@ -121,7 +121,7 @@ def _powers(library: ModuleType) -> dict[type[sp.Basic], Callable[..., Value]]:
         return _power(library, library.fabs(x), a)
 
     def larger(first: Value, *others: Value) -> Value:
-        """Positive part max(x, 0) without a branch: x/2 + |x|/2 is exactly x or 0."""
+        """Largest argument; max(0, x) is computed without a branch as (x + |x|)/2, which is exactly x or 0."""
         rest: Value = reduce(library.fmax, others)
         greater: Value = library.fmax(first, rest)
         return (rest + library.fabs(rest)) / 2 if isinstance(first, float) and first == 0 else greater

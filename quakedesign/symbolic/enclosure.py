@@ -137,7 +137,7 @@ def times(a: Interval, b: Interval) -> Interval:
 
 
 def negative(a: Interval) -> Interval:
-    """Interval of the negative values."""
+    """Interval of the negated values."""
     return -a[1], -a[0]
 
 
@@ -312,7 +312,7 @@ def enclose(expression: sp.Expr, box: BallBox) -> arb:
     Parameters
     ----------
     expression : Expr
-        Built from rationals, symbols, +, ·, powers, exp, sin, cos, Abs, Max, Min and signed powers.
+        Built from numbers, symbols, +, ·, powers, exp, log, sin, cos, asinh, Abs, Max, Min and signed powers.
 
     Returns
     -------

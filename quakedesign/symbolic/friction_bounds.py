@@ -61,8 +61,8 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
     courses = list(_courses(law, exact))
     low, high = exact.bounds
     bounds = FrictionBounds(
-        least=-_confirmed(law, courses, "the lower of its bounds", -_declared(low), lambda c: [-c.friction]),
-        most=_confirmed(law, courses, "the upper of its bounds", _declared(high), lambda c: [c.friction]),
+        least=-_confirmed(law, courses, "the lower bound", -_declared(low), lambda c: [-c.friction]),
+        most=_confirmed(law, courses, "the upper bound", _declared(high), lambda c: [c.friction]),
         slip_slope=_confirmed(
             law, courses, "slip_slope", _declared(exact.slip_slope), lambda c: [c.slip_slope, -c.slip_slope]
         ),
@@ -138,7 +138,7 @@ def _confirmed(
 def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Excess) -> str:
     at = ", ".join(f"{x} {float(value):.4g} {_UNITS.get(str(x), '')}".rstrip() for x, value in answer.at.items())
     return (
-        f"{what} of {law.name} must bound its friction. Declared {float(abs(declared)):.6g}, but "
+        f"{what} of {law.name} must be valid. Declared {float(abs(declared)):.6g}, but "
         f"{'at ' + at if at else 'everywhere'} it is {float(abs(answer.value)):.6g}. Correct the declared value."
     )
 

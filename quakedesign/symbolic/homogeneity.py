@@ -83,7 +83,7 @@ class Homogeneity:
     counterexample : Counterexample or None
     switching : tuple of (Expr, Rational)
         Arguments of signs with their degrees: the switching surfaces are invariant under dilation, so that the identity
-        for every choice of the signs is the one for the sets.
+        for every choice of the signs is also that of the set-valued signs.
     """
 
     weights: Mapping[sp.Symbol, sp.Rational]
@@ -240,7 +240,7 @@ def _search(identity: Identity, meaning: str, weights: Mapping[Any, Any]) -> Cou
 
 
 def _on_a_switch(counterexample: Counterexample) -> bool:
-    """Whether the argument of a sign may vanish at the point; its values then tell nothing about the sets."""
+    """Whether the argument of a sign may vanish at the point, where values do not refute a set-valued identity."""
     at = {**counterexample.point, epsilon: counterexample.epsilon}
     both = sp.Tuple(counterexample.identity.left, counterexample.identity.right)
     return not all(_differ(argument.subs(at, simultaneous=True), sp.Integer(0)) for argument in signs(both))
@@ -340,7 +340,7 @@ def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control
     Returns
     -------
     int or None
-        None if no derivative up to the number of states depends on it, and thus no later one at all points.
+        None if no derivative up to the number of states depends on the control; then no later one does, generically.
     """
     for degree, _ in enumerate(field, start=1):
         output = sp.expand(lie_derivative(output, field))

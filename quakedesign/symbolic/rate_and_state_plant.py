@@ -21,7 +21,7 @@ from quakedesign.symbolic.plant import N_hat, eta_hat, k_hat, mu_star, p, sigma,
 # The plant about steady sliding, for friction with state: third order with inertia, quasi-dynamic without.
 #
 # The force balance is that of `quakedesign.symbolic.plant`, with a far end that moves at the loading rate. For a law
-# without state at rest it gives the equations of that module. Everything else is derived.
+# without state and a loading rate of 0 it gives the equations of that module. Everything else is derived.
 
 loading_rate = sp.Symbol(r"v_\infty", nonnegative=True)
 rate = sp.Symbol("v", positive=True)
@@ -133,7 +133,8 @@ def stability_conditions(names: tuple[str, ...] = (), *, inertia: bool = True) -
     """Expressions that are all positive if and only if all eigenvalues have negative real part (Hurwitz 1895).
 
     The leading coefficient (unless it is 1), the leading minors of Hurwitz's matrix except the last, and the last
-    coefficient. If one of them is negative, an eigenvalue has positive real part.
+    coefficient. If one of them is negative, an eigenvalue has positive real part. Without inertia, a negative leading
+    coefficient stands for an eigenvalue that tends to +∞ as the inertia tends to 0.
     """
     a = characteristic(names, inertia=inertia)
     n = len(a) - 1

@@ -90,7 +90,7 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
     assert said.splitlines()[1] == "(any shear stress of at most 25 kPa, T_s = 300 s)"
-    assert "of an e-LQR designed for this table behind a diffusion path of L^2/D = 833 s, for a, b and D_c" in " ".join(
+    assert "bounds of an e-LQR for this table behind a diffusion path of L^2/D = 833 s, for a, b and D_c" in " ".join(
         said.split()
     )
     assert "another design has other bounds" in " ".join(said.split())
@@ -100,7 +100,7 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     wide = replace(known, task=replace(known.task, ranges=ranges))
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **_: replace(answer, proof=wide))
     assert run("crustal-patch") == 0
-    assert "for a, b and D_c within 0.05 of their values, on" in " ".join(capsys.readouterr().out.split())
+    assert "for a, b and D_c with relative spreads of 0.05, on" in " ".join(capsys.readouterr().out.split())
     assert "linearised about slow sliding" in said
     found = json.loads((tmp_path / "limits" / "results.json").read_text())
     assert found["stress"] == 25000.0
@@ -121,7 +121,7 @@ def test_a_covered_spread_is_rounded_inward(half_width, said, capsys, monkeypatc
     answer = SlidingGuarantee(proof=wide, task=wide.task, held=wide.held)
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **_: answer)
     assert run("crustal-patch") == 0
-    assert f"for a, b and D_c within {said} of their values, on" in " ".join(capsys.readouterr().out.split())
+    assert f"for a, b and D_c with relative spreads of {said}, on" in " ".join(capsys.readouterr().out.split())
 
 
 def test_noise_forbids_more(capsys):

@@ -82,7 +82,7 @@ def test_a_sign_that_a_trend_turns_is_not_told():
     assert found.assessment.verdict == "cannot tell"
     text = " ".join(" ".join(identification_lines(found)).split())
     assert "cannot tell" in text
-    assert "would tell:" in text
+    assert "would decide:" in text
     assert not found.explained
 
 

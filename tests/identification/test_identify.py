@@ -239,13 +239,13 @@ def test_what_a_task_was_taken_from_and_a_rate_that_the_record_does_not_know_are
     aged = replace(weak, law=replace(patch.friction, slowest_rate=1e-10, fastest_rate=9e-7))
     assumed = ("damping 1 kg/s, x", "target slip 1 m, the next rest slip rounded down", "operation time 9 s, y")
     taken, beyond = task_remarks(aged, replace(patch, assumed=assumed))
-    assert taken.startswith("assumed with the friction that is replaced: target slip 1 m, the next rest slip")
+    assert taken.startswith("assumed for the friction that is replaced: target slip 1 m, the next rest slip")
     assert "operation time 9 s" in taken
     assert "damping" not in taken
     assert beyond.startswith("V = 1e-06 m/s is above the rates of the record, 1e-10 to 9e-07 m/s: a, b and D_c are")
     assert task_remarks(replace(weak, law=patch.friction), patch) == []
     save_fault(weak, replace(lab, assumed=assumed[1:2]), path)
-    assert "# assumed with the friction that is replaced: target slip 1 m" in path.read_text()
+    assert "# assumed for the friction that is replaced: target slip 1 m" in path.read_text()
 
 
 def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(weak):

@@ -114,5 +114,5 @@ def test_a_loop_and_its_twin_have_the_same_poles():
 
 def test_an_authority_that_is_not_the_least_is_refused():
     problem = LinearProblem.of(qd.load_fault("real-fault"))
-    with pytest.raises(ParameterError, match="the least: beta from 1"):
+    with pytest.raises(ParameterError, match="the smallest in the range: beta >= 1"):
         replace(problem, sectors=replace(problem.sectors, beta=(F(9, 10), F(3, 2))))

@@ -548,7 +548,7 @@ def test_a_bound_under_inputs_is_no_longer_read(tmp_path, capsys):
     path = tmp_path / "old.json"
     path.write_text('{"format": 1, "inputs": {}, "outputs": {}}')
     assert checker.main([str(path)]) == 2
-    assert "a bound under inputs: no longer read" in capsys.readouterr().err
+    assert "of an older kind: no longer read" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("key", ["inputs", "outputs"])

@@ -204,7 +204,7 @@ def test_both_take_what_is_just_allowed_and_refuse_what_is_just_beyond(raw, path
 SLIDING = json.loads((PATH.parent / "certificates" / "sliding_crustal-patch.json").read_text(encoding="utf-8"))
 NEGATIVE = [
     (HELD, ("loop", "of_reference"), [["0", "0"], ["0", "0"]], "of_reference must not be zero if given"),
-    (HELD, ("start",), {"slip": "0", "rate": "0"}, "a bound of the start must be above 0"),
+    (HELD, ("start",), {"slip": "0", "rate": "0"}, "start must have a bound above 0"),
     (HELD, ("start",), {"slip": "-1/9", "rate": "1/9"}, "bounds of the initial slip and slip rate"),
     (HELD, ("start",), {"slip": "1/9", "rate": "-1/9"}, "bounds of the initial slip and slip rate"),
     (HELD, ("loop", "diffusion"), "-1", "diffusion"),
@@ -301,7 +301,7 @@ def test_a_largest_step_is_claimed_where_it_counts_alone_and_has_to_be_for_a_pum
         (
             HELD,
             wide,
-            "with jitter or a pump rate only",
+            "only with jitter or a pump rate",
         ),
     ):
         with pytest.raises(checker.Refused, match=why):
@@ -632,7 +632,7 @@ def test_the_slip_error_on_which_a_slow_gain_rests_stays_below_its_claim(monkeyp
     assert [verified(slow, F(999, 1000)), verified(steady, F(1))] == [first, first]
     assert [given[2:] for given in asked] == [(checker.Slow(3, F(1, 9)), F(1)), (None, F(1))]
     for slip in (F(1), F(2)):
-        with pytest.raises(checker.Refused, match="with a slow gain the slip error must stay below its claim"):
+        with pytest.raises(checker.Refused, match="with slow_gain the slip error must stay below its claim"):
             verified(slow, slip)
     with pytest.raises(checker.Refused, match="the file"):
         verified(steady | {"more": "1"}, F(0))

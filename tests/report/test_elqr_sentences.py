@@ -26,7 +26,7 @@ def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
 @pytest.mark.parametrize(
     ("loop", "said"),
     [
-        (held(Verdict.PROVED, step="0.1"), "stable with zero-order hold over T_s = 0.1 s, proved for any course"),
+        (held(Verdict.PROVED, step="0.1"), "stable with zero-order hold over T_s = 0.1 s, proved for any time history"),
         (held(Verdict.PROVED, step="0.1"), "T_s up to 0.1576 s and refuted for 0.15822 s"),
         (held(Verdict.REFUTED, witness=(F("1.4"), F(-1, 2), F(2))), "UNSTABLE with zero-order hold over T_s = 0.184 s"),
         (held(Verdict.UNDECIDED, step="0.158"), "undecided with zero-order hold over T_s = 0.158 s; stability is"),
@@ -46,7 +46,7 @@ def test_peaks_of_one_or_no_class():
     peaks = ContinuousProof(task=task, law=law, claims=claims)
     none = NoProof(reason="small gain 2: too much", small_gain=UpperBound(2))
     said = peaks_sentence({"rate": peaks, "amplitude": none})
-    assert said.endswith("slip rate below 8.34e-05 m/s (slip error 0.501 m) for any of its amplitude and rate")
+    assert said.endswith("slip rate below 8.34e-05 m/s (slip error 0.501 m) for any of the fault's amplitude and rate")
     assert peaks_sentence({"rate": none}) == "no bound on the slip rate is certified; small gain 2: too much"
 
 

@@ -110,7 +110,9 @@ PEAKS = object.__new__(ContinuousProof)  # that there are some is all that count
 
 def test_verdicts_are_graded_by_what_the_proof_leaves_out(slow):
     assert grade(entry(slow, FINE)) == "proved for this loop and task"
-    assert grade(entry(slow, FINE, CHATTER)) == "proved, but on_trajectory fails: 1.01 times what is certified"
+    assert (
+        grade(entry(slow, FINE, CHATTER)) == "proved, but on_trajectory fails: requires 1.01 times the certified value"
+    )
     assert grade(entry(slow, MOVING)) == "proved, but constant_reference fails (nothing is certified)"
     assert grade(entry(slow, MOVING, peaks={"amplitude": PEAKS})) == "proved for this loop and task"
     assert grade(entry(slow, FINE, growth_per_step=1.2)) == "proved, but UNSTABLE at the step used"

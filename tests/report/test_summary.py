@@ -212,14 +212,17 @@ def test_a_design_for_another_sampling_time_is_not_said_to_be_guaranteed(monkeyp
     ("grade", "said"),
     [
         ("undecided", "undecided"),
-        ("proved, but along_reference fails: 295 times what is certified", ", and this task violates its conditions"),
         (
-            "proved, but level_set fails: 2 times what is certified; UNSTABLE with zero-order hold",
+            "proved, but along_reference fails: requires 295 times the certified value",
+            ", and this task violates its conditions",
+        ),
+        (
+            "proved, but level_set fails: requires 2 times the certified value; UNSTABLE with zero-order hold",
             ", and this task violates its conditions; unstable with zero-order hold",
         ),
         ("proved, but zero-order hold is proved for no T_s", "; zero-order hold is proved for no T_s"),
         (
-            "proved, but level_set fails: 2 times what is certified; UNSTABLE with zero-order hold over T_s",
+            "proved, but level_set fails: requires 2 times the certified value; UNSTABLE with zero-order hold over T_s",
             ", and this task violates its conditions; unstable with zero-order hold over T_s",
         ),
     ],

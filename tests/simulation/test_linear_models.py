@@ -141,7 +141,7 @@ def test_a_law_of_samples_meets_a_fault_that_is_held():
 
 
 def test_what_is_not_linear_has_no_transfer_function():
-    with pytest.raises(UnsupportedError, match=r"needs a linear law. Received cta"):
+    with pytest.raises(UnsupportedError, match=r"needs a linear law and linear stages. Received cta"):
         qd.loop_transfer(REAL, qd.published("real-fault")["cta"])
     with pytest.raises(ParameterError, match=r"at must be"):
         qd.to_statespace(REAL, float("nan"))

@@ -160,7 +160,7 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
     said = "even for one that measures the slip with errors of no more than 1 µm up to each sample"
     assert said in " ".join(" ".join(limits_lines(found)).split())
     assert found.smallest_peaks()[0][1] > 2 * found.smallest_peaks(measured=False)[0][1]
-    label = "and with measurements of the slip with errors of no more than 1 µm"
+    label = "infeasible when measuring the slip with errors of no more than 1 µm"
     assert label in limits_figure(found).axes[0].get_legend_handles_labels()[1]
     assert found.smallest_peaks(measured=False) == plain.smallest_peaks()
 

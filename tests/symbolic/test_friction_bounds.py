@@ -95,8 +95,8 @@ def test_a_law_of_a_users_is_confirmed():
 WRONG = {
     "slip_slope": (hyperbolic, {"slip_slope": 0.1}, r"slip_slope of own-law .*Declared 0\.1, but at slip .* m it is"),
     "just too flat": (hyperbolic, {"slip_slope": 99.999}, "slip_slope of own-law"),
-    "upper bound": (hyperbolic, {"high": 0.4999}, "the upper of its bounds of own-law .*Declared 0.4999"),
-    "lower bound": (hyperbolic, {"low": 0.401}, "the lower of its bounds of own-law .*Declared 0.401"),
+    "upper bound": (hyperbolic, {"high": 0.4999}, "the upper bound of own-law .*Declared 0.4999"),
+    "lower bound": (hyperbolic, {"low": 0.401}, "the lower bound of own-law .*Declared 0.401"),
     "rate_slope": (
         shape((0.4, 0.5, 100, 0))(lambda s, v: 1 / (1 + s + v)),
         {},
@@ -104,7 +104,7 @@ WRONG = {
     ),
     "a narrow ripple": (shape((0.3, 0.6, 150, 0))(lambda s, _: 1 / (1 + s) + sp.sin(40 * s) / 20), {}, "slip_slope"),
     "a hidden step": (shape((0.3, 0.6, 150, 0))(lambda s, _: sp.Max(0, sp.Min(1, 50 * (s - 7)))), {}, "slip_slope"),
-    "growth far out": (shape((0.3, 0.6, 150, 0))(lambda s, _: sp.log(1 + s) / 9), {}, "the upper of its bounds"),
+    "growth far out": (shape((0.3, 0.6, 150, 0))(lambda s, _: sp.log(1 + s) / 9), {}, "the upper bound"),
     "no friction": (shape((0.0, 0.5, 500, 0))(lambda s, _: 5 / (1 + s) - 4), {}, "must stay positive"),
 }
 
@@ -126,7 +126,7 @@ UNPROVED = {
     "steep at rest": (lambda s, _: 1 - sp.sqrt(sp.Min(s, 1)), r"slip_slope of own-law .* but at slip .* m it is"),
     "no end of a half-line": (
         lambda s, _: s * sp.sin(s) / (1 + s) ** 2,
-        r"own-law: .* bounds, declared as 0\.[36], is not confirmed for slip from \S+e\+\d\d to inf",
+        r"own-law: .* bound, declared as 0\.[36], is not confirmed for slip from \S+e\+\d\d to inf",
     ),
 }
 
@@ -185,7 +185,7 @@ def test_slow_and_short_slip_counts(axis):
         def extended(self, slip, rate):
             return sp.Rational(2, 5)
 
-    with pytest.raises(ParameterError, match=rf"upper of its bounds .* but at {axis} .* it is 1\."):
+    with pytest.raises(ParameterError, match=rf"upper bound .* but at {axis} .* it is 1\."):
         friction_bounds(Raised(rate_slope=1.0))
 
 
@@ -259,7 +259,7 @@ def test_laws_with_state_reach_what_they_declare(name, what):
         slip_slope = changed["slip_slope"]
         rate_slope = changed["rate_slope"]
 
-    with pytest.raises(ParameterError, match="must bound its friction"):
+    with pytest.raises(ParameterError, match="must be valid"):
         friction_bounds(Tighter(**{quantity: QUANTITIES[quantity] for quantity in kind.quantities()}))
 
 

@@ -401,7 +401,7 @@ def test_a_comparison_judges_and_runs_a_given_law_in_its_setup(monkeypatch, stuc
 def test_assess_and_compare_take_quantities_of_the_setup_by_name():
     with pytest.raises(ParameterError, match=r"must be one of .*delay.* Received 'dela'\. Did you mean delay"):
         qd.assess(REAL, LAW, dela="5 ms")
-    with pytest.raises(ParameterError, match="loop setup of a comparison is that of given laws"):
+    with pytest.raises(ParameterError, match="loop setup of a comparison needs given laws"):
         qd.compare(REAL, [], delay="5 ms")
     assert qd.assess(REAL, LAW, delay="20 ms").guarantee.held.delay == Fraction("0.02")
 

@@ -1,4 +1,4 @@
-"""The theorem: bounds of the errors and of the pressure if the small gain is below 1, also for a slow input gain."""
+"""The theorem: bounds of the errors and of the pressure if the small gain is below 1; beta may vary slowly."""
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -12,7 +12,7 @@ from .matrices import BITS
 from .reading import Refused, Row, keys, need, number, upper
 from .task import Task
 
-MAX_PARTS = 16  # of the range of a slow input gain
+MAX_PARTS = 16  # of the range of a slowly varying input gain
 
 
 @dataclass
@@ -33,14 +33,14 @@ def read_slow(value: Any, task: Task, loop: Loop) -> Slow:
 
 
 def with_gain(loop: Loop, gain: Fraction, growth: Fraction) -> Loop:
-    """The loop with another nominal beta, its responses e^(growth*t) as large after t."""
+    """The loop with another nominal beta, its responses at time t multiplied by e^(growth*t)."""
     flow = [[v + growth * (i == j) for j, v in enumerate(line)] for i, line in enumerate(loop.flow)]
     flow[1] = [*flow[1][:2], *(gain * v for v in loop.outputs[2][2:])]
     return replace(loop, flow=flow)
 
 
 def slow_gains(task: Task, loop: Loop, slow: Slow) -> list[list[list[Fraction]]]:
-    """Gains of every input, and of one more, the past of the first, one part after another."""
+    """Gains of every input, and of one more, the first with weights e^(growth*t), one part after another."""
     width = (task.beta[1] - task.beta[0]) / slow.parts
     parts = []
     for part in range(slow.parts):
@@ -59,7 +59,7 @@ def bounds(task: Task, loop: Loop, slow: Slow | None = None, slip: Fraction = Fr
 
     Where the valve's pressure is not the fault's, its b|p − p*| is a fourth; where its last step is bounded, b times
     that is the last.
-    With a slow gain they hold while the slip error stays below `slip`.
+    With a slowly varying input gain they hold while the slip error stays below `slip`.
     """
     spread = None
     if slow:
@@ -82,7 +82,7 @@ def of_class(
 ) -> tuple[Row, Fraction]:
     """The same for one class of disturbances, from the gains of every input.
 
-    `spread`: deviation of a slow beta from that of the nominal loop, now and in the past.
+    `spread`: deviation of a slowly varying beta from that of the nominal loop, now and in the past.
     """
     pushes = len(loop.outputs) - loop.asked - loop.stepped  # outputs before it are errors and pressures on the fault
     half = [(high - low) / 2 for low, high in (task.s, task.w, task.beta)]
@@ -176,7 +176,7 @@ def radius(table: list[Row]) -> Fraction:
 
 
 def inputs(task: Task, half_beta: Fraction) -> tuple[Fraction, Fraction, Fraction, Fraction]:
-    """Bounds of the force and the drift, the coupling from e2 to the drift, and the shift of the push."""
+    """Bounds of the force and the drift, the coupling from e2 to the drift, and the shift of b(p - p*)."""
     if task.change is None:
         return task.reference_force + task.amplitude, task.drift, Fraction(0), Fraction(0)
     if not task.steady_beta:

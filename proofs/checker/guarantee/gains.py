@@ -1,7 +1,7 @@
 """L1 norms: bounds of every output for an input of size 1, for an initial condition, and with a diffusion path.
 
-With R the truncation error of the modes n < MODES (FORMAT.md, Layer), A its area after a unit step, and Y what the
-steps so far will still add to it, x2 = e2 - beta0*b*Y takes the place of e2 in the loop.
+With R the error of omitting the modes n >= MODES (FORMAT.md, Diffusion path), -A its integral after a unit step, and
+-Y what the steps so far will still add to the integral of R, x2 = e2 - beta0*b*Y takes the place of e2 in the loop.
 """
 
 from collections.abc import Iterable, Iterator
@@ -17,7 +17,7 @@ from .reading import Refused, Row, need
 
 STRETCHES, PARTS = 128, 6  # of time without samples, each of 2^PARTS pieces
 Sums = list[int]  # one for every output, in units of 2^-BITS
-LATE = 1 << 12  # the past before those is below 1/4096
+LATE = 1 << 12  # sums end when what remains is below 1/4096 of them
 
 
 def gains(
@@ -201,7 +201,7 @@ FAINT = 60  # bits below the largest bound, by which all are raised so that none
 
 
 def start_gains(loop: Loop) -> list[list[Fraction]]:
-    """Bounds of every output on every piece of the period, as those of an input of size 1."""
+    """Bounds of the free response of every output from the box of initial conditions, on every piece of the period."""
     entries = [in_even_units(loop, entry)[1] for entry in loop.start]
     loop, _ = in_even_units(loop, loop.start[0])
     flows = cut(loop, loop.cuts, [Fraction(0)] * len(loop.flow), False)
@@ -245,7 +245,7 @@ def followed(flows: list[Flow], start: Fixed, rows: int) -> tuple[Fixed, Fixed, 
 
 
 def product(line: list[int], values: list[int]) -> Fraction:
-    """Of a row of sizes and a column."""
+    """Product of a row of sizes and a column."""
     return Fraction(sum(map(int.__mul__, line, values)), 1 << BITS)
 
 
@@ -297,7 +297,7 @@ def loop_gains(loop: Loop, gain: Fraction) -> list[list[Row]]:
     own = input_gains(loop)
     if loop.pulse:
         found = [gains(loop, pulse_entry(loop, gain), False, pulse=loop.pulse)]
-        seen = own[1][3 if loop.asked else 2]  # the steady pressure moves on while one before is at the valve
+        seen = own[1][3 if loop.asked else 2]  # p* moves on while an earlier pressure is at the valve
         seen[:] = [v + loop.pulse.late for v in seen]
     return [*own, *found, *([start_gains(loop)] if loop.start else [])]
 
@@ -314,7 +314,7 @@ def pulse_entry(loop: Loop, gain: Fraction) -> Row:
 
 
 def without_area(loop: Loop, gain: Fraction) -> tuple[Loop, Awaited]:
-    """The loop in x2, with beta0 = gain times the known kick at every step of the well, or of its flow."""
+    """The loop in x2, beta0 = gain: -gain*A times every step of the well, or times its flow, enters x2."""
     last = next(i for i, v in enumerate(loop.outputs[3]) if v)  # the valve's last step, or the well less the valve
     kick = gain * area(loop.layer)
     flow, events = [list(line) for line in loop.flow], [([list(line) for line in jump], t) for jump, t in loop.events]

@@ -59,9 +59,9 @@ def with_next(here: Near | None, majorant: list[Row], entry: Fixed, moved: Fixed
 DOUBLINGS = 12  # at most 4096 periods are summed
 SHARE = 1024  # the past before those is below 1/1024, except for the slowest mode
 IN_COLUMNS = 6  # doublings of columns, after which rows are doubled
-TURNS, ROOM = 8, 1 << 40  # of sums that are solved for to bound themselves
+TURNS, ROOM = 8, 1 << 40  # iterations for sums that bound themselves, and 1/ROOM added to them
 MAX_WORK = 3 * 10**7  # products of integers
-MAX_SUMS = 10**8  # the same of all periods before, the package's limit twice
+MAX_SUMS = 10**8  # the same for all earlier periods: twice the package's limit
 
 
 @dataclass
@@ -198,7 +198,7 @@ def near_pieces(flow: Flow, here: Near, later: Fixed | None) -> Fixed:
 
 @dataclass
 class Past:
-    """All earlier periods: columns of some, of others by each of the maps, and a bound of the rest."""
+    """All earlier periods: columns of the latest, maps that turn them into columns of others, a bound of the rest."""
 
     columns: Fixed
     far: Fixed
@@ -256,7 +256,7 @@ def stacked(rows: Fixed, maps: tuple[Fixed, ...]) -> Fixed:
 
 @lru_cache(maxsize=64)
 def squared(period: Fixed) -> Fixed:
-    """Twice as many periods."""
+    """Map of twice as many periods."""
     return period * period
 
 
@@ -267,9 +267,9 @@ def folded(sums: list[int], count: int) -> list[int]:
 
 @lru_cache(maxsize=4)
 def slowest(period: Fixed) -> list[int]:
-    """Left eigenvector of the slowest mode, if there is one: a row of a high power of the map, in size.
+    """Left eigenvector of the slowest mode, if there is one: a row of a high power of the map, up to a factor.
 
-    That with the largest entry on the diagonal, which is the same in all units of the states.
+    It is the row with the largest diagonal entry; diagonal entries are the same in all units of the states.
     """
     rows = period.rows
     for _ in range(DOUBLINGS):

@@ -39,7 +39,7 @@ def read_reach(value: Any, loop: Loop) -> Reach:
     lines = matrix(facets, "facets", len(facets), size)
     need(size <= MAX_ENTRIES, f"facets must have at most {MAX_ENTRIES} entries")
     ordinary = all(max(abs(v.numerator), v.denominator) < TOO_LARGE for line in lines for v in line)
-    need(ordinary, "numbers of facets must have at most 20 digits")
+    need(ordinary, "indices of facets must have at most 20 digits")
     counts = [("at_samples", len(lines)), ("between", len(loop.outputs))]
     at_samples, between = (read_bases(given[name], name, count, size, len(lines)) for name, count in counts)
     need(sum(map(len, [*at_samples, *between])) <= MAX_BASES, f"there must be at most {MAX_BASES} bases")
@@ -47,7 +47,7 @@ def read_reach(value: Any, loop: Loop) -> Reach:
 
 
 def read_bases(value: Any, what: str, count: int, size: int, facets: int) -> list[list[Basis]]:
-    """Read the numbers of facets for every row, at the ends of as many pieces for all of them."""
+    """Read the indices of facets for every row, at the ends of as many pieces for all of them."""
     need(type(value) is list and len(value) == count, f"{what} must have {count} rows")
     need(all(type(line) is list for line in value), f"{what} must be rows")
     need(2 <= len(value[0]) <= MAX_PIECES + 1, f"{what} must have 1 to {MAX_PIECES} pieces")
@@ -154,7 +154,7 @@ class Between:
         return exponential(self.loop.flow, time), exponential(majorant(self.loop.flow), time).size()
 
     def inverse_of(self, basis: Basis) -> Fixed:
-        """Of the matrix of some facets."""
+        """Inverse of the matrix of some facets."""
         count = len(basis)
         lines = [[*self.facets[i], *ones] for i, ones in zip(basis, unit(count), strict=True)]
         rows = reduced(lines)[0]

@@ -23,7 +23,10 @@ NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 
 @dataclass
 class Pulse:
-    """From `early` before the event with this number until `late` after it; its areas over `before`, `after` are 1."""
+    """Input from `early` before the event with this number until `late` after it.
+
+    Its area before the event, divided by `before`, and its area after it, divided by `after`, add up to at most 1.
+    """
 
     event: int
     early: Fraction
@@ -57,10 +60,12 @@ class Loop:
     errors of e1 and e2, an input each where it is not 0. Without events there may be two inputs more, the second and
     third derivatives of the reference.
     With a diffusion path, L^2/D = `layer`, a fourth output bounds the truncation error of its modes; where `fade` is
-    given, that is one more input, the last one. Where `asked`, the last output is the pressure at the valve. `start`
+    given, that is one more input, the last one. Where `asked`, the last output, or the
+    last but one if `stepped`, is the pressure at the valve. `start`
     has the columns of the box of initial conditions, none at rest. `pump` has its limits as the file states them. Where
     the last step of the valve is bounded it is the last output, `stepped`, and `pulse` says when it may occur. `off` is
-    the jitter of measurements, and `told` lists those of e1 and e2 that have an input for jitter and noise. With
+    the jitter of measurements plus half their averaging time, and
+    `told` lists those of e1 and e2 that have an input for jitter and noise. With
     aperiodic sampling each interval is `step` to `longest`; else `longest` is 0.
     """
 
@@ -125,7 +130,8 @@ def read_loop(value: Any, task: Task, errors: Sequence[Fraction] = (Fraction(0),
     """Build the error loop: e1, e2, the law's states, pressures on their way, valve, and states behind it.
 
     These are: with a lag, the well's pressure minus the valve's; modes of a diffusion path, minus the well's.
-    With a diffusion path and no lag, the last state is the last step of the valve. `errors`: initial e1, e2.
+    With jitter, a pump rate, or a diffusion path without a lag, the last state is the last step of the valve. `errors`:
+    initial e1, e2.
     """
     if type(value) is dict and "rates" in value:
         need(not any(errors), "a law in continuous time must start at rest")
@@ -253,7 +259,7 @@ def maps_of(law: Held, b: Fraction) -> tuple[list[Row], list[Row]]:
     arrival[valve] = unit(size)[valve - 1]
     last = arrival if law.part else sample
     change = [v - (i == valve) for i, v in enumerate(last[valve])]
-    for i in law.path[:1] if law.lag > 0 else law.path:  # it stays while the valve's pressure jumps
+    for i in law.path[:1] if law.lag > 0 else law.path:  # pressures behind the valve do not jump with it
         last[i] = [v - c for v, c in zip(last[i], change, strict=True)]
     if law.stepped:
         last[-1] = change
@@ -287,7 +293,7 @@ def starts_of(law: Held, errors: Sequence[Fraction]) -> list[Row]:
 
 
 def with_left_out(loop: Loop, law: Held) -> Loop:
-    """The loop with a bound of the truncation error of the modes: of the well's flow, or fading after its steps."""
+    """The loop with a bound of the truncation error of the modes: by the rate of the well, or after its steps."""
     size, time, high = law.size, law.diffusion, abs(mode_share(MODES))
     rate, floor = mode_rate(MODES, time), 6 * MODES * SHORT
     cut = replace(loop, cuts=BENT, past_cuts=HALVES, layer=time)

@@ -12,7 +12,7 @@ from .reading import Row, need
 
 BITS = 192
 MANY, COARSE, PLACE = 64, 60, 128  # columns that are multiplied at once, bits of their entries and of a product's place
-LARGEST = 1 << 2 * BITS  # entries beyond 2^BITS
+LARGEST = 1 << 2 * BITS  # in units of 2^-BITS: larger entries are rejected
 
 
 def zeros(size: int) -> list[Row]:

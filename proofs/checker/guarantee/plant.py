@@ -1,7 +1,8 @@
 """Verify certificate files of the kind ``uncertain_plant`` (FORMAT.md) with the Python standard library alone.
 
 A linear plant with sectors, loads and disturbances under a sampled linear law of several signals. A checker forms the
-loop and upper sums of its impulse responses, all inputs at once, and the numbers of the file must close the small gain.
+loop and upper sums of its impulse responses, all inputs at once, and the numbers of the file must satisfy the
+small-gain condition.
 """
 
 import struct
@@ -15,16 +16,16 @@ from .matrices import BITS, Fixed, exponential, fixed, unit
 from .reading import Row, entries, keys, lower, matrix, need, number, row, upper
 
 MOST, MOST_LAW, MOST_LOOP, MOST_PIECES, MOST_PERIODS = 40, 48, 96, 64, 8
-AT_ONCE, LEFT, FAINT = (8, 256), 1024, 60  # periods in columns, remaining share of sums, bits by which none is 0
+AT_ONCE, LEFT, FAINT = (8, 256), 1024, 60  # periods in columns; 1/LEFT of sums may remain; 2^-FAINT raises 0
 MOST_WORK = 12 * 10**8
-BEYOND = 64  # factor on the periods that may be followed, within which the map of a stable loop is small
+BEYOND = 64  # times MOST_WORK: periods within which powers of the map of a stable loop must become small
 SWEEPS = 8  # of the choice of units
 COARSE, PLACE, HALF = 58, 128, 64  # bits of entries that are multiplied at once, and of the places of their products
 
 
 @dataclass
 class Sector:
-    """phi(y, t) between low*y and high*y for the argument y, a row over states and controls; up to `within`, if any."""
+    """phi(y, t) between low*y and high*y for y, a row over states and controls, and |y| <= `within`, if any."""
 
     entry: Row
     line: Row
@@ -120,7 +121,7 @@ def listed(value: Any, where: str) -> list[Any]:
 
 
 def table(value: Any, where: str, width: int) -> list[Row]:
-    """A matrix of any height that is bounded."""
+    """A matrix of at most MOST rows."""
     need(type(value) is list and len(value) <= MOST, f"{where} must have at most {MOST} rows")
     return matrix(value, where, len(value), width)
 
@@ -411,7 +412,7 @@ class Sums:
         return sums, free
 
     def whole(self, totals: list[list[int]], i: int, rest: Fixed, count: int) -> list[int]:
-        """Sums for an input with the quadrature error of its columns, by those for unit columns."""
+        """Sums for an input, including the quadrature error of its columns, bounded by the sums for unit columns."""
         used = [(count + j, v) for j, (v,) in enumerate(rest.rows) if v]
         return [line[i] + sum((line[j] * v >> BITS) + 1 for j, v in used) for line in totals]
 
@@ -519,7 +520,7 @@ def raised(part: list[int]) -> list[int]:
 
 
 def shrinks(leap: Fixed) -> bool:
-    """Whether a map makes every vector smaller by its largest entry."""
+    """Whether a map makes every vector smaller in the maximum norm."""
     return max(map(sum, leap.size().rows)) < 1 << BITS
 
 
@@ -542,7 +543,7 @@ def grouped(left: Fixed, right: Fixed, lengths: list[int]) -> Iterator[list[int]
 
     Many columns at once, side by side in one long integer. Each row of `right` is cut to COARSE bits, with a power of 2
     for its size in the column of `left` that meets it, and each row of `left` to as many; the upper half of a place is
-    read. With l = l' + d and r = r' + e a product is off by at most |l|*e + d*|r'|.
+    read. With l = l' + d and r = r' + e the error of a product is at most |l|*e + d*|r'|.
     """
     count = sum(lengths)
     cuts = [max(max(map(abs, line)).bit_length() - COARSE, 0) for line in right.rows]

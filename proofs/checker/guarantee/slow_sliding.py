@@ -57,7 +57,7 @@ class Fault:
         return (1 + self.swing) * max(abs(self.load() / mu - self.ramp) for mu in self.box["coefficient"])
 
     def normal(self, push: Fraction) -> Range:
-        """Range of the effective normal stress for pressures within `push` of the planned one."""
+        """Range of the effective normal stress for pressures within `push` of p*."""
         low, high = self.box["normal_stress"]
         return low - self.stiffness * self.distance / self.box["coefficient"][0] - push, high + push
 

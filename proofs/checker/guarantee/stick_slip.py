@@ -150,8 +150,8 @@ class Period:
     def __init__(self, rock: Rock, task: Task, target: Fraction, growths: Row, law: Law, reach: Reach) -> None:
         self.task, self.law, self.reach = task, law, reach
         self.bend, self.force = task.reference_acceleration, task.amplitude
-        self.rate = task.reference_rate + law.excess  # as the law measures it
-        self.still = self.bend * law.longest_interval / 2 + law.excess  # largest r' with which it may stand still
+        self.rate = task.reference_rate + law.excess  # bound of r' as the law uses it
+        self.still = self.bend * law.longest_interval / 2 + law.excess  # largest r' if the reference stands still
         ahead, self.peak, up, behind, down = (1 / abs(sum(row)) for row in reach.facets[:5])
         self.ahead, self.behind, self.level = ahead, behind, max(up, down)
         zero, one = Fraction(0), Fraction(1)
@@ -225,7 +225,8 @@ class Period:
     def margins(self, own: list[Near], moved: list[Near]) -> list[Near]:
         """Margin between the bounds at two intervals, for factors of slip and slip rate.
 
-        It is the squared distance of the two over 8, times a bound of the second derivative by the interval.
+        It is the squared distance of the two over 8, times a bound of the second derivative with respect to the
+        interval.
         """
         law, task, most = self.law, self.task, self.law.longest_interval
         part = (most - law.step) ** 2 / PARTS**2 / 8
@@ -278,7 +279,7 @@ class Period:
         return [law.target * (law.back - end.of_error), law.rate, Fraction(1)], -law.target * end.constant
 
     def carried(self, facet: Row, end: End, interval: Fraction) -> tuple[Fraction, Fraction, Fraction]:
-        """Effect of law and reference on a facet: factor of e1, constant, factor of r' if it may stand still."""
+        """Effect of law and reference on a facet: factor of e1, constant, factor of r' if r may stand still."""
         law, (n1, _, n3) = self.law, facet
         predicted = n3 * (law.level + law.slip * law.step / 2)
         sign = int(end.positive)
@@ -328,7 +329,7 @@ class Period:
                     yield end.place, Function([of_error, Fraction(0), n3], constant, more, total)
 
     def stops(self) -> list[Range]:
-        """Factors and constants of y that bound the slip until a last stop."""
+        """Factors g of y and constants h: the slip until the last stop is at most g*y + h."""
         step, (low, high) = self.law.longest_interval, self.damping
         least = Fraction(1, 2) + low * step / 24
         found = []

@@ -76,7 +76,7 @@ class Rock:
     area: tuple[Fraction, Fraction]
 
     def stress(self, slip: Fraction, growth: Fraction) -> tuple[Fraction, Fraction]:
-        """Range of the effective normal stress that holds the fault at rest, for slips up to one."""
+        """Range of the effective normal stress that holds the fault at rest, for slips up to a given one."""
         kappas = [(k - growth) / n for k, n in product(self.stiffness, self.area)]
         return effective_stress(self.mu, self.normal_stress, slip, kappas)
 

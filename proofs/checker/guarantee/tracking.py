@@ -45,19 +45,19 @@ def verify(document: dict[str, Any]) -> list[str]:
     )
     need(
         loop.stepped or STEP not in claims,
-        "largest_step must be claimed with jitter or a pump rate only",
+        "largest_step may be claimed only with jitter or a pump rate",
     )
     need("rate" not in loop.pump or STEP in claims, "a pump rate needs the claim largest_step")
     within = loop.root is None or root_within(loop.root, loop.step, *errors)
     need(within, "the root of the implicit step must lie between its lines for all claimed errors")
     slow = read_slow(document["slow_gain"], task, loop) if "slow_gain" in more else None
     need(("reach" in more) == (loop.longest > 0), "reach must be given for aperiodic sampling, and for that alone")
-    need(not (slow and loop.longest), "aperiodic sampling must have no slow gain")
+    need(not (slow and loop.longest), "aperiodic sampling must have no slow_gain")
     if loop.longest:
         (slip, rate, *pushes), small = bounds_within(task, loop, read_reach(document["reach"], loop))
     else:
         (slip, rate, *pushes), small = bounds(task, loop, slow, claims["slip_error"])
-    need(not slow or slip < claims["slip_error"], "with a slow gain the slip error must stay below its claim")
+    need(not slow or slip < claims["slip_error"], "with slow_gain the slip error must stay below its claim")
     steps = [pushes.pop() / task.b] if loop.stepped else []
     ends = [end for push in pushes for end in (task.rest[0] - push / task.b, task.rest[1] + push / task.b)]
     found = dict(zip([*CLAIMS, *ASKED], (slip, rate, rate + task.reference_rate, *ends), strict=False))

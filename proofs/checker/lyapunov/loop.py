@@ -43,15 +43,15 @@ Powers = tuple[Number, ...]
 class Term:
     """Product of a number (gains and constants included), uncertain parameters and powers of states and lifts.
 
-    A factor |x_i|^a is kept as the integer exponent r_i*a of u_i = |x_i|^(1/r_i) and a flag: odd for the
-    signed power, even for the absolute one. For a lift, which comes after the states, a itself is kept.
+    A factor |x_i|^a is stored as the integer exponent r_i*a of u_i = |x_i|^(1/r_i) and a flag: odd for the
+    signed power, even for the absolute one. For a lift, which comes after the states, a itself is stored.
     """
 
     number: Fraction
     uncertain: tuple[str, ...]
     exponents: Powers
     odd: tuple[bool, ...]
-    written: str = ""  # in the file, where the number is zero, so that no change of it goes unseen
+    written: str = ""  # text of a term whose number is zero: printed, so that any change of it shows
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def pad_terms(terms: list[Term], size: int) -> list[Term]:
 def read_lifts(value: dict[str, Any], loop: Loop) -> dict[str, list[Term]]:
     """Read the arguments of nested powers, each of states and of the lifts before it.
 
-    Terms with a gain or constant zero are disregarded; of the others only roots may have a range.
+    Terms with a zero gain or constant are disregarded; in the others only roots may have ranges of more than one point.
     """
     lifts: dict[str, list[Term]] = {}
     for lift, entries in value.items():
@@ -235,7 +235,8 @@ def cells_of(choices: Iterable[Sequence[int]]) -> dict[str, Exponents]:
 class Cell:
     """Points where states and lifts have given signs, and the relations there; it grows with every lift.
 
-    `degrees` has an entry for every variable: its index among states and lifts, and the degree of that.
+    `degrees` has an entry for every variable: its index among states and lifts, and the degree of the state (1) or of
+    the lift's argument.
     """
 
     label: str

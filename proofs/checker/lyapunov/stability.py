@@ -84,7 +84,7 @@ def read_claims(value: Any, loop: Loop) -> dict[str, Fraction]:
 
 @dataclass(frozen=True)
 class Obligation:
-    """P >= 0 where all variables are non-negative and the limits hold; `size` is the number of variables."""
+    """P >= 0 where the limits hold, and on cells all variables are non-negative; `size` is the number of variables."""
 
     name: str
     polynomial: Polynomial
@@ -104,7 +104,7 @@ def power_sum(indices: Iterable[int], size: int, degree: int) -> Polynomial:
 
 
 def vertices_of(loop: Loop) -> list[dict[str, Fraction]]:
-    """Return the vertices of the box of uncertain parameters; a range of one point has one."""
+    """Return the vertices of the box of uncertain parameters; a range of one point has one end."""
     return [
         dict(zip(loop.uncertain, vertex, strict=True))
         for vertex in product(*(dict.fromkeys(ends) for ends in loop.uncertain.values()))
@@ -166,7 +166,7 @@ def falling(
 
 
 def read_squares(value: Any, where: str, size: int, most: int) -> Polynomial:
-    """Read and expand the sum of u^times b'Qb, with times up to 1 or 0."""
+    """Read and expand the sum of u^times b'Qb, with entries of `times` up to `most`, 1 on cells and 0 on reals."""
     total: Polynomial = {}
     for index, entry in enumerate(read_list(value, f"{where} squares", 0, 2**size), 1):
         label, _, expanded = read_square(entry, f"{where} square {index}", "times", size)

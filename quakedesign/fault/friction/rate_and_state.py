@@ -56,7 +56,7 @@ class RateAndState(FrictionLaw):
         When a parameter is outside its range, or the law is evaluated without a state.
     """
 
-    domain: ClassVar[str] = "slowest_rate <= rate <= fastest_rate, theta between the steady states of the two"
+    domain: ClassVar[str] = "slowest_rate <= rate <= fastest_rate, theta between the steady states at these two rates"
     state_names: ClassVar[tuple[str, ...]] = ("theta",)
     state_units: ClassVar[tuple[str, ...]] = ("s",)
 
@@ -128,7 +128,7 @@ class RateAndState(FrictionLaw):
         if len(state) != 1:
             raise ParameterError(
                 f"{self.name} needs one state, theta [s]. Received {len(state)}. "
-                "Pass it after the slip rate, or ask for steady_coefficient(rate)."
+                "Pass it after the slip rate, or call steady_coefficient(rate)."
             )
         return state[0]
 

@@ -115,7 +115,8 @@ class ExponentialSlipWeakening(SlipWeakening):
 class LinearSlipWeakening(SlipWeakening):
     """μ(slip) = residual + drop · max(0, 1 − slip/critical_slip).
 
-    Friction has a kink at the critical slip, and would grow without bound for slip < 0; `extended` holds it there.
+    Friction has a kink at the critical slip. It would grow without bound for slip < 0, where `extended` keeps it at its
+    static value.
 
     Attributes
     ----------

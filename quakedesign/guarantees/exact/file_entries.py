@@ -1,14 +1,16 @@
 """Objects shared by several kinds of guarantee files: fault, reference, disturbance, step.
 
-Each class declares its keys and converts to a value of the package, and back.
+Each class declares the keys of one object. Methods and functions convert objects to values of the
+package, and back.
 """
 
 from fractions import Fraction
-from typing import Annotated, Any
+from typing import Annotated
 
 from msgspec import Meta
 from msgspec.structs import astuple
 
+from quakedesign.files import Json
 from quakedesign.laws.implicit_root import MOST_TERMS, ImplicitRoot, Power
 from quakedesign.plant.fault_plant import FaultPlant, Friction
 from quakedesign.sos.exact.strict import Entries, Name, made
@@ -29,7 +31,7 @@ class SlipAndRate(Entries):
 
 
 class SpreadEntries(Entries):
-    """Relative half-widths [-]."""
+    """Relative half-widths [-] of the uncertain parameters of a fault."""
 
     stiffness: Fraction
     damping: Fraction
@@ -37,7 +39,7 @@ class SpreadEntries(Entries):
 
 
 class FaultEntries(Entries):
-    """A fault with friction of slip and slip rate."""
+    """A fault whose friction depends on slip and slip rate."""
 
     name: FaultName
     density: Fraction
@@ -66,7 +68,7 @@ class DisturbanceEntries(Entries, kw_only=True):
 
 
 class TaskEntries(Entries):
-    """Common keys of files about a fault with friction of slip and slip rate."""
+    """Common keys of files about a fault whose friction depends on slip and slip rate."""
 
     fault: FaultEntries
     reference: ReferenceEntries
@@ -78,7 +80,7 @@ class TaskEntries(Entries):
         return made(FaultPlant, self.fault, self.reference, self.disturbance, spreads=spreads, growths=growths)
 
 
-def task_entries(task: FaultPlant) -> dict[str, Any]:
+def task_entries(task: FaultPlant) -> Json:
     """The three objects of `TaskEntries` by name."""
     stiffness, damping, authority = task.spreads
     slip, rate = task.growths
@@ -102,7 +104,7 @@ Powers = Annotated[tuple[PowerEntries, ...], Meta(max_length=MOST_TERMS)]
 
 
 class RootEntries(Entries):
-    """The sum q of an implicit step, and the lines that enclose its solution."""
+    """The sum q of an implicit step, and the sector bound of its solution."""
 
     pull: Powers
     slopes: Pair

@@ -15,7 +15,7 @@ from msgspec import Meta
 from msgspec.structs import astuple
 
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.files import write_whole
+from quakedesign.files import Json, write_whole
 from quakedesign.guarantees.exact.file_entries import (
     MOST_STATES,
     FaultName,
@@ -55,7 +55,7 @@ if TYPE_CHECKING:
     from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 
 Claim = Union[TrackingProof, ContinuousProof, SlidingProof, "StickSlipProof"]
-"""What files about a fault claim."""
+"""Types of the claims in certificate files about a fault."""
 _ZERO = Fraction(0)
 
 # ----------------------------------------------------------------------
@@ -105,14 +105,15 @@ class SampledLoopEntries(Entries, kw_only=True):
         law = made(LinearLaw, self, root=None if self.root is None else self.root.value())
         need(not law.of_reference or any(map(any, law.of_reference)), "of_reference must not be zero if given")
         noise, initial = ((_ZERO, _ZERO) if pair is None else astuple(pair) for pair in (self.noise, start))
-        need(start is None or any(initial), "a bound of the start must be above 0 if given")
+        need(start is None or any(initial), "start must have a bound above 0 if given")
         times = JitterEntries(measured=_ZERO, delay=_ZERO) if self.jitter is None else self.jitter
         need(self.jitter is None or any(astuple(times)), "jitter must be above 0 if given")
         pump = self.pump
         if pump is not None:
             need(astuple(pump) != astuple(PumpEntries()), "a pump must have limits or a rate")
             need(
-                (pump.rate is not None) == (pump.ramp != 0) and pump.ramp >= 0, "a rate of a pump needs a ramp above 0"
+                (pump.rate is not None) == (pump.ramp != 0) and pump.ramp >= 0,
+                "the rate of a pump and a ramp above 0 must be given together",
             )
         return made(
             SampledLoop,
@@ -181,7 +182,7 @@ def _tracking_entries(claim: TrackingProof | ContinuousProof) -> Any:
     )
 
 
-def _read_tracking(raw: dict[str, Any]) -> TrackingProof | ContinuousProof:
+def _read_tracking(raw: Json) -> TrackingProof | ContinuousProof:
     if isinstance(raw.get("loop"), dict) and "rates" in raw["loop"]:
         file = read_as(ContinuousFile, raw)
         claim: TrackingProof | ContinuousProof = ContinuousProof(
@@ -196,7 +197,7 @@ def _read_tracking(raw: dict[str, Any]) -> TrackingProof | ContinuousProof:
             slow_gain.models(task)
         free = bool(held.longest_step)
         need(free == (reach is not None), "reach must be given for aperiodic sampling, and for that alone")
-        need(not free or slow_gain is None, "aperiodic sampling must have no slow gain")
+        need(not free or slow_gain is None, "aperiodic sampling must have no slow_gain")
         claim = TrackingProof(task=task, held=held, claims=sampled.claims, slow_gain=slow_gain, reach=reach)
         if reach is not None:
             require_fit(claim.loop, reach)
@@ -209,7 +210,7 @@ def _read_tracking(raw: dict[str, Any]) -> TrackingProof | ContinuousProof:
     counted = "stepped" in loop.outputs
     need(
         counted or claims.largest_step is None,
-        "largest_step must be claimed with jitter or a pump rate only",
+        "largest_step may be claimed only with jitter or a pump rate",
     )
     need(not paced or claims.largest_step is not None, "a pump rate needs the claim largest_step")
     need(
@@ -295,7 +296,7 @@ def _sliding_entries(claim: SlidingProof) -> Any:
     return written(file)
 
 
-def _read_sliding(raw: dict[str, Any]) -> SlidingProof:
+def _read_sliding(raw: Json) -> SlidingProof:
     file = read_as(SlidingFile, raw)
     ranges = {axis: getattr(file.fault, axis) for axis in AXES}
     task = made(SlidingPlant, file.fault, file.reference, ranges=ranges, stress=file.stress)
@@ -318,7 +319,7 @@ def _cuts(file: SlidingFile) -> Cuts:
 # Any of these files.
 
 
-def guarantee_document(claim: Claim | PlantProof) -> dict[str, Any]:
+def guarantee_document(claim: Claim | PlantProof) -> Json:
     """Content of the file."""
     if not hasattr(claim, "claims"):
         raise ParameterError(f"a claim must be a guarantee. Received {shown(claim)}. Prove one with guarantee.")
@@ -351,8 +352,8 @@ def load_guarantee(path: str | Path) -> Claim | PlantProof:
     Returns
     -------
     TrackingProof, ContinuousProof, SlidingProof, StickSlipProof or PlantProof
-        The first has a ``controller`` for `simulate`, `export_controller` and `loop_transfer`: the law with its T_s,
-        its limit at rest, and the delay, lag and diffusion path of the proof.
+        The ``controller`` of a TrackingProof is for `simulate`, `export_controller` and `loop_transfer`: the law with
+        its T_s, its limit at rest (against windup), and the delay, lag and diffusion path of the proof.
 
     Raises
     ------
@@ -363,7 +364,7 @@ def load_guarantee(path: str | Path) -> Claim | PlantProof:
 
 
 def save_guarantee(claim: Claim | PlantProof, path: str | Path) -> None:
-    """Write the file whole."""
+    """Write the file atomically."""
     write_whole(Path(path), guarantee_text(claim))
 
 

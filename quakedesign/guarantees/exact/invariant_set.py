@@ -2,31 +2,31 @@
 
 **Loop.** Each sampling interval T is arbitrary within T_s ≤ T ≤ T_m; all else is as with periodic sampling, and the law
 does not measure T. Let the map of a sample be J = CB, B its reduced row echelon form without rows of zeros and C its
-columns at B's pivots. With y the state just before a sample, the sample retains only ξ = By. At θ after it, x(θ) =
-e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
+columns at B's pivots. With x₋ the state just before a sample, the sample retains only ξ = Bx₋. At a time θ after it,
+x(θ) = e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
 
 **Theorem.** Let X = {ξ: |h_l·ξ| ≤ 1 for all l}, 0 ∈ X, and let every input be at most W_i. Suppose |h_l·Bx(T)| ≤ 1 for
 all l and T_s ≤ T ≤ T_m, and |c_y·x(θ)| ≤ Y_y for 0 ≤ θ ≤ T_m, for all ξ ∈ X and all such inputs. If W_i ≥ F_i + Σ_y
-c_iy·Y_y for every input (`inputs`), then from rest every output stays below Y_y for all t.
+c_iy·Y_y for every input, with F_i and c_iy as in `small_gain`, then for the initial state 0, |y| ≤ Y_y for every output
+y and all t.
 
-**Proof.** By induction ξ stays in X while the inputs obey their bounds. Along a trajectory of the loop s, w, β and φ
-are functions of time, with which the inputs are linear in the state. Saturate the inputs at ±W_i: a solution of this
-loop obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t. So no input saturates, and this is the unique
-solution of the original loop. ∎
+**Proof.** By induction ξ stays in X while the inputs obey their bounds. Along a trajectory of the loop, s, w, β and φ
+are functions of time, and for these functions the inputs are linear in the state. Saturate the inputs at ±W_i: a
+solution of this loop obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t. So no input saturates, and
+this is the unique solution of the original loop. ∎
 
 **What is verified.** For r independent facets l ∈ L, |gξ| ≤ |gH_L⁻¹|·1 on X. A file names r facets for every row g at
 every end of a piece. For c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) = |ce^{Aθ}(Cξ + Σ j·n)| + Σ
-W_i∫₀^θ|ce^{Aσ}b_i|dσ. On a piece [α, β] the first term is that of a vector within (β − α)²/8·max|cA²e^{Aσ}||x(0)| of
-its chord, and the second is within (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i| of its own: f is at most the larger of its ends
-plus both. Integrals are trapezoidal sums, as in `norms`.
+W_i∫₀^θ|ce^{Aσ}b_i|dσ. On a piece [α, β] the first term exceeds the linear interpolation of its two end values by at
+most (β − α)²/8·max|cA²e^{Aσ}||x(0)|, and the second by at most (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i|: f is at most the
+larger of its two end values plus both of these bounds. Integrals are trapezoidal sums, as in `norms`.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property, reduce
 from itertools import pairwise
-from typing import Any
 
 from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 
@@ -93,7 +93,7 @@ class InvariantPolytope:
             (
                 "numerators and denominators of facets must be below 1e20",
                 not large,
-                "" if not large else f"the entry {shortly(large[0])}, of larger ones",
+                "" if not large else f"the entry {shortly(large[0])}, whose numerator or denominator is larger",
             ),
             ("facets must have the same number of entries", len(sizes) == 1, f"rows of {_listed(sizes)} entries"),
             (
@@ -110,7 +110,7 @@ class InvariantPolytope:
                 for name, table in (("at_samples", self.at_samples), ("between", self.between))
             ),
             (
-                f"a basis must be {size} numbers of facets, from 0 to below {count}",
+                f"a basis must be {size} indices of facets, each at least 0 and below {count}",
                 not outside,
                 "" if not outside else f"{outside[0]}",
             ),
@@ -130,7 +130,7 @@ def _listed(numbers: list[int]) -> str:
 
 
 def _even(table: tuple[tuple[Basis, ...], ...]) -> bool:
-    """Whether all rows have equally many pieces."""
+    """Whether all rows have the same number of bases, 2 to `MOST_PIECES` + 1."""
     return len({len(row) for row in table}) == 1 and 2 <= len(table[0]) <= MOST_PIECES + 1
 
 
@@ -146,7 +146,7 @@ def reached_bounds(task: FaultPlant, held: SampledLoop, reach: InvariantPolytope
     shares = [sum((c * largest[y] for y, c in channel.shares.items()), _ZERO) for channel in channels]
     for channel, share, bound in zip(channels, shares, reach.inputs, strict=True):
         if channel.own + share > bound:
-            return NoProof(reason=f"the {channel.name} may be larger than the set is for")
+            return NoProof(reason=f"the {channel.name} may exceed its bound in the invariant set")
     gains = (share / bound for share, bound in zip(shares, reach.inputs, strict=True) if bound)
     return Bounds(
         slip_error=largest["slip_error"],
@@ -161,13 +161,13 @@ class BetweenSamples:
     """Flow from one sample to the next, for rows of the state and columns of inputs."""
 
     by: Arithmetic
-    flow: Any
-    inputs: Any
-    known: dict[Any, tuple[Any, Any]] = field(default_factory=dict)
+    flow: arb_mat
+    inputs: arb_mat
+    known: dict[Fraction, tuple[arb_mat, arb_mat]] = field(default_factory=dict)
 
     def along(
-        self, rows: Any, ends: Sequence[Any], first: int, largest: Any, bounds: Iterable[Any]
-    ) -> Iterator[tuple[Any, Any, Any]]:
+        self, rows: arb_mat, ends: Sequence[Fraction], first: int, largest: arb_mat, bounds: list[arb]
+    ) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
         """At each end from `first` on: rows, contribution of bounded inputs, and excess within the next piece.
 
         `largest` bounds the state right after a sample, entry by entry; no piece follows the last end.
@@ -184,7 +184,7 @@ class BetweenSamples:
             rows = following
         yield rows, area, area * 0
 
-    def _step(self, piece: Any) -> tuple[Any, Any]:
+    def _step(self, piece: Fraction) -> tuple[arb_mat, arb_mat]:
         """e^{Ah} and an upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h."""
         if piece not in self.known:
             h = self.by.number(piece)
@@ -197,12 +197,12 @@ class _SampleMap:
     """Map from one sample to the next: B, C, H, output rows, inputs of the flow and of samples, with their bounds."""
 
     between: BetweenSamples
-    seen: Any
-    lift: Any
+    seen: arb_mat
+    lift: arb_mat
     facets: fmpq_mat
-    rows: Any
-    bounds: list[Any]
-    sampled: list[tuple[Any, Any]]
+    rows: arb_mat
+    bounds: list[arb]
+    sampled: list[tuple[arb_mat, arb]]
 
     @classmethod
     def of(cls, loop: PeriodicLoop, channels: Sequence[Channel], reach: InvariantPolytope) -> "_SampleMap":
@@ -236,8 +236,8 @@ class _SampleMap:
         rows = zip(self.rows.tolist(), reach.between, strict=True)
         return [upper(self._largest(arb_mat([row]), ends, bases)) for row, bases in rows]
 
-    def _largest(self, row: Any, ends: list[Fraction], bases: tuple[Basis, ...]) -> Any:
-        """Bound of |c·x(θ)| for every θ from the end of the first basis on."""
+    def _largest(self, row: arb_mat, ends: list[Fraction], bases: tuple[Basis, ...]) -> arb:
+        """Bound of |c·x(θ)| for every θ from the piece end of the first basis on."""
         places = self.between.along(row, ends, len(ends) - len(bases), self._largest_state, self.bounds)
         pieces = [
             (self._height(now, basis) + area[0, 0], more[0, 0])
@@ -246,13 +246,13 @@ class _SampleMap:
         peaks = (a.max(b) + more for (a, more), (b, _) in pairwise(pieces))
         return reduce(arb.max, peaks, arb(0)).abs_upper()
 
-    def _height(self, row: Any, basis: Basis) -> Any:
+    def _height(self, row: arb_mat, basis: Basis) -> arb:
         """Bound of |c·x| right after a sample."""
         size = _sum(absolute(row * self.lift * arb_mat(self._inverse(basis))))
         return sum((abs((row * entry)[0, 0]) * bound for entry, bound in self.sampled), size)
 
     @cached_property
-    def _largest_state(self) -> Any:
+    def _largest_state(self) -> arb_mat:
         """Bounds of the state right after a sample, entry by entry."""
         frame = absolute(arb_mat(self._inverse(tuple(range(self.facets.ncols())))))
         total = absolute(self.lift) * BALLS.sums(frame)
@@ -303,5 +303,5 @@ def _cut(start: Fraction, end: Fraction, pieces: int) -> list[Fraction]:
     return [start + (end - start) * i / pieces for i in range(pieces + 1)]
 
 
-def _sum(row: Any) -> Any:
+def _sum(row: arb_mat) -> arb:
     return sum(row.entries(), arb(0))

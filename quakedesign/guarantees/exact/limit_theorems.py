@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
 from math import ceil, sqrt
-from typing import Any, TypedDict
+from typing import TypedDict
 
 from flint import arb, arb_mat, ctx
 
@@ -84,7 +84,7 @@ class SlidingPush:
         return beta > 1 + kappa and (beta - 1 - kappa) ** 2 >= 4 * kappa
 
     @property
-    def pole(self) -> Any:
+    def pole(self) -> arb:
         """The largest λ [1/s]."""
         kappa, beta = self._ratios
         trace = beta - 1 - kappa
@@ -251,7 +251,7 @@ class _Pushed:
     authority: Fraction
 
     @property
-    def pole(self) -> Any:
+    def pole(self) -> arb:
         """λ [1/s], in a form without cancellation where damping is large."""
         w, twice = ball(self.rate), 2 * ball(self.slip)
         root = (w * w + 2 * twice).sqrt()
@@ -318,7 +318,7 @@ def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> Up
     """T + θ [s] beyond which every controller fails, without a diffusion path; None without a limit."""
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
-    def longest(plant: _Pushed | SlidingPush) -> Any:
+    def longest(plant: _Pushed | SlidingPush) -> arb:
         ratio = ball(plant.authority * withdrawal / task.amplitude)
         return _at_least_one(ratio).log() / plant.pole
 
@@ -329,7 +329,7 @@ def longest_diffusion(task: FaultPlant | SlidingPush, withdrawal: Fraction, step
     """L²/D [s] beyond which every controller with samples T apart fails; None without a limit."""
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
-    def longest(plant: _Pushed | SlidingPush) -> Any:
+    def longest(plant: _Pushed | SlidingPush) -> arb:
         pole = plant.pole
         ratio = ball(plant.authority * withdrawal / task.amplitude) * (-pole * ball(step)).exp()
         return _at_least_one(ratio).acosh() ** 2 / pole
@@ -398,7 +398,7 @@ _ASSUMED = (
 )
 
 
-def _least(task: FaultPlant | SlidingPush, value: Callable[[_Pushed | SlidingPush], Any]) -> UpperBound | None:
+def _least(task: FaultPlant | SlidingPush, value: Callable[[_Pushed | SlidingPush], arb]) -> UpperBound | None:
     with ctx.workprec(_BITS):
         bounds = [upper(value(plant)) for plant in _pushed(task)]
     return UpperBound(min(bounds)) if bounds else None
@@ -450,7 +450,7 @@ def _surprise(
     def hidden(slip: Fraction) -> Fraction:
         return shortened(measurements.hides(slip, plant.rate, amplitude, step))
 
-    def bound(slip: Fraction, unseen: Fraction) -> Any:
+    def bound(slip: Fraction, unseen: Fraction) -> arb:
         return 2 * ball(amplitude) * _moved(slip, plant.rate, interval + shortened(delay) + unseen)[1]
 
     reach = plant.reach or _IMPOSSIBILITY_ZERO
@@ -481,7 +481,7 @@ def _surprise(
     return best
 
 
-def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[Any, Any]:
+def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[arb, arb]:
     """Slip and slip rate from rest after a unit acceleration for some time."""
     flow = arb_mat([[arb(0), arb(1), arb(0)], [ball(slip), -ball(rate), arb(1)], [arb(0), arb(0), arb(0)]])
     moved = (flow * ball(time)).exp()
@@ -494,6 +494,6 @@ def _require(holds: bool, what: str, *values: Fraction) -> None:
         raise ParameterError(f"a performance limit needs {what}. Received {received}.")
 
 
-def _at_least_one(value: Any) -> Any:
+def _at_least_one(value: arb) -> arb:
     """Larger of the upper end of a ball and 1."""
     return value.upper().max(arb(1))

@@ -12,7 +12,6 @@ from fractions import Fraction
 from functools import cached_property, lru_cache, reduce
 from itertools import accumulate, chain, pairwise
 from operator import add, mul
-from typing import Any
 
 from flint import arb, arb_mat, ctx, fmpq
 
@@ -24,32 +23,32 @@ from quakedesign.loop import Fading, PeriodicLoop, Pulse, Segment
 # Matrices of balls: rationals go in, upper bounds come out.
 
 
-def ball(value: Fraction) -> Any:
+def ball(value: Fraction) -> arb:
     """Ball of a rational."""
     return arb(fmpq(value.numerator, value.denominator))
 
 
-def matrix(rows: tuple[tuple[Fraction, ...], ...]) -> Any:
+def matrix(rows: tuple[tuple[Fraction, ...], ...]) -> arb_mat:
     """Ball matrix of rational rows."""
     return arb_mat([[ball(v) for v in row] for row in rows])
 
 
-def column(values: tuple[Fraction, ...]) -> Any:
+def column(values: tuple[Fraction, ...]) -> arb_mat:
     """Ball matrix of one rational column."""
     return arb_mat([[ball(v)] for v in values])
 
 
-def identity(size: int) -> Any:
+def identity(size: int) -> arb_mat:
     """Identity matrix."""
     return arb_mat(size, size, [int(i == j) for i in range(size) for j in range(size)])
 
 
-def beside(parts: list[Any]) -> Any:
+def beside(parts: list[arb_mat]) -> arb_mat:
     """Matrices side by side."""
     return arb_mat([list(chain(*rows)) for rows in zip(*(part.tolist() for part in parts), strict=True)])
 
 
-def majorant(flow: Any) -> Any:
+def majorant(flow: arb_mat) -> arb_mat:
     """M with |e^{Aδ}| ≤ e^{Mh} for 0 ≤ δ ≤ h: |A| off the diagonal, max(A, 0) on it."""
     table = [[v.abs_upper() for v in row] for row in flow.tolist()]
     for i in range(len(table)):
@@ -57,49 +56,49 @@ def majorant(flow: Any) -> Any:
     return arb_mat(table)
 
 
-def absolute(matrix: Any) -> Any:
+def absolute(matrix: arb_mat) -> arb_mat:
     """Exact upper bounds of the absolute values of all entries."""
     return arb_mat([[v.abs_upper() for v in row] for row in matrix.tolist()])
 
 
-def upper(value: Any) -> Fraction:
+def upper(value: arb) -> Fraction:
     """A rational that is not below a ball."""
     return end_of(value.upper())
 
 
-def above(parts: list[Any]) -> Any:
+def above(parts: list[arb_mat]) -> arb_mat:
     """Matrices stacked vertically."""
     return arb_mat([row for part in parts for row in part.tolist()])
 
 
-def modulus(matrix: Any) -> Any:
+def modulus(matrix: arb_mat) -> arb_mat:
     """Absolute values, as balls."""
     return arb_mat([[abs(v) for v in row] for row in matrix.tolist()])
 
 
-def larger(one: Any, other: Any) -> Any:
+def larger(one: arb_mat, other: arb_mat) -> arb_mat:
     """Entrywise maximum of two matrices."""
     return arb_mat(one.nrows(), one.ncols(), [*map(arb.max, one.entries(), other.entries())])
 
 
-def row_sums(matrix: Any) -> Any:
+def row_sums(matrix: arb_mat) -> arb_mat:
     """Sums of the absolute values of every row, in a column."""
     return arb_mat([[sum(map(abs, row), arb(0))] for row in matrix.tolist()])
 
 
-def scaled(matrix: Any, weights: Iterable[Any]) -> Any:
+def scaled(matrix: arb_mat, weights: Iterable[arb]) -> arb_mat:
     """Matrix with its columns scaled by numbers."""
     return arb_mat([[*map(mul, row, weights)] for row in matrix.tolist()])
 
 
-def grouped(matrix: Any, weights: list[Any]) -> Any:
+def grouped(matrix: arb_mat, weights: list[arb]) -> arb_mat:
     """Weighted sums of groups of columns, as many as there are weights."""
     rows, count = matrix.tolist(), len(weights)
     groups = [[row[i : i + count] for i in range(0, len(row), count)] for row in rows]
     return arb_mat([[sum(map(mul, group, weights), arb(0)) for group in line] for line in groups])
 
 
-def not_above(one: Any, other: Any) -> bool:
+def not_above(one: arb_mat, other: arb_mat) -> bool:
     """Whether no entry of `one` exceeds that of `other`, whose entries are bounds ≥ 0."""
     return all(a == 0 or a <= b for a, b in zip(one.entries(), other.entries(), strict=True))
 
@@ -109,8 +108,8 @@ class SlowestMode:
     """Estimated slowest mode of a loop: both eigenvectors, and the sum of its remainder after 2^doublings periods."""
 
     doublings: int
-    seen: Any
-    along: Any
+    seen: arb_mat
+    along: arb_mat
     left: float
 
 
@@ -118,27 +117,28 @@ class SlowestMode:
 class Arithmetic:
     """Number and matrix types of an algorithm: by default balls, for proofs; others for estimates.
 
-    In both, `*` is the product of matrices, and matrices have the methods `exp`, `nrows` and `ncols` of `arb_mat`. An
-    estimate omits remainders and uses a given slowest mode of the map Ψ of one period.
+    In both, `*` is the product of matrices, and matrices have the methods `exp`, `nrows` and `ncols` of `arb_mat`. The
+    declared types are those of balls. An estimate omits remainders and uses a given slowest mode of the map Ψ of one
+    period.
     """
 
-    slowest: Callable[[Any], SlowestMode] | None = None
-    number: Callable[[Fraction], Any] = ball
-    matrix: Callable[[tuple[tuple[Fraction, ...], ...]], Any] = matrix
-    column: Callable[[tuple[Fraction, ...]], Any] = column
-    identity: Callable[[int], Any] = identity
-    pieces: Callable[[Segment, bool], tuple[Any, ...]] = lambda segment, past: segment.pieces(past=past)
-    beside: Callable[[list[Any]], Any] = beside
-    above: Callable[[list[Any]], Any] = above
-    part: Callable[[Any, int, int], Any] = lambda whole, first, end: arb_mat(whole.tolist()[first:end])  # rows
-    majorant: Callable[[Any], Any] = majorant
-    absolute: Callable[[Any], Any] = absolute
-    modulus: Callable[[Any], Any] = modulus
-    larger: Callable[[Any, Any], Any] = larger
-    scaled: Callable[[Any, Any], Any] = scaled
-    sums: Callable[[Any], Any] = row_sums
-    grouped: Callable[[Any, list[Any]], Any] = grouped
-    highest: Callable[[Any], Any] = lambda whole: arb_mat([[reduce(arb.max, row)] for row in whole.tolist()])
+    slowest: Callable[[arb_mat], SlowestMode] | None = None
+    number: Callable[[Fraction], arb] = ball
+    matrix: Callable[[tuple[tuple[Fraction, ...], ...]], arb_mat] = matrix
+    column: Callable[[tuple[Fraction, ...]], arb_mat] = column
+    identity: Callable[[int], arb_mat] = identity
+    pieces: Callable[[Segment, bool], tuple[Fraction, ...]] = lambda segment, past: segment.pieces(past=past)
+    beside: Callable[[list[arb_mat]], arb_mat] = beside
+    above: Callable[[list[arb_mat]], arb_mat] = above
+    part: Callable[[arb_mat, int, int], arb_mat] = lambda whole, first, end: arb_mat(whole.tolist()[first:end])  # rows
+    majorant: Callable[[arb_mat], arb_mat] = majorant
+    absolute: Callable[[arb_mat], arb_mat] = absolute
+    modulus: Callable[[arb_mat], arb_mat] = modulus
+    larger: Callable[[arb_mat, arb_mat], arb_mat] = larger
+    scaled: Callable[[arb_mat, Iterable[arb]], arb_mat] = scaled
+    sums: Callable[[arb_mat], arb_mat] = row_sums
+    grouped: Callable[[arb_mat, list[arb]], arb_mat] = grouped
+    highest: Callable[[arb_mat], arb_mat] = lambda whole: arb_mat([[reduce(arb.max, row)] for row in whole.tolist()])
 
     @property
     def proves(self) -> bool:
@@ -195,7 +195,7 @@ def flow_norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, .
         }
 
 
-def _sums(flow: Any, rows: Any, state: Any) -> tuple[Any, Any]:
+def _sums(flow: arb_mat, rows: arb_mat, state: arb_mat) -> tuple[arb_mat, arb_mat]:
     """Bounds of the integrals up to T for every column of `state`, which begins with the unit columns; e^{AT}·state."""
     size, square, sums = flow.nrows(), flow * flow, arb_mat(rows.nrows(), state.ncols())
     largest = max(sum(row, arb(0)).abs_upper() for row in absolute(flow).tolist())
@@ -224,14 +224,14 @@ def _sums(flow: Any, rows: Any, state: Any) -> tuple[Any, Any]:
     )
 
 
-def _columns(whole: Any, first: int, end: int) -> Any:
+def _columns(whole: arb_mat, first: int, end: int) -> arb_mat:
     return arb_mat([row[first:end] for row in whole.tolist()])
 
 
 # ----------------------------------------------------------------------
 # Responses to an input bounded by 1 over one segment of a periodic loop; for the proof see `norms`.
 
-Weights = tuple[tuple[Any, Any], ...]
+Weights = tuple[tuple[arb, arb], ...]
 _ZERO = Fraction(0)
 
 
@@ -240,46 +240,46 @@ class _SegmentFlow:
     """One segment: A, J, and h and e^{Ah} for every piece."""
 
     by: Arithmetic
-    flow: Any
-    jump: Any
+    flow: arb_mat
+    jump: arb_mat
     lengths: tuple[Fraction, ...]
-    pieces: tuple[Any, ...]
-    steps: tuple[Any, ...]
+    pieces: tuple[arb, ...]
+    steps: tuple[arb_mat, ...]
 
     @classmethod
-    def of(cls, by: Arithmetic, flow: Any, segment: Segment, *, past: bool) -> "_SegmentFlow":
+    def of(cls, by: Arithmetic, flow: arb_mat, segment: Segment, *, past: bool) -> "_SegmentFlow":
         """Segment with its pieces for outputs or for past inputs."""
         lengths = by.pieces(segment, past)
         parts = {h: (by.number(h), (flow * by.number(h)).exp()) for h in set(lengths)}
         return cls(by, flow, by.matrix(segment.jump), lengths, *zip(*(parts[h] for h in lengths), strict=True))
 
     @cached_property
-    def within(self) -> list[Any]:
+    def within(self) -> list[arb_mat]:
         """Upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h, of every piece: e^{Mh} with M = |A|, but max(A, 0) on the diagonal."""
         bounds = {h: absolute((majorant(self.flow) * ball(h)).exp()) for h in set(self.lengths)}
         return [bounds[h] for h in self.lengths]
 
     @cached_property
-    def whole(self) -> Any:
+    def whole(self) -> arb_mat:
         """e^{Aτ}J."""
         return reduce(lambda now, step: step * now, self.steps, self.jump)
 
     @cached_property
-    def square(self) -> Any:
+    def square(self) -> arb_mat:
         """A²."""
         return self.flow * self.flow
 
     @cached_property
-    def widths(self) -> list[Any]:
+    def widths(self) -> list[arb]:
         """Weights of a trapezoidal sum."""
         none = self.by.number(_ZERO)
         return [(a + b) / 2 for a, b in pairwise((none, *self.pieces, none))]
 
-    def chord(self, number: int) -> Any:
+    def chord(self, number: int) -> arb:
         """h²/8 of a piece."""
         return self.pieces[number] ** 2 / 8
 
-    def phases(self, rows: Any) -> list[Any]:
+    def phases(self, rows: arb_mat) -> list[arb_mat]:
         """Rows times e^{Aσ} at the ends of the pieces."""
         return list(accumulate(self.steps, mul, initial=rows))
 
@@ -289,49 +289,50 @@ class _Response(ABC):
     """Response to an input that enters with b over one segment."""
 
     of: _SegmentFlow
-    entry: Any
+    entry: arb_mat
 
     @cached_property
-    def ends(self) -> list[Any]:
+    def ends(self) -> list[arb_mat]:
         """e^{Aσ}b at the ends of the pieces."""
         return list(accumulate(self.of.steps, lambda now, step: step * now, initial=self.entry))
 
-    def slope(self, start: Any, piece: int) -> Any:
+    def slope(self, start: arb_mat, piece: int) -> arb_mat:
         """Upper bound of |Ae^{Aσ}x| over a piece that starts with x."""
         return self.of.within[piece] * absolute(self.of.flow * start)
 
-    def curvature(self, start: Any, piece: int) -> Any:
+    def curvature(self, start: arb_mat, piece: int) -> arb_mat:
         """Upper bound of |A²e^{Aσ}x|."""
         return self.of.within[piece] * absolute(self.of.square * start)
 
     @abstractmethod
-    def columns(self, later: Any) -> Any:
+    def columns(self, later: arb_mat) -> arb_mat:
         """Response at the end of the segment, mapped by `later`: columns whose absolute values are added.
 
         The remainder is in `rest`.
         """
 
     @abstractmethod
-    def rest(self, later: Any) -> Any:
+    def rest(self, later: arb_mat) -> arb_mat:
         """Bounds of the entries of the remainder."""
 
     @abstractmethod
-    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+    def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
         """Sums of output rows since the jump at both ends of every piece, and the remainder to add to the larger."""
 
 
 class _Flowing(_Response):
     """Response to an input that is bounded by 1 at every time."""
 
-    def columns(self, later: Any) -> Any:
+    def columns(self, later: arb_mat) -> arb_mat:
         return self.of.by.scaled(later * self.of.by.beside(self.ends), self.of.widths)
 
-    def rest(self, later: Any) -> Any:
+    def rest(self, later: arb_mat) -> arb_mat:
         bends = (self.curvature(self.ends[i], i) * (h**3 / 12) for i, h in enumerate(self.of.pieces))
         return absolute(absolute(later) * reduce(add, bends))
 
-    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
-        by, area, more = self.of.by, rows * (self.entry * 0), None
+    def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
+        by = self.of.by
+        area = more = rows * (self.entry * 0)
         heights = [by.modulus(rows * now) for now in self.ends]
         for i, (h, (a, b)) in enumerate(zip(self.of.pieces, pairwise(heights), strict=True)):
             before, area = area, area + (a + b) * (h / 2)
@@ -344,14 +345,14 @@ class _Flowing(_Response):
 class _Sudden(_Response):
     """Response to an input that enters with the jump alone."""
 
-    def columns(self, later: Any) -> Any:
+    def columns(self, later: arb_mat) -> arb_mat:
         return later * self.ends[-1]
 
-    def rest(self, later: Any) -> Any:
+    def rest(self, later: arb_mat) -> arb_mat:
         return later * self.entry * 0
 
-    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
-        by, more = self.of.by, None
+    def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
+        by, more = self.of.by, rows * (self.entry * 0)
         for i, (a, b) in enumerate(pairwise(by.modulus(rows * now) for now in self.ends)):
             if by.proves:
                 more = absolute(rows) * self.curvature(self.ends[i], i) * self.of.chord(i)
@@ -364,19 +365,19 @@ class _Faded(_Response):
 
     weights: Weights
 
-    def _from(self, start: int) -> list[Any]:
+    def _from(self, start: int) -> list[arb_mat]:
         """b at the start of a piece, then e^{Aσ}b at the ends of that piece and of all later ones."""
         return list(accumulate(self.of.steps[start:], lambda now, step: step * now, initial=self.entry))
 
-    def columns(self, later: Any) -> Any:
+    def columns(self, later: arb_mat) -> arb_mat:
         return beside([later * self._from(i)[-1] * mass for i, (mass, _) in enumerate(self.weights)])
 
-    def rest(self, later: Any) -> Any:
+    def rest(self, later: arb_mat) -> arb_mat:
         """Bounds by slopes, at the end of the segment, of responses to inputs within a piece."""
         moved = (self.slope(self._from(i + 1)[-1], i) * moment for i, (_, moment) in enumerate(self.weights))
         return absolute(absolute(later) * reduce(add, moved))
 
-    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+    def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
         size = absolute(rows)
         for i, (mass, _) in enumerate(self.weights):
             first, last = (modulus(rows * now) for now in (self.entry, self.of.steps[i] * self.entry))
@@ -390,7 +391,7 @@ class _Faded(_Response):
                 more = more + (self._bend(size, now, i) * passed + size * slopes * moment)
             yield start, end, more
 
-    def _bend(self, size: Any, start: Any, piece: int) -> Any:
+    def _bend(self, size: arb_mat, start: arb_mat, piece: int) -> arb_mat:
         return size * self.curvature(start, piece) * self.of.chord(piece)
 
 
@@ -407,13 +408,13 @@ class _Pulsed(_Response):
     ahead: bool
 
     @cached_property
-    def _sides(self) -> tuple[Any, Any]:
+    def _sides(self) -> tuple[arb_mat, arb_mat]:
         """States after the jump for the parts of the pulse before and after it."""
         number = self.of.by.number
         return self.of.jump * self.entry * number(self.pulse.before), self.entry * number(self.pulse.after)
 
     @cached_property
-    def _off(self) -> tuple[Any, Any]:
+    def _off(self) -> tuple[arb_mat, arb_mat]:
         """Bounds of the errors of these states."""
         pulse, flow = self.pulse, self.of.flow
         moved, early, late = flow * self.entry, self._within(pulse.early), self._within(pulse.late)
@@ -421,23 +422,23 @@ class _Pulsed(_Response):
         back = absolute((flow * ball(-pulse.late)).exp() * moved)
         return shifted, late * back * ball(pulse.after * pulse.late)
 
-    def _within(self, time: Fraction) -> Any:
+    def _within(self, time: Fraction) -> arb_mat:
         """Upper bound of |e^{Aσ}|, 0 ≤ σ ≤ time."""
         return absolute((majorant(self.of.flow) * ball(time)).exp())
 
-    def columns(self, later: Any) -> Any:
+    def columns(self, later: arb_mat) -> arb_mat:
         if not self.here:
             return later * (self.entry * 0)
         (before, after), whole = self._sides, self._whole(later)
         return self.of.by.beside([whole * (before + after) / 2, whole * (before - after) / 2])
 
-    def _whole(self, later: Any) -> Any:
+    def _whole(self, later: arb_mat) -> arb_mat:
         return later * reduce(lambda now, step: step * now, self.of.steps)
 
-    def rest(self, later: Any) -> Any:
+    def rest(self, later: arb_mat) -> arb_mat:
         return absolute(absolute(self._whole(later)) * larger(*self._off) if self.here else self.entry * 0)
 
-    def since_jump(self, rows: Any) -> Iterator[tuple[Any, Any, Any]]:
+    def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
         by, phases, none = self.of.by, self.of.phases(rows), rows * (self.entry * 0)
         soon = self._ahead(rows) if by.proves and self.ahead else none
         for i in range(len(self.of.lengths)):
@@ -451,7 +452,7 @@ class _Pulsed(_Response):
             left = sum(self.of.lengths[i + 1 :], _ZERO)
             yield start, end, more + soon if left < self.pulse.early else more
 
-    def _ahead(self, rows: Any) -> Any:
+    def _ahead(self, rows: arb_mat) -> arb_mat:
         """Outputs for the part of the pulse before the jump that ends the segment, while it lasts."""
         moved = self._within(self.pulse.early) * absolute(self.of.flow * self.entry)
         height = modulus(rows * self.entry) + absolute(rows) * moved * ball(self.pulse.early)
@@ -493,7 +494,7 @@ def _weights(flows: list[_SegmentFlow], fading: Fading) -> list[Weights]:
     return weights
 
 
-def _weight(fading: Fading, start: Fraction, length: Fraction) -> tuple[Any, Any]:
+def _weight(fading: Fading, start: Fraction, length: Fraction) -> tuple[arb, arb]:
     x = fading.rate * start
     height = fading.height / (1 + x + x**2 / 2 + x**3 / 6 + x**4 / 24)
     mass = height * min(1 / fading.rate, length) + fading.floor * length
@@ -507,7 +508,7 @@ def _weight(fading: Fading, start: Fraction, length: Fraction) -> tuple[Any, Any
 MOST_DOUBLINGS = 12
 
 
-def slowest(flows: list[_SegmentFlow]) -> list[Any]:
+def slowest(flows: list[_SegmentFlow]) -> list[arb]:
     """Row that isolates the slowest mode, if there is one: a row of the map of 2^12 periods.
 
     It is the row with the largest diagonal entry. These entries do not depend on the units of the states, so a checker
@@ -535,28 +536,28 @@ def slowest(flows: list[_SegmentFlow]) -> list[Any]:
 class _Periods:
     """Ψ of a loop, its powers, and bounds of the states after 2^j periods; each is computed once."""
 
-    def __init__(self, flows: list[_SegmentFlow], period: Any = None) -> None:
+    def __init__(self, flows: list[_SegmentFlow], period: arb_mat | None = None) -> None:
         self.by, self.size = flows[0].by, flows[0].jump.nrows()
         self.later = list(accumulate((flow.whole for flow in flows[:0:-1]), mul, initial=self.by.identity(self.size)))
         self.powers = [self.later[-1] * flows[0].whole if period is None else period]
         self.mode = self.by.slowest(self.powers[0]) if self.by.slowest else None
         self.slow = slowest(flows) if self.by.proves else []
-        self._seen: dict[int, tuple[Any, Any]] = {}
-        self._left: dict[tuple[int, int], tuple[Any, Any]] = {}
+        self._seen: dict[int, tuple[arb_mat, arb_mat]] = {}
+        self._left: dict[tuple[int, int], tuple[arb_mat, arb_mat]] = {}
 
-    def power(self, number: int) -> Any:
+    def power(self, number: int) -> arb_mat:
         """Ψ^{2^number}."""
         while len(self.powers) <= number:
             self.powers.append(self.powers[-1] * self.powers[-1])
         return self.powers[number]
 
-    def followed(self, columns: Any, doublings: int) -> Any:
+    def followed(self, columns: arb_mat, doublings: int) -> arb_mat:
         """Columns times Ψᵏ, for 2^doublings periods."""
         for number in range(doublings):
             columns = self.by.beside([columns, self.power(number) * columns])
         return columns
 
-    def seen_alone(self, sums: Any) -> tuple[int, Any]:
+    def seen_alone(self, sums: arb_mat) -> tuple[int, arb_mat]:
         """Index of the dominant state, whose row of W isolates the slowest mode, and W of `norms`."""
         sizes = [(abs(v) * size).mid() for v, size in zip(self.slow, sums.entries(), strict=True)]
         place = sizes.index(max(sizes))
@@ -569,7 +570,7 @@ class _Periods:
             self._seen[place] = seen, back
         return place, self._seen[place][0]
 
-    def left(self, number: int, place: int) -> tuple[Any, Any]:
+    def left(self, number: int, place: int) -> tuple[arb_mat, arb_mat]:
         """Ψ^KW⁻¹ and D, K = 2^number."""
         if (number, place) not in self._left:
             seen, back = self._seen[place]
@@ -603,7 +604,7 @@ def unstable() -> ParameterError:
 #   `norms`: the isolated slowest mode only has to decrease. All entries of m are raised by 2⁻⁶⁰ of its largest entry,
 #   so that none is 0. ∎
 
-Group = tuple[Any, list[Any]]
+Group = tuple[arb_mat, list[arb]]
 
 START = "start"
 _FREE_BITS = 128
@@ -624,12 +625,12 @@ def free_peaks(loop: PeriodicLoop) -> Mapping[str, tuple[Fraction, ...]]:
         return dict(zip(loop.outputs, _upper_rows(LoopResponses(BALLS, loop).free()), strict=True))
 
 
-def _upper_rows(columns: list[Any]) -> list[tuple[Fraction, ...]]:
+def _upper_rows(columns: list[arb_mat]) -> list[tuple[Fraction, ...]]:
     """Rational bounds of the rows of columns side by side."""
     return [tuple(map(upper, row)) for row in beside(columns).tolist()]
 
 
-def _followed(periods: _Periods, start: Any) -> list[Group]:
+def _followed(periods: _Periods, start: arb_mat) -> list[Group]:
     """ΨᵏX for all k < K, and ΨᴷW⁻¹ with m; K is so large that almost only the slowest mode is left."""
     columns, even = start, [periods.by.number(Fraction(1))] * start.ncols()
     if periods.mode:
@@ -646,11 +647,11 @@ def _followed(periods: _Periods, start: Any) -> list[Group]:
     raise unstable()
 
 
-def _peaks(columns: Any, weights: list[Any]) -> Any:
+def _peaks(columns: arb_mat, weights: list[arb]) -> arb_mat:
     return absolute(BALLS.highest(grouped(absolute(columns), weights)))
 
 
-def _but(column: Any, place: int) -> Any:
+def _but(column: arb_mat, place: int) -> arb_mat:
     """A column with 0 in one place."""
     copied = column * 1
     copied[place, 0] = 0
@@ -743,14 +744,14 @@ class LoopResponses:
         self.places = sum(count * (len(part.lengths) + 1) + size for part in self.flows)
 
     @cached_property
-    def _seen(self) -> list[tuple[list[Any], list[Any]]]:
+    def _seen(self) -> list[tuple[list[arb_mat], list[arb_mat]]]:
         """Output rows mapped back to the start of each segment and of all earlier ones.
 
         In a proof, also bounds of their second derivatives.
         """
         by, all_rows = self.by, []
         for number, flow in enumerate(self.flows):
-            phases, bends = flow.phases(self.rows), list[Any]()
+            phases, bends = flow.phases(self.rows), list[arb_mat]()
             rows = by.above([*phases, by.identity(self.periods.size)] if by.proves else phases) * flow.jump
             if by.proves:
                 pieces = zip(phases, flow.within, strict=False)
@@ -759,14 +760,14 @@ class LoopResponses:
             all_rows.append((list(accumulate(before, mul, initial=rows)), bends))
         return all_rows
 
-    def sums(self, name: str) -> Iterator[list[tuple[Any, Any, tuple[Any, ...]]]]:
+    def sums(self, name: str) -> Iterator[list[tuple[arb_mat, arb_mat, tuple[arb_mat, ...]]]]:
         """Sums of an input for every output at both ends of every piece of every segment, and remainders."""
         by, count, size = self.by, self.rows.nrows(), self.periods.size
         parts = responses(self.loop, self.flows, name)
         earlier = parts if self.earlier is self.flows else responses(self.loop, self.earlier, name)
         past = _Past.of(earlier, self.periods, self.places)
         for number, (part, (rows, bends)) in enumerate(zip(parts, self._seen, strict=True)):
-            before, result = past.of_rows(rows, number), list[tuple[Any, Any, tuple[Any, ...]]]()
+            before, result = past.of_rows(rows, number), list[tuple[arb_mat, arb_mat, tuple[arb_mat, ...]]]()
             pieces = len(part.of.lengths)
             ends = [by.part(before, i * count, (i + 1) * count) for i in range(pieces + 1)]
             units = by.part(before, before.nrows() - size, before.nrows())
@@ -775,7 +776,7 @@ class LoopResponses:
                 result.append((ends[i] + start, ends[i + 1] + end, rest))
             yield result
 
-    def free(self) -> list[Any]:
+    def free(self) -> list[arb_mat]:
         """Largest outputs of the free response from the box: in a proof on every piece, else at all ends of pieces."""
         by, peaks = self.by, []
         period = reduce(lambda now, flow: flow.whole * now, self.flows, by.identity(self.periods.size))
@@ -802,9 +803,9 @@ class _Past:
     """Inputs before the first jump of a period: columns of K periods, and bounds of all earlier ones."""
 
     parts: list[_Response]
-    columns: Any
-    far: Any
-    bound: Any
+    columns: arb_mat
+    far: arb_mat
+    bound: arb_mat
 
     @classmethod
     def of(cls, parts: list[_Response], periods: _Periods, rows: int) -> "_Past":
@@ -831,7 +832,7 @@ class _Past:
                 return cls(parts, columns, far, _whole(left, sums))
         raise unstable()
 
-    def of_rows(self, rows: list[Any], segment: int) -> Any:
+    def of_rows(self, rows: list[arb_mat], segment: int) -> arb_mat:
         """N of rows just before a segment: inputs earlier in this period, and those of all earlier periods.
 
         `rows` are these rows, mapped back to the start of this segment, then of each earlier one in turn.
@@ -845,7 +846,7 @@ class _Past:
         return sums
 
 
-def _whole(left: Any, sums: Any) -> Any:
+def _whole(left: arb_mat, sums: arb_mat) -> arb_mat:
     """Some x with y + Dx ≤ x.
 
     Raises
@@ -862,7 +863,7 @@ def _whole(left: Any, sums: Any) -> Any:
     return solution
 
 
-def _diagonal(column: Any) -> Any:
+def _diagonal(column: arb_mat) -> arb_mat:
     """One column for every nonzero entry."""
     nonzero = [i for i, v in enumerate(column.entries()) if not v.is_zero()]
     return arb_mat([[column[i, 0] if i == j else arb(0) for j in nonzero] for i in range(column.nrows())])

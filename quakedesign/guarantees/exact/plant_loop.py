@@ -10,7 +10,6 @@ from fractions import Fraction
 from functools import reduce
 from itertools import accumulate, pairwise
 from operator import add, mul
-from typing import Any
 
 from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 
@@ -293,7 +292,7 @@ class _AllResponses:
             inputs=tuple(inputs[kind] for kind in self.kind), sampled=tuple(inputs[self.kinds :]), start=start
         )
 
-    def _own(self, s: int, later: Any) -> tuple[list[Any], list[Any]]:
+    def _own(self, s: int, later: arb_mat) -> tuple[list[arb_mat], list[arb_mat]]:
         """Columns and remainder of every input of the flow over one segment, at the end of the period."""
         h, columns, rests = self.lengths[s], [], []
         for entry in self.entries:
@@ -303,7 +302,9 @@ class _AllResponses:
             rests.append(absolute(later) * (reduce(add, bends) * (h**3 / 12)))
         return columns, rests
 
-    def _all_periods(self, rows: Any, period: Any, own: list[Any], left: list[Any]) -> tuple[list[Any], Any]:
+    def _all_periods(
+        self, rows: arb_mat, period: arb_mat, own: list[arb_mat], left: list[arb_mat]
+    ) -> tuple[list[arb_mat], arb_mat]:
         """Sums over all periods of every row for every input, and the largest free response of every row."""
         size, start = self.size, [column(entry) for entry in self.loop.start]
         columns = beside([*own, identity(size), *start])
@@ -345,7 +346,7 @@ class _AllResponses:
             free = absolute(larger(free, beyond * most))
         return totals, free
 
-    def _peaks(self, s: int, i: int, before: Any) -> Row:
+    def _peaks(self, s: int, i: int, before: arb_mat) -> Row:
         """Bounds of all rows in a segment for input `i`, of which the last stands for the initial states.
 
         `before` is the contribution of all earlier times.
@@ -372,19 +373,19 @@ class _AllResponses:
         return tuple(map(upper, (reduce(larger, ends) + bent * h**2 / 8).entries()))
 
 
-def _total(sums: Any, i: int, count: int, rest: Any) -> Any:
+def _total(sums: arb_mat, i: int, count: int, rest: arb_mat) -> arb_mat:
     """Sums for an input plus its remainders, which the sums for unit columns bound."""
     used = [(count + j, v) for j, v in enumerate(rest.entries()) if not v.is_zero()]
     return arb_mat([[line[i] + sum((line[j] * v for j, v in used), arb(0))] for line in sums.tolist()])
 
 
-def _raised(part: Any) -> Any:
+def _raised(part: arb_mat) -> arb_mat:
     """Slightly larger bounds, none of which is 0."""
     faint = reduce(arb.max, part.entries()) * ball(_FAINT)
     return arb_mat([[(v + faint).abs_upper()] for v in part.entries()])
 
 
-def _require_fading(leap: Any, work: int) -> None:
+def _require_fading(leap: arb_mat, work: int) -> None:
     """Reject a map of several periods if none of its powers within the work limit is small."""
     power, periods = leap, _AT_ONCE
     while not all(v < 1 for v in absolute(power).entries()):

@@ -17,12 +17,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from msgspec import Meta
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds, response_bounds
 from quakedesign.guarantees.exact.proof import NoProof, Proof
 from quakedesign.lyapunov.exact.certificate_files import UNCERTAIN_PLANT
@@ -135,7 +136,7 @@ class PlantProof(Proof[Row]):
         text += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
         return f"{text}, for all t >= 0: {', '.join(self._peaks())}"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts."""
         return {
             "peaks": {name: bound.exact for name, bound in self.bounds.items()},
@@ -255,7 +256,7 @@ class PlantFile(Entries):
     claims: dict[str, UpperBound]
 
 
-def plant_entries(claim: PlantProof) -> dict[str, Any]:
+def plant_entries(claim: PlantProof) -> Json:
     """Content of the file but its format and kind."""
     part, law = claim.part, claim.law
     disturbances = tuple(SizedEntry(entry=entry, size=size) for entry, size in part.disturbances)
@@ -273,7 +274,7 @@ def plant_entries(claim: PlantProof) -> dict[str, Any]:
     return dict(written(file))
 
 
-def read_plant_guarantee(raw: dict[str, Any]) -> PlantProof:
+def read_plant_guarantee(raw: Json) -> PlantProof:
     """Claim from a parsed file without its format and kind.
 
     Raises

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.files import Json
 from quakedesign.laws.implicit_root import ImplicitRoot
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -77,7 +78,7 @@ class Proof(ABC, Generic[B]):
         """Statement of the claims and of all that they depend on, as text."""
 
     @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact claims as texts, SI."""
 
     @property

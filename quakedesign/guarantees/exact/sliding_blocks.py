@@ -11,8 +11,9 @@ For |y| ≤ Y and |z| ≤ Z let f = γy and g = ηz, γ and η between the chord
 gives ranges of α and κ. The plant below has the sectors γα and η of z and γκ of w, valid for |z| ≤ Z and |w| ≤ W, and
 disturbances of size sup(γκ)·sup|ŝ|. These claims give Y = sup α·Z + sup κ·(W + sup|ŝ|).
 
-|ŝ| is at most the sum of the shear stress, the rounding error of μ* and the term of inertia, sup|r|/λ₀. In this r, |w′|
-≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇ replaces K|x′| + μ*|q′|, q̇ = 2Q/lag, Y the largest of all blocks. y, z, w and q
+|ŝ| is at most the sum of the shear stress, the rounding error of μ* and the term of inertia, sup|R|/λ₀, with R the κ of
+`sliding_small_gain`. In R, |w′| ≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇ replaces K|x′| + μ*|q′|, q̇ = 2Q/lag, Y the
+largest of all blocks. y, z, w and q
 are continuous and initially 0, and u is determined by samples before it acts. So if bounds below the claims Z, W and Q
 follow from these, no claim is ever reached. ∎
 """
@@ -52,7 +53,8 @@ class BlockClaims:
     pull : Fraction
         W: shear stress by springs and wells [Pa].
     push : Fraction
-        Q: commanded pressure at a well minus the plan [Pa]; the pressures in the blocks are means of its past.
+        Q: commanded pressure at a well minus the plan [Pa]; the pressures in the blocks are weighted means of its past
+        values.
     """
 
     log_state: Fraction
@@ -80,9 +82,9 @@ class SlidingBlocks:
     chain : BlockChain
         With one steady friction coefficient; identical blocks if there are fewer wells than blocks.
     lag : Fraction
-        [s].
+        Time constant of the lag of every well [s], positive.
     stress : Fraction
-        [Pa].
+        Bound of the shear stress on every block [Pa], positive.
     """
 
     chain: BlockChain
@@ -108,19 +110,19 @@ class SlidingBlocks:
             if task.state_law != "ageing" or task.regularised:
                 raise UnsupportedError(
                     "blocks in slow sliding need rate-and-state-aging friction. Received "
-                    f"{self.chain.blocks[place - 1].friction.name} in block {place}: for this law no guarantee of "
-                    "several blocks is known. limits accepts it; one block has a guarantee."
+                    f"{self.chain.blocks[place - 1].friction.name} in block {place}: no guarantee of several blocks "
+                    "with this friction is known. Use the command limits, or a fault of one block."
                 )
         if len({task.ranges["coefficient"] for task in self.tasks}) > 1:
             raise UnsupportedError(
                 "blocks in slow sliding need one steady friction coefficient at the rate of the task, so that all need "
-                "the same pressure. Received different ones. Change reference_coefficient of the blocks."
+                "the same pressure. Received different coefficients. Change reference_coefficient of the blocks."
             )
         require_independent(self.chain.shares)
         if m < N and not self.chain.alike:
             raise UnsupportedError(
-                f"fewer wells than blocks in slow sliding need blocks that are alike. Received {counted(m, 'well')} "
-                f"and {N} blocks that differ. Add wells."
+                "blocks in slow sliding must be identical if there are fewer wells than blocks. Received "
+                f"{counted(m, 'well')} and {N} blocks that differ. Add wells."
             )
 
     @cached_property
@@ -244,10 +246,10 @@ class SlidingBlocks:
             | {f"pressure {k + 1}": "MPa" for k in range(m)},
             name=name,
             remarks={
-                "plant": f"of {name}, in slow sliding with constants as they are, from steady sliding, behind a lag of "
-                f"{shortly(self.lag)} s that the plan of the reference does not have",
-                "disturbances": f"slip rates over V by {LowerBound(self.stress).quantity('Pa', 4)} of shear stress and "
-                f"up to {more.quantity('Pa')} of inertia and rounding",
+                "plant": f"of {name}, in slow sliding with all constants as given, from steady sliding, with a lag of "
+                f"{shortly(self.lag)} s at the wells that the planned pressure does not include",
+                "disturbances": f"ratios of slip rate to V due to {LowerBound(self.stress).quantity('Pa', 4)} of shear "
+                f"stress and up to {more.quantity('Pa')} of inertia and rounding",
             },
         )
 

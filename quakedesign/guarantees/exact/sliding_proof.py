@@ -4,10 +4,11 @@ from collections.abc import Mapping
 from dataclasses import fields
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.proof import NoProof, Proof
 from quakedesign.guarantees.exact.sampled_loop import SampledLoop
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, cell_bounds, exponential, follows
@@ -53,7 +54,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
 
     @property
     def lasts(self) -> str:
-        """Short statement of the time range."""
+        """Short statement of the slip range of the claims."""
         return f"during the {LowerBound(self.task.distance):.4g} m of slip of the task"
 
     def __repr__(self) -> str:
@@ -85,7 +86,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
 
     @property
     def peak_slip_rate(self) -> UpperBound:
-        """Ve^Y [m/s] from above."""
+        """Upper bound of V·e^Y [m/s], with the claimed bound Y of |ln(v/V)|."""
         return UpperBound(self.task.rate * exponential(self.claims.log_rate))
 
     @property
@@ -95,14 +96,14 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
 
     @property
     def valve_pressures(self) -> tuple[LowerBound, UpperBound]:
-        """Least and largest pressure at the valve, with the planned pressure [Pa]."""
+        """Least and largest pressure at the valve, including the planned pressure [Pa]."""
         return self._within(self.claims.asked)
 
     def _within(self, size: UpperBound) -> tuple[LowerBound, UpperBound]:
         """Range of p* along the reference, widened by a size [Pa] on both sides."""
         return LowerBound(-size), UpperBound(self.task.pressure_per_slip * self.task.distance + size)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts, SI."""
         claims, (low, high), (least, largest) = self.claims, self.pressures, self.valve_pressures
         return {

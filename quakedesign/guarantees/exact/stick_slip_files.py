@@ -1,8 +1,8 @@
 """Files of proofs on the stick–slip plant (proofs/FORMAT.md)."""
 
 from fractions import Fraction
-from typing import Any
 
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.file_entries import Powers, TaskEntries, power_entries, powers, task_entries
 from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip, StickSlipClaims, StickSlipPolytope
@@ -34,14 +34,14 @@ class StickSlipFile(TaskEntries):
     claims: StickSlipClaims
 
 
-def stick_slip_entries(claim: StickSlipProof) -> dict[str, Any]:
+def stick_slip_entries(claim: StickSlipProof) -> Json:
     """Content of the file for a claim, without format and kind."""
     held, pull = claim.held, power_entries(claim.held.law.pull)
     loop = made(StickSlipLoopEntries, held, held.law, pull=pull or None, longest=held.longest_step)
     return dict(written(StickSlipFile(**task_entries(claim.task), loop=loop, set=claim.reach, claims=claim.claims)))
 
 
-def read_stick_slip(raw: dict[str, Any]) -> StickSlipProof:
+def read_stick_slip(raw: Json) -> StickSlipProof:
     """Claim from a parsed file without its format and kind.
 
     Raises

@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from quakedesign import laws
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import Bound, LowerBound, UpperBound
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.proof import NoProof, Proof
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.stick_slip_set import (
@@ -147,7 +148,7 @@ class StickSlipProof(Proof[StickSlipClaims]):
         """Whether the claims follow, and the task's disturbance includes the healing."""
         return self.claims.follow(bounds) and self.healing >= 0 and self.disturbance >= 0
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts, SI."""
         held = self.held
         return {

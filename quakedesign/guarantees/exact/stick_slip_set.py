@@ -82,6 +82,7 @@ from flint import arb, ctx, fmpq
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, shortly
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
 from quakedesign.guarantees.exact.small_gain import holds
 from quakedesign.guarantees.exact.tracking_proof import above
@@ -324,7 +325,7 @@ class StickSlipClaims:
             and self.largest_pressure >= proved.largest_pressure
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts, SI."""
         return {
             "slip_behind": self.slip_behind.exact,
@@ -339,9 +340,9 @@ class Numbers:
     """Number type: floats for a search, balls for a proof; arrays have the same operations."""
 
     number: Callable[[Fraction], Any]
-    exponential: Callable[[tuple[tuple[Fraction, ...], ...]], list[list[Any]]]
+    exponential: Callable[[tuple[tuple[Fraction, ...], ...]], list[list[arb]]]
     bent: Callable[[tuple[tuple[Fraction, ...], ...], Fraction], tuple[tuple[Any, Any], ...]]
-    array: Callable[[Any], np.ndarray]
+    array: Callable[[object], np.ndarray]
     middle: Callable[[np.ndarray], np.ndarray]
 
     def without(self, values: np.ndarray, flags: np.ndarray) -> np.ndarray:
@@ -349,8 +350,8 @@ class Numbers:
         return np.where(flags & (values < 0).astype(bool), self.number(_ZERO), values)
 
 
-def _ball_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]:
-    exponential: list[list[Any]] = matrix(rows).exp().tolist()
+def _ball_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[arb]]:
+    exponential: list[list[arb]] = matrix(rows).exp().tolist()
     return exponential
 
 
@@ -362,7 +363,7 @@ def curvature(flow: tuple[tuple[Fraction, ...], ...], step: Fraction) -> tuple[t
     return tuple((power[0, 1].upper(), power[1, 1].upper()) for power in powers)
 
 
-def _ball_array(values: Any) -> np.ndarray:
+def _ball_array(values: object) -> np.ndarray:
     table = np.array(values, dtype=object)
     return np.asarray(np.vectorize(lambda v: ball(v) if isinstance(v, Fraction) else arb(v), otypes=[object])(table))
 
@@ -378,7 +379,7 @@ def _exact(value: Any) -> fmpq:
     return fmpq(number.numerator, number.denominator)
 
 
-def _exact_array(values: Any) -> np.ndarray:
+def _exact_array(values: object) -> np.ndarray:
     return np.asarray(np.vectorize(_exact, otypes=[object])(np.array(values, dtype=object)))
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import Bound, LowerBound, UpperBound, six_digits
+from quakedesign.files import Json
 from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope, reached_bounds
 from quakedesign.guarantees.exact.proof import NoProof, Proof
@@ -103,7 +104,7 @@ class Claims:
             return (fault,)
         return fault, (self.least_asked, self.largest_asked)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts, SI."""
         return {
             "slip_error": self.slip_error.exact,
@@ -304,7 +305,7 @@ class TrackingProof(Proof[Bounds]):
             and self.claims.follow(self.task, bounds)
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact claims as texts, SI."""
         return self.claims.to_dict()
 
@@ -544,7 +545,7 @@ class ContinuousProof(Proof[Bounds]):
         """Whether the claims follow, and the fault stays closed."""
         return self.claims.follow(self.task, bounds)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact claims as texts, SI, and their assumptions."""
         kind = "amplitude" if self.task.change is None else "rate"
         return {"disturbance_class": kind, **self.claims.to_dict(), "premises": list(PREMISES)}

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, expm
@@ -194,9 +195,10 @@ class _Floats:
         `frame` bounds the entries of the state at a sample.
         """
         largest = np.abs(self.lift) @ frame + bounds @ np.abs(self.sampled)
+        between: Any = self.between  # typed for balls
         places = [
             (now @ self.lift, area[:, 0] + np.abs(now @ self.sampled.T) @ bounds, more[:, 0])
-            for now, area, more in self.between.along(floats(rows), ends, first, floats(largest[:, None]), bounds)
+            for now, area, more in between.along(floats(rows), ends, first, floats(largest[:, None]), bounds)
         ]
         along, added, bends = (np.array(part).swapaxes(0, 1) for part in zip(*places, strict=True))
         return along, added, bends[:, :-1]

@@ -21,6 +21,7 @@ from quakedesign.cache import search_once
 from quakedesign.errors import UnsupportedError, require_known
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, to_sympy
 from quakedesign.fault.model import require_ordinary
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, holds
@@ -210,7 +211,7 @@ class Compensation:
             f"{UpperBound(root.remainder):.2g} m/s, within the proved errors"
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Json:
         """Exact numbers as texts."""
         law = self.controller
         return {

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import floor, inf, log10
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from scipy.linalg import expm
@@ -135,14 +135,14 @@ class _FloatMatrix(np.ndarray):
     __array_priority__ = 1.0  # for the type of concatenations
 
     @classmethod
-    def of(cls, rows: Iterable[Iterable[Fraction]]) -> Any:
+    def of(cls, rows: Iterable[Iterable[Fraction]]) -> "_FloatMatrix":
         return np.array([[v.numerator / v.denominator for v in row] for row in rows]).view(cls)
 
     def __mul__(self, other: Any) -> Any:
         return self.dot(other) if isinstance(other, _FloatMatrix) else np.multiply(self, other)
 
-    def exp(self) -> Any:
-        return floats(expm(self.view(np.ndarray)))
+    def exp(self) -> "_FloatMatrix":
+        return np.asarray(expm(self.view(np.ndarray))).view(_FloatMatrix)
 
     def nrows(self) -> int:
         return len(self)
@@ -156,7 +156,7 @@ def floats(values: np.ndarray) -> Any:
     return values.view(_FloatMatrix)
 
 
-def _slowest(period: Any) -> SlowestMode:
+def _slowest(period: _FloatMatrix) -> SlowestMode:
     """Slowest mode; a complex pair, or two modes with nearly equal decay, are summed until they decay instead.
 
     The same applies if all modes decay within a few periods.
@@ -177,7 +177,7 @@ def _slowest(period: Any) -> SlowestMode:
     return SlowestMode(doublings=doublings, seen=floats(seen[None]), along=floats(along[:, None]), left=left)
 
 
-FLOATS = Arithmetic(
+FLOATS: Arithmetic = cast("Any", Arithmetic)(
     slowest=_slowest,
     number=float,
     matrix=_FloatMatrix.of,
@@ -186,7 +186,7 @@ FLOATS = Arithmetic(
     pieces=lambda segment, _: (float(segment.duration) / _PIECES,) * _PIECES,
     beside=lambda parts: np.concatenate(parts, axis=1),
     above=np.concatenate,
-    majorant=lambda flow: floats(np.where(np.eye(len(flow)), np.maximum(flow, 0), np.abs(flow))),
+    majorant=lambda flow: floats(np.asarray(np.where(np.eye(len(flow)), np.maximum(flow, 0), np.abs(flow)))),
     absolute=np.abs,
     modulus=np.abs,
     larger=np.maximum,

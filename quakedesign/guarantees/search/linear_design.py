@@ -21,6 +21,7 @@ from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_ordinary
+from quakedesign.files import Json
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain
@@ -383,7 +384,7 @@ class _Laws:
         return _NARROW if self.template.longest_step else self.family.room
 
     @property
-    def _effort(self) -> dict[str, Any]:
+    def _effort(self) -> Json:
         """Number of evaluations of a search, of 0.05 s each."""
         return {"evaluations": _FEWER} if self.template.longest_step else {}
 

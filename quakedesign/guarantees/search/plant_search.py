@@ -82,7 +82,7 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
         for name in left:
             bounds[name] = _rounded(reached[name] * _WIDER)
     name = free[0]
-    reason = f"the argument of {name} moves further for every bound, up to {UpperBound(bounds[name]):.3g}"
+    reason = f"the argument of {name} may exceed every bound that was tried, up to {UpperBound(bounds[name]):.3g}"
     return NoProof(reason=reason)
 
 
@@ -104,11 +104,11 @@ def _claimed(
         rows = row_bounds(part, responses, inputs)[len(part.outputs) :]
         names = [*plant.sectors, *plant.gains]
         beyond = [
-            f"{name} holds for arguments up to {UpperBound(s.within):.4g}, which may reach {UpperBound(row):.4g}"
+            f"{name} is valid up to {UpperBound(s.within):.4g}, but its argument may reach {UpperBound(row):.4g}"
             for name, s, row in zip(names, part.sectors, rows, strict=False)
             if s.within is not None and row >= s.within
         ]
-        return NoProof(reason="; ".join(beyond) or "the numbers of the small gain do not close")
+        return NoProof(reason="; ".join(beyond) or "the small-gain inequalities are not satisfied")
     claimed = tuple(UpperBound(above(v * MARGIN)) for v in bounds)
     count = len(part.outputs)
     claims = PlantClaims(outputs=claimed[:count], controls=claimed[count:])
@@ -178,7 +178,7 @@ def _unstable(part: LinearPart, loop: PlantLoop) -> str:
         return ""
     states = np.real(mode[: len(part.A)] / mode[np.argmax(abs(mode[: len(part.A)]))])
     shape = ", ".join(f"{v:.2g}" for v in states)
-    return f"the nominal loop is not stable: the mode ({shape}) of the states grows by {radius:.4g} a sample"
+    return f"the nominal loop is not stable: the mode ({shape}) of the states is multiplied by {radius:.4g} a sample"
 
 
 def escaping(plant: UncertainPlant, law: MatrixLaw) -> tuple[float, np.ndarray]:

@@ -494,7 +494,7 @@ def what_would_do(
         Of the task.
     """
     if reach.held is None or reach.numbers is None:
-        return "none was found with a well that is much nearer either: a smaller spread, stress or noise may do"
+        return "no guarantee was found with a well that is much nearer either: a smaller spread, stress or noise may do"
     for noise in (setup.slip_noise, *quieter(setup)):
         loop = setup if noise == setup.slip_noise else replace(setup, slip_noise=noise)
         held = replace(reach.held, slip_noise=noise)

@@ -26,7 +26,8 @@ from quakedesign.symbolic.casadi_printer import to_numpy
 # ----------------------------------------------------------------------
 # Errors of the estimates of a differentiator, measured with adverse signals.
 #
-# Proved properties of the implicit one, from rest, are in `quakedesign.loop.sensing.differentiator`.
+# What is proved of the implicit differentiator, for a fault initially at rest, is in
+# `quakedesign.loop.sensing.differentiator`.
 
 SAMPLES = 1000
 SETTLED = 400
@@ -97,7 +98,7 @@ def _kinds(unit: Differentiator) -> int:
 
 
 def _signs(sample: int, errors: "np.ndarray", random: np.random.Generator) -> "np.ndarray":
-    """One row an adverse signal: square waves, signs of every error and their opposites, random; one column a run."""
+    """One row per adverse signal: square waves, signs of every error and their opposites, random; a column per run."""
     columns = errors.shape[1]
     waves = [np.full(columns, 1.0 if sample // half % 2 else -1.0) for half in HALF_PERIODS]
     chasing = [way * np.where(error > 0, 1.0, -1.0) for error in errors for way in (1, -1)]
@@ -132,11 +133,12 @@ def _function(unit: Differentiator) -> ca.Function:
 #
 #     A + B·max |p(e1 + ε1, e2 + ε2) − p(e1, e2)| < λ_d
 #
-# is self-consistent. For signed powers up to 1 the difference is largest across the origin, at e = −ε/2. The left-
-# hand side grows with λ_d as ε does for a linear law, so that the sampling period decides, and more slowly for a
-# sliding mode, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and with
-# zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs none from rest, and its
-# estimates are then proved for a linear law (`quakedesign.loop.sensing.differentiator`).
+# is self-consistent. For signed powers up to 1 the difference is largest across the origin, at e = −ε/2. For a
+# linear law the left-hand side grows with λ_d as ε does, so that the sampling period decides; for a sliding mode it
+# grows more slowly, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and with
+# zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs no such
+# bound for a fault initially at rest, and its estimates are then proved for a linear law
+# (`quakedesign.loop.sensing.differentiator`).
 #
 # The condition is a premise of the differentiator. It does not prove that the loop with estimates is stable, and loops
 # may work without it. It neglects the stages before the differentiator; a mean of N readings lags by (N − 1)T/2 more.
@@ -153,7 +155,7 @@ class JointCondition:
     ----------
     name : str
     required : float
-        Value [m/s²] that λ_d, the `certified` value, must exceed; infinite for n_d ≥ 2 [m/s^(n_d+1)].
+        Value that λ_d, the `certified` value, must exceed [m/s² for n_d = 1]; infinite for n_d ≥ 2.
     certified : float
         λ_d.
     ratio : float

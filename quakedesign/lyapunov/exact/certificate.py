@@ -88,7 +88,7 @@ def _check_proof(certificate: Evidence) -> None:
     allowed |= {"decay"} if second == "decrease" else set()
     require(
         required <= set(claims) <= required | allowed,
-        f"the claims must be those named positive and {second}, bounds of states and, on cells, decay.",
+        f"the claims must include positive and {second}, and may include only bounds of states and, on cells, decay.",
     )
     require(all(c > 0 for c in claims.values()), "a claim must be positive.")
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)
@@ -97,7 +97,7 @@ def _check_proof(certificate: Evidence) -> None:
 
 
 def _check_witnesses(certificate: Evidence, obligations: Iterable[Obligation]) -> None:
-    """Require an exact witness for every different obligation, in order."""
+    """Require an exact witness for every distinct obligation, in order."""
     expected = list[str]()
     for one in different(obligations):
         expected.append(one.name)
@@ -183,9 +183,10 @@ class Certificate(Evidence):
     lyapunov : tuple of Term
         Lyapunov function V; empty for a refutation.
     claims : mapping of str to Fraction
-        ``positive`` and ``decrease`` or ``rate`` [1/s on `reals`].
+        ``positive``, and ``decrease`` on `cells` or ``rate`` [1/s] on `reals`; optionally ``bound_`` and the name of a
+        state, and on `cells` ``decay``.
     witnesses : mapping of str to Witness
-        One for every different obligation, by name.
+        One for every distinct obligation, by name.
     refutation : Equilibrium, optional
     """
 

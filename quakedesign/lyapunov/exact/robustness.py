@@ -38,7 +38,7 @@ _INPUT = 1
 class Robustness:
     """Constants that bound the perturbations of the acceleration for which V' stays negative."""
 
-    # slip, rate: Upper bounds on a1 [1/s² of the scaled loop, inverse] and a2; see the head of this file
+    # slip, rate: Upper bounds on a1 [inverse of 1/s² of the scaled loop] and a2; see the comment above
     slip: Fraction
     rate: Fraction
     # slip_power, rate_power: p1 and p2 [-]
@@ -89,7 +89,7 @@ class _Cells:
         return to_terms(derivative, [symbols[s] for s in self.loop.states])
 
     def disturbance_term(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
-        """Bound β·∂V/∂e2·|e_i| on a cell, from the enclosures of the units of e_i and e2 in their states."""
+        """Bound of β·∂V/∂e2·|e_i| on a cell, with enclosures of the units of the states that belong to e_i and e2."""
         weight = self.weights[index]
         bare = cell_polynomial(slope, self.loop.states, signs, {})
         units = list(error_units(self.loop, self.model).values())
@@ -170,7 +170,7 @@ class LevelSets:
     """Level sets of a proved V for gains scaled by λ, in metres and seconds."""
 
     certificate: Certificate  # For the base gains (λ = 1), with bounds of all states
-    scale: Fraction  # λ; the scaled loop has the errors λe of the base loop at the same time
+    scale: Fraction  # λ; at any time the errors of the scaled loop are λ times those of the base loop
     # Loop of the law, for the units of its states; by default that of the law that the certificate names
     model: LoopField | None = None
 

@@ -102,7 +102,7 @@ def neighbourhood(
         Current V, with which the changes of the gains are linearised.
     changed : sequence of Loop
         Loops with one changed gain each. The difference to `loop` is one part, exact if the field is affine in the
-        gain. Conditions on cells do not change with the gains, so a search must re-check its resulting gains.
+        gain. The conditions of the cells stay those of `loop`, so a search must re-check its resulting gains.
     """
     monomials = signed_monomials(loop.states, degree, loop.domain)
     sizes = tuple(Fraction(_power(scale, exponents_of(term, loop.states))) for term in monomials)
@@ -527,7 +527,7 @@ class Objective(ABC):
         return find_certificate(state.loop, setting.degree, subject=subject)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Proof of given gains without a climb; an objective with a rate compares it with a climb. None without one."""
+        """Certificate of given gains without a climb, or None; with a rate it is compared with that of a climb."""
         return None
 
     @abstractmethod

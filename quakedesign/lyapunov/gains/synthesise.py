@@ -135,7 +135,7 @@ class LargestDecay(Objective):
         return None
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate with the V of the largest margins, which is better if the forms w fit poorly."""
+        """Certificate with the V of the largest margins, which is better if the linear forms w ≈ V^{1/m} fit poorly."""
         bound, beta = loop.uncertain["d"][1], loop.uncertain.get("beta", (Fraction(1), Fraction(1)))
         gains = tuple(loop.gains.values())
         settling = fastest_settling(subject, gains, lipschitz=bound, gain_range=beta, start=bound, degrees=degrees)
@@ -345,8 +345,8 @@ class Synthesis:
     unit: str
     gains: Mapping[str, Fraction]
     certificate: Certificate  # Checked in exact arithmetic
-    # Value of the objective that the certificate proves, rounded down if larger is better; for `sampled` the measured
-    # value
+    # Value of the objective that the certificate proves, rounded down if larger is better; for the objective
+    # ``sampled`` of the command the measured value
     value: float
     norm: float  # ‖k_i/L̄^{p_i}‖₂ of the gains
     # Gains from the literature, if any are known for the law

@@ -49,7 +49,7 @@ def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
 
 @dataclass(frozen=True, slots=True)
 class _Strategy:
-    """Sign that a parameter follows: that of a product of states and rates, at the middle of all ranges."""
+    """Sign that a parameter follows: that of a product of states and rates, the rates at the middle of all ranges."""
 
     names: tuple[str, ...]
     sign: int
@@ -104,7 +104,7 @@ class _FloatField:
         return total
 
     def growths(self, strategies: Sequence[tuple[_Strategy, ...]], steps: int, step: float) -> np.ndarray:
-        """Largest growth of every play in e-foldings over all initial states, without the initial share of the run."""
+        """Largest growth of every strategy in e-foldings over all initial states, without the initial part of a run."""
         x = np.tile(np.random.default_rng(0).normal(size=(len(self.states), _STARTS)), len(strategies))
         middle, ends = self._parameters()
         growth = np.zeros(x.shape[1])
@@ -124,7 +124,7 @@ class _FloatField:
         return np.asarray(growth.reshape(len(strategies), _STARTS).max(axis=1))
 
     def _followed(self, strategies: Sequence[_Strategy]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows (of states, rates and a one) of the two signs multiplied in every column, and the sign of the play."""
+        """Rows (of states, rates and a one) of the two signs multiplied in a column, and the sign of its strategy."""
         rows = {name: i for i, name in enumerate((*self.states, *(f"{s}'" for s in self.states), ""))}
         pairs = np.array([[rows[name] for name in (*one.names, "")[:2]] for one in strategies])
         return (*np.repeat(pairs, _STARTS, axis=0).T, np.repeat([one.sign for one in strategies], _STARTS))

@@ -62,7 +62,7 @@ class Dual:
 
 
 def dual(loop: Loop, degree: int) -> Dual | None:
-    """Exact proof that no V of a degree proves a loop; None if none is found.
+    """Exact proof that no V of a degree proves the stability of a loop; None if no such proof is found.
 
     None implies nothing. It is also returned for nested powers with positive exponents, whose cells contain few
     rational points, and for irrational roots of gains, as the ends of their enclosures are no values of the loop.

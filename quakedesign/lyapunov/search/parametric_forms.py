@@ -18,7 +18,7 @@ from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.symbolic.terms import Term, cell_polynomial
 
 # ----------------------------------------------------------------------
-# V_j and −V̇_j on every different cell and vertex, with symbolic gains and ranges.
+# V_j and −V̇_j on every cell and vertex, each distinct form once, with symbolic gains and ranges.
 
 Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
 """j, exponents, names multiplied, coefficient."""
@@ -75,7 +75,7 @@ def values_of(loop: Loop) -> dict[str, float]:
 
 
 def rows_of(loop: Loop, monomials: Sequence[Term], *, with_function: bool = False) -> tuple[FormRow, ...]:
-    """Every different form of V, then of −V̇; with `with_function`, equal forms of −V̇ with different V are kept apart.
+    """Every distinct form of V, then of −V̇; with `with_function`, equal forms of −V̇ with different V are kept apart.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _single(term: Term, weights: Mapping[str, int], signs: Mapping[str, int]) ->
 
 
 # ----------------------------------------------------------------------
-# V and −V̇ on every different cell and vertex in floating point, cached for all loops of one structure.
+# V and −V̇ on every cell and vertex, each distinct form once, in floating point, cached for all loops of one structure.
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +167,7 @@ class StructureKey:
 
 @lru_cache(maxsize=32)
 def float_rows(key: StructureKey) -> tuple[FormRow, ...]:
-    """Every different row of the monomials of V in floating point, each −V̇ with its V."""
+    """Every distinct row of the monomials of V in floating point, each −V̇ with its V."""
     monomials = signed_monomials(key.loop.states, key.structure.degree, key.loop.domain)
     rows = rows_of(key.loop, monomials, with_function=True)
     return tuple(replace(row, function=_floats(row.function), decrease=_floats(row.decrease)) for row in rows)

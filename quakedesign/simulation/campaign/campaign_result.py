@@ -309,7 +309,7 @@ def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
 def require_metric(metric: str, known: Sequence[str]) -> None:
     """Raise if a metric is unknown."""
     if not known:
-        raise ParameterError(f"metric must be that of a finite sample, but all samples diverge. Received {metric!r}.")
+        raise ParameterError(f"metric must be one of a run without divergence, but all diverge. Received {metric!r}.")
     require_known(metric, known, "metric")
 
 

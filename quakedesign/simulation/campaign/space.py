@@ -89,7 +89,7 @@ class Space:
             If the point has another dimension.
         """
         if len(point) != len(self.ranges):
-            raise ParameterError(f"point must hold {len(self.ranges)} numbers, one a range. Received {len(point)}.")
+            raise ParameterError(f"point must have {len(self.ranges)} numbers, one per range. Received {len(point)}.")
         values = {
             name: min(high, low + float(share) * (high - low))
             for (name, (low, high)), share in zip(self.ranges.items(), point, strict=True)

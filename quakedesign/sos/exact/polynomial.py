@@ -41,7 +41,7 @@ def mapping(polynomial: fmpq_mpoly) -> dict[Exponents, Fraction]:
 
 
 def product(variables: int, factors: Iterable[Polynomial]) -> dict[Exponents, Fraction]:
-    """Product of polynomials; the constant one without factors."""
+    """Product of polynomials; the constant 1 if there are no factors."""
     factors, one = list(factors), constant(variables)
     others = [f for f in factors if f != one]
     if len(others) < 2:
@@ -146,7 +146,7 @@ def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fra
 
     try:
         whole = expression.as_expr()
-        floats = {f: to_sympy(fraction_of_float(f)) for f in whole.atoms(sp.Float)}  # "QQ" takes what is only close
+        floats = {f: to_sympy(fraction_of_float(f)) for f in whole.atoms(sp.Float)}  # "QQ" accepts floats inexactly
         terms = sp.Poly(whole.xreplace(floats), *variables, domain="QQ").terms()
     except (AttributeError, sp.polys.polyerrors.BasePolynomialError) as error:  # relations and matrices have no as_expr
         raise PolynomialError(

@@ -62,7 +62,7 @@ class Statement:
         )
         if () not in self.products or len(set(self.products)) != len(self.products) or not well_formed:
             raise PolynomialError(
-                f"products must be different increasing index sets with (). Received {self.products}."
+                f"products must be distinct increasing index sets that include (). Received {self.products}."
             )
 
     @cached_property
@@ -113,7 +113,7 @@ class Statement:
 
     @cached_property
     def parities(self) -> dict[int, int]:
-        """Echelon basis over GF(2) of the parities of all occurring exponents, as leading bit to vector."""
+        """Echelon basis over GF(2) of the parities of all occurring exponents: vectors by leading bit."""
         echelon: dict[int, int] = {}
         for p in (self.target, *self.inequalities, *self.equalities):
             for e in p:

@@ -22,13 +22,13 @@ from quakedesign.sos.exact.proofs import Element, as_element
 # Expansion of polynomials with a work budget: every limit is checked before the operation that it limits.
 
 DEGREE = 60
-"""Total degree of any intermediate polynomial, and largest exponent."""
+"""Largest total degree of any intermediate polynomial, and largest exponent."""
 MONOMIALS = 10_000
-"""Monomials of any intermediate polynomial."""
+"""Largest number of monomials of any intermediate polynomial."""
 DIGITS = 400
-"""Decimal digits of the numerator and of the denominator of a number in the text."""
+"""Largest number of decimal digits of the numerator and of the denominator of a number in the text."""
 COEFFICIENT_DIGITS = 1000
-"""Decimal digits of any intermediate numerator or denominator."""
+"""Largest number of decimal digits of any intermediate numerator or denominator."""
 
 _WORK = 2_000_000  # sums and products of two short coefficients in one text: about a second
 _FIELD = 7  # bits per exponent; the sum of two exponents up to DEGREE fits
@@ -126,14 +126,14 @@ class Expansion:
     def divide(self, left: Terms, right: Terms, token: Token) -> Terms:
         """p/c for a nonzero number c."""
         if set(right) != {0}:
-            reject(self._text, token, "a nonzero number after /", "Multiply out; only numbers divide.")
+            reject(self._text, token, "a nonzero number after /", "Multiply out; only a number can be a divisor.")
         return self.multiply(left, {0: 1 / right[0]}, token)
 
     def power(self, base: Terms, token: Token) -> Terms:
         """Power p^n; the token must be a whole number n."""
         if not token.text.isdigit() or len(token.text) > 9 or int(token.text) > DEGREE:
             expected = f"a whole number from 0 to {DEGREE} as exponent"
-            reject(self._text, token, expected, "Write for example x^2; only digits make an exponent.")
+            reject(self._text, token, expected, "Write the exponent in digits, for example x^2.")
         exponent = int(token.text)
         self._check_size(self._size_of_power(base, exponent), token)
         total: Terms = {0: fmpq(1)}
@@ -241,7 +241,7 @@ def parse(
     order = _order(text, tokens, variables)
     relation = next((token for token in tokens if token.kind == "relation"), None)
     if relation:
-        reject(text, relation, "a polynomial without relation", "Give constraints apart, for example on x>=0.")
+        reject(text, relation, "a polynomial without relation", 'Give constraints separately: on="x >= 0".')
     expansion = Expansion(text, order)
     return order, expansion.unpacked(_evaluate(text, tokens, expansion))
 
@@ -304,7 +304,8 @@ def _tokens(text: str) -> list[Token]:
         raise PolynomialError(f"a polynomial is text. Received {type(text).__name__}. Write for example 'x^2 + 1'.")
     if len(text) > LENGTH:
         raise PolynomialError(
-            f"a polynomial has at most {LENGTH} characters. Received {len(text)}. Factor it, or hand over its terms."
+            f"a polynomial has at most {LENGTH} characters. Received {len(text)}. "
+            "Factor it, or give a mapping of exponents to coefficients."
         )
     return [*_scan(text), Token("end", "", len(text))]
 

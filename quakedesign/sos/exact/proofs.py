@@ -226,8 +226,8 @@ def holds(statement: Statement, proof: Proof) -> bool:
     Returns
     -------
     bool
-        True implies, for the three kinds in order: the polynomial is non-negative on the set; the statement is false;
-        the polynomial is negative at a point of the set. False implies nothing.
+        True implies, for the three kinds in order: the polynomial is non-negative on the set; multiplier · polynomial
+        is not in the cone; the polynomial is negative at a point of the set. False implies nothing.
     """
     try:
         match proof:

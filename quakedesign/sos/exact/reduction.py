@@ -3,8 +3,8 @@
 One rule replaces Newton polytope and diagonal inconsistency. Let e be a monomial to which no equality and only
 diagonal Gram entries contribute, each with a positive factor. If the coefficient of e in the target is zero, all
 these diagonal entries vanish, and so do their rows. The rule is repeated until nothing changes. On ℝⁿ, every
-vertex v of the convex hull of the basis then has 2v in the support of the target, so the basis lies in half of
-the Newton polytope of the target (Reznick 1978).
+vertex v of the convex hull of the basis then has 2v in the support of the target, so the basis lies in ½·New,
+where New is the Newton polytope of the target (Reznick 1978).
 """
 
 from collections import Counter, defaultdict
@@ -30,7 +30,7 @@ def full_bases(statement: Statement) -> Bases:
     counts = [comb(size + h, size) if h >= 0 else 0 for h in halves]
     if max(counts, default=0) > _MONOMIALS or sum(n * n for n in counts) > _PAIRS:
         raise PolynomialError(
-            f"a basis must have at most {_MONOMIALS} monomials, and all together {_PAIRS} pairs. "
+            f"a basis must have at most {_MONOMIALS} monomials, and all bases together at most {_PAIRS} pairs. "
             f"Received {shortly(max(counts))} monomials in the largest of {len(counts)}. Lower the degree."
         )
     return tuple(tuple(monomials(size, h)) for h in halves)
@@ -81,7 +81,7 @@ def _contributions(statement: Statement, alive: Any) -> Any:
 
 
 def _removed(weight: Polynomial, k: int, gone: Exponents, basis: Any, others: Any, diagonal: Any) -> list[Exponents]:
-    """Remove the entries of one basis element; the monomials to which they contributed."""
+    """Remove the entries of one basis element; return the monomials to which they contributed."""
     touched = []
     for e, c in weight.items():
         shifted = times(gone, e)

@@ -55,7 +55,7 @@ def _depth(text: str) -> int:
     return max(accumulate(1 if bracket in "[{" else -1 for bracket in brackets), default=0)
 
 
-def unique(pairs: list[tuple[str, Any]]) -> Json:
+def unique(pairs: list[tuple[str, object]]) -> Json:
     """Object of key-value pairs. Raises CertificateError for duplicate keys."""
     need(len({k for k, _ in pairs}) == len(pairs), "a key occurs twice in one object")
     return dict(pairs)
@@ -81,7 +81,7 @@ def need(condition: bool, reason: str) -> None:
         _reject(reason)
 
 
-def headed(raw: Any, kind: str = "") -> Json:
+def headed(raw: object, kind: str = "") -> Json:
     """Entries of a file after a check of its format and, if given, its kind, both of which are removed."""
     if not isinstance(raw, dict):
         _reject("the file must be an object")
@@ -90,7 +90,7 @@ def headed(raw: Any, kind: str = "") -> Json:
     return {key: entry for key, entry in raw.items() if key != "format" and (key != "kind" or not kind)}
 
 
-def read_rational(raw: Any) -> Fraction:
+def read_rational(raw: object) -> Fraction:
     """Fraction of a text in canonical form."""
     if not isinstance(raw, str):
         _reject("a rational must be a text")
@@ -118,7 +118,7 @@ def common_grid(gram: Iterable[Fraction]) -> None:
             _reject(f"the common denominator of a Gram matrix exceeds {_GRID_BITS} bits")
 
 
-def read_polynomial(raw: Any) -> dict[tuple[int, ...], Fraction]:
+def read_polynomial(raw: object) -> dict[tuple[int, ...], Fraction]:
     """Polynomial from an object of exponents (equal length, each at most 999) to nonzero rationals."""
     if not isinstance(raw, dict):
         _reject("a polynomial must be an object")
@@ -144,7 +144,7 @@ def polynomial_text(polynomial: Any) -> dict[str, str]:
     return {",".join(map(str, e)): exact_text(c) for e, c in polynomial.items()}
 
 
-def write_readable(path: str | Path, written: str, load: Callable[[str], Any]) -> None:
+def write_readable(path: str | Path, written: str, load: Callable[[str], object]) -> None:
     """Write a text atomically, and only if it can be read back."""
     load(written)
     write_whole(Path(path), written)
@@ -158,7 +158,7 @@ class Entries(msgspec.Struct, forbid_unknown_fields=True):
     """An object of a file, with its fields as keys; a field with its default value is omitted."""
 
 
-def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
+def read_as(kind: type[_Kind], raw: object, what: str = "the file") -> _Kind:
     """Value of a type from parsed entries; `written` is its inverse.
 
     Parameters
@@ -188,7 +188,7 @@ def read_as(kind: type[_Kind], raw: Any, what: str = "the file") -> _Kind:
     return value
 
 
-def written(value: Any) -> Any:
+def written(value: object) -> Any:
     """Entries of a file for a value; the inverse of `read_as`."""
     match value:
         case int() | str():
@@ -227,7 +227,7 @@ class PolynomialEntries(dict[tuple[int, ...], Fraction]):
     """A polynomial of a file: exponents such as ``"2,0,1"`` to nonzero rationals."""
 
 
-def _decoded(kind: type, raw: Any) -> Any:
+def _decoded(kind: type, raw: object) -> Any:
     if kind is PolynomialEntries:
         return PolynomialEntries(read_polynomial(raw))
     number = read_rational(raw)
@@ -252,7 +252,7 @@ def _difference(raw: Any, again: Any) -> str:
     return "" if raw == again else " "
 
 
-def made(kind: type[_Kind], *sources: Any, **entries: Any) -> _Kind:
+def made(kind: type[_Kind], *sources: object, **entries: object) -> _Kind:
     """Object of a type; each field is given, taken from a source with that attribute, or left at its default."""
     for name, *_ in _parts(cast(Any, kind)):
         values = [getattr(source, name) for source in sources if hasattr(source, name)]

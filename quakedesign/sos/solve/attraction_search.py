@@ -45,7 +45,7 @@ from quakedesign.sos.solve.program import NoSolution, Program
 # Points with V̇ ≥ 0 and the lowest V: sought in floating point, then made rational and checked exactly.
 
 _SEED = 20240609
-_DIRECTIONS, _REFINED, _STARTS = 300, 3, 30  # number of directions per state
+_DIRECTIONS, _REFINED, _STARTS = 300, 3, 30  # directions per state, refined directions, starts for equilibria
 _NEAR = 1e-3  # distance of the point in a direction in which V does not decrease near the origin
 _PRECISE = {"xatol": 1e-12, "fatol": 1e-14, "maxiter": 200}
 _TOLERANCES = (1e-3, 1e-7, 1e-12)  # relative tolerances of the fractions tried for a point
@@ -97,7 +97,7 @@ class _Rays:
 
 
 def _first_root(row: np.ndarray) -> float:
-    """Smallest r > 0 at which Σ row_k·r^k stops being negative; infinite if there is none."""
+    """Smallest r > 0 where Σ row_k·r^k stops being negative; infinite if none; `_NEAR` if not negative near 0."""
     used = np.flatnonzero(row)
     if not len(used) or row[used[0]] > 0:
         return _NEAR
@@ -163,7 +163,8 @@ def other_equilibrium(claim: Attraction) -> Point | None:
 _ROUNDS = 30
 _GROWTH = Fraction(1002, 1000)  # least growth of β in a round that continues the search
 _INSIDE = Fraction(999999, 1000000)  # share of the level that V must not exceed where shape ≤ β
-_SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))  # of β where shape touches level
+# Shares of the β at which {shape ≤ β} touches the level set
+_SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))
 _SLACK = (Fraction(99, 100), Fraction(9, 10))  # share of level and β for the multipliers; at 1, V could not change
 _MORE = (0, 2)
 _LOSS = 1e-3  # share of the largest β given up for a V with a margin
@@ -311,7 +312,7 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
     field : mapping of str or Symbol to str, SymPy expression or mapping
         Rate of every state: a polynomial in the states with rational coefficients that vanishes at the origin.
     V : str, SymPy expression or mapping, optional
-        Lyapunov function, searched by default.
+        Lyapunov function; by default the function searches for one.
     degrees : sequence of int
         Degrees of V that the search tries in turn.
 
@@ -356,10 +357,11 @@ def region_of_attraction(
     relative : float
         Relative width of the final bracket of the bisection; from 1e-6 to below 1.
     degree : int, optional
-        Even degree up to which other V are searched, from the given one, for a larger part of the shape inside.
+        Even degree up to which other V are tried, starting from the given one, so that the region contains a larger
+        part of the shape.
     shape : str, SymPy expression or mapping, optional
-        A polynomial that is positive except at the origin. The largest β found is proved for which {shape ≤ β} lies in
-        the region. By default Σ x_i² if a degree is given, otherwise none.
+        A polynomial that is positive except at the origin. The result contains the largest β found for which
+        {shape ≤ β} is proved to lie in the region. By default Σ x_i² if a degree is given, otherwise none.
 
     Returns
     -------
@@ -403,7 +405,7 @@ def _region(claim: Attraction, relative: float) -> Region:
 
 
 def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomial | None:
-    """Exact shape; by default Σ x_i² if V is searched, otherwise None."""
+    """Exact shape; by default Σ x_i² if other V are tried (`degree`), otherwise None."""
     if degree is not None and not (isinstance(degree, int) and degree >= 2 and degree % 2 == 0):
         raise PolynomialError(f"degree must be an even number from 2. Received {degree!r}. Give for example 4.")
     return None if shape is None and degree is None else _claim(field, shape).lyapunov

@@ -24,7 +24,7 @@ from quakedesign.sos.exact.polynomial import Exponents
 
 Array = np.ndarray
 Sided = tuple[sparse.csc_matrix, np.ndarray]  # matrix and right-hand side
-_LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # bound the programme if every polynomial is in the cone
+_LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # bounds of the margin, which is infinite if every polynomial is in the cone
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -53,7 +53,9 @@ class Solution:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class NoSolution:
-    """Result of a search without a decision, false as a truth value; no proof of infeasibility.
+    """Result of a search that found no decisions; false as a truth value.
+
+    It implies infeasibility only if the reason states it.
 
     Attributes
     ----------
@@ -250,7 +252,7 @@ class Program:
                     yield best, loss
 
     def _rounded(self, best: float, loss: float) -> Solution | None:
-        """Proved decision near the last one of the solver, whose objective is within `loss` of the optimum."""
+        """Proved decision near the last one of the solver; its objective is within 2·`loss` of the optimum."""
         for bits in _BITS:
             near = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
             values = self._forced.completed(near)

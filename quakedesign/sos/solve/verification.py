@@ -137,7 +137,7 @@ def _verified(problem: Statement, squares: Sequence[Square]) -> Answer:
     moved = scaled(problem)
     blocks, grams = zip(*(_block(moved.statement, moved.square(s)) for s in squares), strict=True)
     least = min(float(np.linalg.eigvalsh(g)[0]) for g in grams)
-    sizes = f"largest error in a coefficient {UpperBound(error):.2g}, least eigenvalue {least:.2g} scaled"
+    sizes = f"largest error in a coefficient {UpperBound(error):.2g}, least eigenvalue of the scaled matrix {least:.2g}"
     matrix = f"the given matrix ({sizes})"
     near = error <= _NEAR * max(map(abs, problem.polynomial.values()), default=Fraction(1))
     for how, proof in _proposed(moved, blocks, grams) if near else ():
@@ -227,8 +227,8 @@ def read_gram(path: str | Path) -> GramFile:
 
     A ``.mat`` file has the variables p, Q, Z and vars; any other file is JSON with the keys polynomial, gram, basis and
     variables. A polynomial is text, or a list of terms, each a coefficient followed by exponents. Basis elements are
-    texts or lists of exponents. JSON numbers are read exactly as written, MATLAB floats as the decimals that they print
-    as.
+    texts or lists of exponents. Coefficients are read exactly: JSON numbers as written, MATLAB floats as their shortest
+    decimals. Entries of the Gram matrix become floats.
 
     Raises
     ------

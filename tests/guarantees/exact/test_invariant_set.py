@@ -504,7 +504,7 @@ _ROW = (F(1),) * 7
         ),
         (
             lambda s: {"facets": ((F(10) ** 20, *s.facets[0][1:]), *s.facets[1:])},
-            r"must be below 1e20 .* Received the entry 1e\+20, of larger ones",
+            r"must be below 1e20 .* Received the entry 1e\+20, whose numerator or denominator is larger",
         ),
         (lambda s: {"at_samples": s.at_samples[:-1]}, "at_samples must have one row for each facet"),
         (
@@ -514,11 +514,11 @@ _ROW = (F(1),) * 7
         (lambda s: {"at_samples": tuple(line[:1] for line in s.at_samples)}, "rows of at_samples .* rows of 1 bases"),
         (
             lambda s: {"between": ((s.between[0][0][:-1], *s.between[0][1:]), *s.between[1:])},
-            r"a basis must be \d numbers of facets, from 0 to below \d+ .* Received \(",
+            r"a basis must be \d indices of facets, each at least 0 and below \d+ .* Received \(",
         ),
         (
             lambda s: {"between": (((len(s.facets), *s.between[0][0][1:]), *s.between[0][1:]), *s.between[1:])},
-            r"a basis must be \d numbers of facets, from 0 to below \d+ .* Received \(",
+            r"a basis must be \d indices of facets, each at least 0 and below \d+ .* Received \(",
         ),
         (lambda s: {"inputs": (F(-1), *s.inputs[1:])}, "inputs must be given, 0 or more each .* Received -1"),
         (lambda s: {"inputs": ()}, "inputs must be given, 0 or more each .* Received none"),

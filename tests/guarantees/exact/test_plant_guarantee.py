@@ -357,7 +357,7 @@ def test_none_says_why():
         sectors={"s": qd.Sector(entry=[1], row=[1], slopes=(0, 0.5), within=0.5)},
         disturbances={"d": ([1], 2)},
     )
-    assert "holds for arguments up to 0.5" in qd.guarantee(far, gains=[[0]], step="0.1").reason
+    assert "is valid up to 0.5" in qd.guarantee(far, gains=[[0]], step="0.1").reason
 
 
 USER_LAW = control.ss(1, [[1, 1]], 1, [[0, 0]], 0.1)

@@ -122,7 +122,7 @@ def test_inertia_is_a_stress_of_less_than_a_pascal_and_grows_with_the_mass():
     extra = float(heavy.disturbances["stress on block 2"][1]) / by_pull - 10000
     assert extra == pytest.approx(1000 * (light / by_pull - 10000), rel=0.05)
     told = heavy.remarks["disturbances"]
-    own, more = re.search(r"by ([0-9.]+) kPa of shear stress and up to ([0-9.]+) Pa of", told).groups()
+    own, more = re.search(r"due to ([0-9.]+) kPa of shear stress and up to ([0-9.]+) Pa of", told).groups()
     by_pull = float(heavy.sectors["rate of block 2 by its pull"].slopes[1]) / 1e6
     extra = float(heavy.disturbances["stress on block 2"][1]) / by_pull - 10000
     assert own == "10"
@@ -345,7 +345,10 @@ def of_law(name):
     ("chain", "said"),
     [
         (replace(CHAIN, blocks=changed(1, reference_coefficient=0.61)), "one steady friction coefficient"),
-        (replace(CHAIN, blocks=changed(1, critical_slip=7e-3), wells=(2500.0,)), "need blocks that are alike"),
+        (
+            replace(CHAIN, blocks=changed(1, critical_slip=7e-3), wells=(2500.0,)),
+            "must be identical if there are fewer wells",
+        ),
         (replace(CHAIN, wells=(1000.0, 2000.0)), "wells that act independently"),
         (replace(CHAIN, blocks=changed(1, stress_sensitivity=0.1)), "stress_sensitivity 0"),
         (of_law("RateAndStateSlip"), "need rate-and-state-aging friction. Received rate-and-state-slip in block 1"),

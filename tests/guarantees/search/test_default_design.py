@@ -109,7 +109,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert f"T_s up to at least {float(step):.3g} s, and at T_s = {float(step):.6g} s for delays up to at least" in said
     late = replace(premises(design)["delay"], certified=F(0))
     without = SimpleNamespace(design=design.with_premise(late), guarantee=SimpleNamespace(limit_lines=list))
-    assert headlines.limit_lines(without)[0].endswith(" s none was found with a delay")
+    assert headlines.limit_lines(without)[0].endswith(" s no guarantee was found with a delay")
     assert late.sides == ("0 s", "0 s")
     assert account.badge(entry) == "not guaranteed at T_s = 0.1 s"
     real = SimpleNamespace(design=designed("real"), proof=designed("real").guarantee)

@@ -112,7 +112,9 @@ def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
 def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
     reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, ExactSetup(lag=Fraction(600)), stressed=False)
     assert (reach.share, reach.held) == (0, None)
-    assert what_would_do(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith("none was found with a well")
+    assert what_would_do(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith(
+        "no guarantee was found with a well"
+    )
 
 
 def test_a_well_that_no_controller_reaches_the_fault_through_is_said_to_be_one():

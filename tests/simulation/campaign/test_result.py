@@ -64,7 +64,7 @@ def test_nothing_but_divergence():
     found = campaign([None, None])
     assert found.to_dict()["quantiles"] == {}
     assert found.to_dict()["events"]["diverged"]["count"] == 2
-    with pytest.raises(ParameterError, match="metric must be that of a finite sample"):
+    with pytest.raises(ParameterError, match="metric must be one of a run without divergence"):
         found.values("max_slip_error")
     assert found.plot().axes
 
@@ -113,7 +113,7 @@ def test_a_metric_counts_where_the_run_has_ended_in_time():
 
 
 def test_a_metric_that_there_is_not():
-    with pytest.raises(ParameterError, match="metric must be that of a finite sample, but all samples diverge"):
+    with pytest.raises(ParameterError, match="metric must be one of a run without divergence, but all diverge"):
         campaign([None]).values("max_slip_error")
     for wrong in (campaign([1.0, None]).values, campaign([1.0, None]).worst):
         with pytest.raises(ParameterError, match=r"metric must be one of max_slip_error, min_pressure\. Received 'spe"):

@@ -52,7 +52,7 @@ def test_a_start_that_slips_back_is_refused():
 
 def test_a_point_of_another_dimension_is_refused():
     space = Space.of(load_fault("lab-fault"))
-    with pytest.raises(ParameterError, match=f"point must hold {len(space.ranges)} numbers"):
+    with pytest.raises(ParameterError, match=f"point must have {len(space.ranges)} numbers"):
         space.sample([0.5], 1)
 
 
