@@ -106,7 +106,7 @@ def test_each_part_of_the_error_of_packed_products_counts(cut):
 
     def bound(left_error, right_error):
         left = checker.Fixed([[l] * height], left_error)
-        (found,) = checker.grouped(left, checker.Fixed([[r]] * height, right_error), [1])
+        (found,) = checker.grouped(left, checker.Fixed([[r, 0]] * height, right_error), [1, 1])
         return found[0] * ONE
 
     plain = height * l * r + height * (l * (1 << cut) + (1 << shift) * ((1 << 57) + 1))
@@ -231,6 +231,23 @@ def test_the_error_of_columns_is_bounded_by_the_sums_for_unit_columns():
     assert sums.whole([[5, 3, 9, 7], [0, 0, 0, 0]], 0, rest, 1) == [5 + 7 + 4, 2]
 
 
+def test_columns_of_several_periods_have_the_error_of_the_worst(monkeypatch):
+    """Two columns of the input and two of the states are mapped over 1 to 7 periods by a shear of up to 4000."""
+    given, errors, grouped, product = [], [], checker.grouped, checker.Fixed.__mul__
+
+    def recorded(left, right):
+        result = product(left, right)
+        if len(result.rows[0]) == 4:
+            errors.append(result.error)
+        return result
+
+    monkeypatch.setattr(checker, "grouped", lambda a, b, lengths: given.append(b) or grouped(a, b, lengths))
+    monkeypatch.setattr(checker.Fixed, "__mul__", recorded)
+    checker.Sums(loop_of([[F(-1, 2), 4000], [0, F(-1, 2)]], inputs=[[0, 1]]), 1).found()  # in its own units
+    assert len(set(errors)) > 1
+    assert given[0].error == max(errors)
+
+
 # ---------------------------------------------------------------- limits of work, and checks of decay
 
 
@@ -297,6 +314,8 @@ def test_sums_are_closed_by_a_check_of_their_own(monkeypatch):
         checker.responses(loop_of(SHEARED, inputs=[[0, 1]]), 1)
     with pytest.raises(CHECK.Refused, match=r"the nominal loop must be stable and decay$"):
         checker.responses(loop_of([[F(-1, 10)]], inputs=[[1]]), 1)
+    with pytest.raises(CHECK.Refused, match=r"the nominal loop must be stable and decay$"):
+        checker.responses(loop_of([[F(-1, 10), 0], [0, -9]], inputs=[[1, 1]]), 1)  # one of two states has decayed
     with pytest.raises(CHECK.Refused, match="the free response must decay"):
         checker.responses(loop_of([[0, 12], [0, 0]], jump=[["9/10", 0], [0, "9/10"]], start=[[0, 1]]), 1)
 
