@@ -191,7 +191,7 @@ def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
         For a cut outside its box, too few or too many cuts, or more than 64 cells.
     """
     boxes, leaves = [task], []
-    for cut in cuts[: 2 * MOST_CELLS]:
+    for cut in cuts[: 2 * MOST_CELLS]:  # 65 cells would need one entry more
         if not boxes:
             break
         box = boxes.pop()
@@ -199,7 +199,7 @@ def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
             leaves.append(box)
         else:
             boxes += reversed(parts(box, *cut))
-    if boxes or len(cuts) != 2 * len(leaves) - 1 or len(leaves) > MOST_CELLS:
+    if len(cuts) != 2 * len(leaves) - 1:
         raise ParameterError(
             f"n cells of a box, n from 1 to {MOST_CELLS}, need 2n - 1 entries of cuts. Received {len(cuts)} entries "
             f"for {len(leaves)} cells. Add or remove entries."

@@ -1,5 +1,6 @@
 """Data of a plant that no fault has are rejected with the quantity, the condition and the value."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from fractions import Fraction as F
 
@@ -48,6 +49,27 @@ def test_data_that_may_vanish(name):
 def test_friction_of_a_fault(changes, said):
     with pytest.raises(ParameterError, match=said):
         replace(PLANT, friction=replace(PLANT.friction, **changes))
+
+
+@pytest.mark.parametrize(
+    ("shape", "smooth"),
+    [
+        ((0, 0, 0, 10, -15, 6), True),
+        ((0, 0, 6, -8, 3), False),  # r'' is 12 at the start, 0 at the end
+        ((0, 0, 0, 4, -3), False),  # 0 at the start, -12 at the end
+        ((0, 0, 3, -2), False),
+    ],
+)
+def test_the_acceleration_of_a_smooth_reference_is_0_at_both_ends(shape, smooth):
+    plant = replace(PLANT, shape=tuple(map(F, shape)))
+    with nullcontext() if smooth else pytest.raises(ParameterError, match="whose acceleration jumps there"):
+        plant.require_smooth_reference()
+
+
+def test_a_bounded_rate_of_the_disturbance_is_a_difference_if_the_certificate_needs_one():
+    rate = uncertain_plant(load_fault("lab-fault"), rate_limited=True)
+    assert PLANT.differences(PLANT) == PLANT.differences(rate) == rate.differences(rate) == []
+    assert rate.differences(PLANT) == ["class of the disturbance: rate in the certificate, amplitude in the fault"]
 
 
 @pytest.mark.parametrize("place", range(3))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction as F
+from itertools import pairwise
 from math import log
 
 import pytest
@@ -10,7 +11,7 @@ from quakedesign import load_fault
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.plant import plant_like
 from quakedesign.plant.of_fault import slow_sliding_plant
-from quakedesign.plant.sliding_plant import SlidingPlant
+from quakedesign.plant.sliding_plant import SlidingPlant, cells
 
 RANGES = {
     "direct_effect": (F(1, 100), F(2, 100)),
@@ -113,6 +114,33 @@ def test_constants_must_lie_within_the_ranges_of_the_proof(axis):
     assert differences(2 * high, 2 * high) == said(in_words[2 * high])
 
 
+@pytest.mark.parametrize(("count", "valid"), [(1, True), (2, True), (64, True), (65, False)])
+def test_a_box_has_at_most_64_cells(count, valid):
+    """Each cut of D_c from below leaves one cell below it."""
+    places = [F(1) + F(i, count) for i in range(1, count)]
+    cuts = (*(entry for at in places for entry in (("critical_slip", at), None)), None)
+    if valid:
+        ends = [one.ranges["critical_slip"] for one in cells(PLANT, cuts)]
+        assert ends == list(pairwise([F(1), *places, F(2)]))
+        return
+    with pytest.raises(ParameterError, match="n from 1 to 64, need 2n - 1 entries of cuts"):
+        cells(PLANT, cuts)
+
+
+@pytest.mark.parametrize(
+    "cuts", [(), (None, None), (("critical_slip", F(3, 2)), None), (("critical_slip", F(3, 2)), None, None, None)]
+)
+def test_cuts_that_are_incomplete_or_more_than_cells_are_rejected(cuts):
+    with pytest.raises(ParameterError, match="need 2n - 1 entries of cuts"):
+        cells(PLANT, cuts)
+
+
+@pytest.mark.parametrize(("axis", "at"), [("critical_slip", F(1)), ("critical_slip", F(2)), ("rate", F(1, 2))])
+def test_a_cut_outside_its_range_is_rejected(axis, at):
+    with pytest.raises(ParameterError, match=r"a cut must be along one of .*, strictly within its range"):
+        cells(PLANT, ((axis, at), None, None))
+
+
 PATCH = load_fault("crustal-patch")
 
 
@@ -150,7 +178,7 @@ def test_a_plant_like_another_has_its_stress_and_planned_pressure():
 
 
 def test_friction_that_the_theorem_does_not_cover_is_rejected():
-    with pytest.raises(UnsupportedError, match=r"needs a friction law among .*Received exponential-slip-weakening"):
+    with pytest.raises(UnsupportedError, match=r"among .*Received exponential-slip-weakening\. Sim"):
         slow_sliding_plant(load_fault("real-fault"), F(0))
     stressed = replace(PATCH, friction=replace(PATCH.friction, stress_sensitivity=0.1))
     with pytest.raises(UnsupportedError, match=r"stress_sensitivity 0\.1"):
