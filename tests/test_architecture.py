@@ -462,10 +462,10 @@ def test_the_name_of_a_class_and_of_a_file_occurs_once():
 
 BUDGETS = {
     "fault": 3223,
-    "symbolic": 3134,
+    "symbolic": 3135,
     "sos": 6347,
     "laws": 3112,
-    "loop": 4185,
+    "loop": 4184,
     "plant": 1457,
     "guarantees": 13308,
     "lyapunov": 6961,
@@ -474,8 +474,8 @@ BUDGETS = {
     "rocq": 844,
     "simulation": 9756,
     "identification": 4064,
-    "studies": 4137,
-    "report": 4142,
+    "studies": 4140,
+    "report": 4139,
     "cli": 3553,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

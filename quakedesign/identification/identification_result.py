@@ -46,7 +46,7 @@ class ParameterEstimate:
         Ends for all parameters jointly: those of the smallest box that contains their joint region.
     profile : tuple of (float, float)
         Tried values, ascending, each with the square root of its excess: the sum of squares, minimised over all other
-        parameters, minus the smallest one, divided by the variance of the noise.
+        parameters, minus the smallest one, divided by the noise variance of independent samples.
     """
 
     name: str

@@ -45,7 +45,7 @@ def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.S
     return y + 2 * first + third + fourth, fourth
 
 
-_MOST_STEPS = 30  # largest mean number of steps per sample; with more, the block is unstable or the samples too sparse
+_MOST_STEPS = 30  # largest mean number of trial steps per interval; more: an unstable block, or samples too sparse
 _SAFETY = 0.9
 _USABLE_ERROR = 1e3  # largest error of friction that gives the next length; else the length falls by a fixed factor
 _SHORTEST = 1e-8  # share of the time between two samples

@@ -14,7 +14,7 @@ SECOND_EFFECT, SECOND_SLIP = "second_effect", "second_slip"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _TwoStates(RateAndState):
-    """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c) + b_2 log(v_0 θ_2/d_2); each evolves by the one-state law.
+    """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c) + b_2 log(v_0 θ_2/d_2); each state evolves as in the law with one.
 
     The second effect may be negative. Such friction only describes records; no fault can have it.
     """

@@ -61,7 +61,7 @@ class MeasuredSlip(_Weakening):
         return self.strength(self.slip, fitted)[0]
 
     def slopes(self, fitted: ndarray) -> ndarray:
-        """Derivatives of `friction` by the logarithms of the quantities of the law, which are all coordinates."""
+        """Derivatives of `friction` by the logarithms of the quantities of the law, the only coordinates here."""
         return self.strength_slopes(self.slip, fitted)
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:

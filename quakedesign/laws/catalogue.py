@@ -19,7 +19,7 @@ BARE = "custom"
 
 @cache
 def laws() -> dict[str, type[Law]]:
-    """Every law of the package by name, including laws with proofs only, for plants other than a fault."""
+    """Laws of the package that are defined by a list of gains, by name; laws for other plants have proofs only."""
     classes = discovered(__package__, Law)
     return {name: law for name, law in classes.items() if name not in _OF_MATRICES}
 

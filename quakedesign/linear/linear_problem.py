@@ -306,7 +306,7 @@ class Polytope:
         return list(map(floats, self.vertices.values()))
 
     def slowest(self) -> float:
-        """Largest real part of an eigenvalue of a vertex [1/s]; no V has V′ ≤ −2aV with a above its negative."""
+        """Largest real part r of an eigenvalue of a vertex [1/s]; no quadratic V has V′ ≤ −2aV with a > −r."""
         return max(float(np.linalg.eigvals(A).real.max()) for A in self.floats())
 
 

@@ -102,7 +102,7 @@ def compare(
     setup, laws = setup.with_given(**entered), [one for one in designs if not isinstance(one, Design)]
     if setup != IDEAL and not laws:
         raise ParameterError(
-            f"a loop setup of a comparison needs given laws. Received {setup!r} without one. Give it to design."
+            f"a loop setup of a comparison needs given laws. Received {setup!r} without any. Give the setup to design."
         )
     tell = progress or (lambda _what, _done: None)
     how: dict[str, Any] = {

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Reject early a folder that cannot be written or exists; with `force`, an existing one without results."""
+    """Reject early a folder that cannot be written, or that exists; with `force` it may exist if it has results."""
     if os.path.exists(out) and not force:
         raise OutputError(
             f"output folder must be new. Received {out}, which exists. Give another --out, or --force to replace it."

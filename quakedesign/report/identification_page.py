@@ -229,7 +229,7 @@ def identification_figure(identification: Identification) -> "Figure":
         axis.tick_params(labelleft=i == 0)
         axis.set_ylabel("" if i else "distance [deviations]", fontsize=SMALL)
     note = f"residual: dashed at twice the noise of {fit.noise:.3g}, crosses at the edge beyond eight times; profiles: "
-    note += "95 % threshold of one parameter dashed, of all parameters jointly dotted"
+    note += "dashed at the 95 % threshold of one parameter, dotted at that of all jointly"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
     return finish(drawing, title, [], note, legend=axes["friction"])
 

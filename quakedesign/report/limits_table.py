@@ -105,8 +105,9 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
         f"needs no longer stops them; D = {float(limits.diffusivity):g} m^2/s",
         "proved: no design"
         if limits.guarantee is None
-        else f"proved: bounds of an e-LQR for this table{_path(limits.guarantee)}, {_constants(limits.guarantee)}, "
-        "on the fault itself with inertia; another design has other bounds; the pressure is that at the fault",
+        else f"proved: bounds of an e-LQR that was designed for this table{_path(limits.guarantee)}, "
+        f"{_constants(limits.guarantee)}, on the fault itself with inertia; another design has other bounds; the "
+        "pressure is that at the fault",
     ]
 
 

@@ -187,8 +187,8 @@ def _slowly(entry: "Entry") -> list[str]:
         return []
     cells = "one cell" if len(proof.cells) == 1 else f"{len(proof.cells)} cells"
     return [
-        "The pressure at the well is p plus a plan: what the nominal fault needs along its reference, which grows at "
-        "the rate kV/(μ*A).",
+        "The pressure at the well is p plus a planned pressure, which grows at the rate kV/(μ*A): what the nominal "
+        "fault needs along its reference.",
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
         "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
         "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
@@ -211,9 +211,8 @@ def _at_samples(entry: "Entry") -> list[str]:
     root = " (within the proved errors, where the implicit step of the sliding mode is deadbeat)" if law.pull else ""
     return [
         f"the equations with the index k are the law that runs{root}: x and y are the measured slip [m] and slip rate "
-        "[m/s], r "
-        "the reference, v the target slip rate, i the innovation of the slip, D the estimate of the disturbance [Pa]; "
-        "D, v+, x and y are 0 before the first sample"
+        "[m/s], r the reference, v the target slip rate, i the innovation of the slip, D the estimate of the "
+        "disturbance [Pa]; D, v+, x and y are 0 before the first sample"
     ]
 
 
@@ -383,9 +382,8 @@ CAPTIONS = {
     "cycle": "Without control, loaded by the far end of the spring at the reference rate of the friction law: slip and "
     "slip rate. Dotted: the loading rate.",
     "slow-sliding": "Controlled fault in slow sliding. The stress is a sine with the amplitude that the guarantee "
-    "allows. Slip and "
-    "its reference, slip rate and its proved bound, fluid pressure in the fault, and friction state divided by its "
-    "value in steady sliding.",
+    "allows. Slip and its reference, slip rate and its proved bound, fluid pressure in the fault, and friction state "
+    "divided by its value in steady sliding.",
     "sliding-errors": "How far slip and slip rate are from their references in the run of slow sliding.",
     "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "
     "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",

@@ -184,9 +184,7 @@ def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
     """Largest slip rate in continuous time, for every requested class of disturbances."""
     lines = [
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
-        + {"amplitude": "any disturbance of the fault's amplitude", "rate": "any of the fault's amplitude and rate"}[
-            name
-        ]
+        + f"any disturbance of the fault's amplitude{' and rate' if name == 'rate' else ''}"
         for name, proved in peaks.items()
         if proved.found
     ]

@@ -555,7 +555,7 @@ def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
 
 
 def _linear(system: Any, names: tuple[str, ...]) -> Any:
-    """StateSpace of a linear system from its first inputs, given by name, to its outputs, from unit vectors."""
+    """StateSpace of a linear system from its first inputs, given by name, to its outputs, found from unit vectors."""
     import control
 
     n, seen = system.nstates, system.ninputs

@@ -117,7 +117,10 @@ class ChainLimits:
         return parts if self.modes else [*parts, "", "no mode is unstable"]
 
     def to_dict(self) -> Json:
-        """Plain values, SI; limits of a mode are null if no well reaches it, if it oscillates, or without a stress."""
+        """Plain values, SI.
+
+        Limits of a mode are null if no well reaches it, if it oscillates, or, in slow sliding, without a stress.
+        """
         modes, values = [asdict(mode) for mode in self.modes], {"fault": self.chain.name, "feasible": self.feasible}
         if not self.chain.has_state:
             shown = ("pole", "shape", "reached", "pressure")

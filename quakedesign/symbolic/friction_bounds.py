@@ -139,7 +139,7 @@ def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Exces
     at = ", ".join(f"{x} {float(value):.4g} {_UNITS.get(str(x), '')}".rstrip() for x, value in answer.at.items())
     return (
         f"{what} of {law.name} must be valid. Declared {float(abs(declared)):.6g}, but "
-        f"{'at ' + at if at else 'everywhere'} it is {float(abs(answer.value)):.6g}. Correct the declared value."
+        f"{'at ' + at if at else 'everywhere'} the law has {float(abs(answer.value)):.6g}. Correct the declared value."
     )
 
 

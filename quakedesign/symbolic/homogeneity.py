@@ -82,8 +82,8 @@ class Homogeneity:
         One identity for a function, one for every component of a field; empty without a proof.
     counterexample : Counterexample or None
     switching : tuple of (Expr, Rational)
-        Arguments of signs with their degrees: the switching surfaces are invariant under dilation, so that the identity
-        for every choice of the signs is also that of the set-valued signs.
+        Arguments of signs with their degrees: the switching surfaces are invariant under dilation. An identity that
+        holds for every choice of the signs therefore also holds for set-valued signs.
     """
 
     weights: Mapping[sp.Symbol, sp.Rational]
@@ -240,7 +240,7 @@ def _search(identity: Identity, meaning: str, weights: Mapping[Any, Any]) -> Cou
 
 
 def _on_a_switch(counterexample: Counterexample) -> bool:
-    """Whether the argument of a sign may vanish at the point, where values do not refute a set-valued identity."""
+    """Whether the argument of a sign may vanish at the point: values there would not refute a set-valued identity."""
     at = {**counterexample.point, epsilon: counterexample.epsilon}
     both = sp.Tuple(counterexample.identity.left, counterexample.identity.right)
     return not all(_differ(argument.subs(at, simultaneous=True), sp.Integer(0)) for argument in signs(both))
@@ -340,7 +340,8 @@ def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control
     Returns
     -------
     int or None
-        None if no derivative up to the number of states depends on the control; then no later one does, generically.
+        None if no derivative up to the number of states depends on the control. If the field is smooth, no later one
+        does either.
     """
     for degree, _ in enumerate(field, start=1):
         output = sp.expand(lie_derivative(output, field))

@@ -90,10 +90,9 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
     assert said.splitlines()[1] == "(any shear stress of at most 25 kPa, T_s = 300 s)"
-    assert "bounds of an e-LQR for this table behind a diffusion path of L^2/D = 833 s, for a, b and D_c" in " ".join(
-        said.split()
-    )
-    assert "another design has other bounds" in " ".join(said.split())
+    said = " ".join(said.split())
+    assert "bounds of an e-LQR that was designed for this table behind a diffusion path of L^2/D = 833 s, for a" in said
+    assert "another design has other bounds" in said
     ranges = {
         name: (Fraction(95, 100) * low, Fraction(105, 100) * high) for name, (low, high) in known.task.ranges.items()
     }

@@ -170,7 +170,7 @@ def test_a_declared_slope_is_a_finite_number(wrong):
 
 
 def test_constant_friction_counts_everywhere():
-    with pytest.raises(ParameterError, match=r"Declared 0\.45, but everywhere it is 0\.5\."):
+    with pytest.raises(ParameterError, match=r"Declared 0\.45, but everywhere the law has 0\.5\."):
         friction_bounds(shape((0.4, 0.45, 0, 0))(lambda s, _: sp.Integer(1))())
 
 
@@ -185,7 +185,7 @@ def test_slow_and_short_slip_counts(axis):
         def extended(self, slip, rate):
             return sp.Rational(2, 5)
 
-    with pytest.raises(ParameterError, match=rf"upper bound .* but at {axis} .* it is 1\."):
+    with pytest.raises(ParameterError, match=rf"upper bound .* but at {axis} .* the law has 1\."):
         friction_bounds(Raised(rate_slope=1.0))
 
 

@@ -314,7 +314,7 @@ def pulse_entry(loop: Loop, gain: Fraction) -> Row:
 
 
 def without_area(loop: Loop, gain: Fraction) -> tuple[Loop, Awaited]:
-    """The loop in x2, beta0 = gain: -gain*A times every step of the well, or times its flow, enters x2."""
+    """The loop in x2, beta0 = gain: -gain*A times every pressure step of the well, or times its rate, enters x2."""
     last = next(i for i, v in enumerate(loop.outputs[3]) if v)  # the valve's last step, or the well less the valve
     kick = gain * area(loop.layer)
     flow, events = [list(line) for line in loop.flow], [([list(line) for line in jump], t) for jump, t in loop.events]

@@ -39,7 +39,7 @@ def read_reach(value: Any, loop: Loop) -> Reach:
     lines = matrix(facets, "facets", len(facets), size)
     need(size <= MAX_ENTRIES, f"facets must have at most {MAX_ENTRIES} entries")
     ordinary = all(max(abs(v.numerator), v.denominator) < TOO_LARGE for line in lines for v in line)
-    need(ordinary, "indices of facets must have at most 20 digits")
+    need(ordinary, "numbers in facets must have at most 20 digits")
     counts = [("at_samples", len(lines)), ("between", len(loop.outputs))]
     at_samples, between = (read_bases(given[name], name, count, size, len(lines)) for name, count in counts)
     need(sum(map(len, [*at_samples, *between])) <= MAX_BASES, f"there must be at most {MAX_BASES} bases")

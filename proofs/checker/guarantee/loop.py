@@ -60,13 +60,12 @@ class Loop:
     errors of e1 and e2, an input each where it is not 0. Without events there may be two inputs more, the second and
     third derivatives of the reference.
     With a diffusion path, L^2/D = `layer`, a fourth output bounds the truncation error of its modes; where `fade` is
-    given, that is one more input, the last one. Where `asked`, the last output, or the
-    last but one if `stepped`, is the pressure at the valve. `start`
-    has the columns of the box of initial conditions, none at rest. `pump` has its limits as the file states them. Where
-    the last step of the valve is bounded it is the last output, `stepped`, and `pulse` says when it may occur. `off` is
-    the jitter of measurements plus half their averaging time, and
-    `told` lists those of e1 and e2 that have an input for jitter and noise. With
-    aperiodic sampling each interval is `step` to `longest`; else `longest` is 0.
+    given, that is one more input, the last one. Where `asked`, the last output, or the last but one if `stepped`, is
+    the pressure at the valve. `start` has the columns of the box of initial conditions, none at rest. `pump` has its
+    limits as the file states them. Where the last step of the valve is bounded it is the last output, `stepped`, and
+    `pulse` says when it may occur. `off` is the jitter of measurements plus half their averaging time, and `told` lists
+    those of e1 and e2 that have an input for jitter or noise. With aperiodic sampling each interval is `step` to
+    `longest`; else `longest` is 0.
     """
 
     flow: list[Row]

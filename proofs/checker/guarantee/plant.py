@@ -16,16 +16,16 @@ from .matrices import BITS, Fixed, exponential, fixed, unit
 from .reading import Row, entries, keys, lower, matrix, need, number, row, upper
 
 MOST, MOST_LAW, MOST_LOOP, MOST_PIECES, MOST_PERIODS = 40, 48, 96, 64, 8
-AT_ONCE, LEFT, FAINT = (8, 256), 1024, 60  # periods in columns; 1/LEFT of sums may remain; 2^-FAINT raises 0
+AT_ONCE, LEFT, FAINT = (8, 256), 1024, 60  # periods in columns; 1/LEFT may remain; raised by max*2^-FAINT
 MOST_WORK = 12 * 10**8
-BEYOND = 64  # times MOST_WORK: periods within which powers of the map of a stable loop must become small
+BEYOND = 64  # times MOST_WORK: work of the periods within which powers of the map must become small
 SWEEPS = 8  # of the choice of units
 COARSE, PLACE, HALF = 58, 128, 64  # bits of entries that are multiplied at once, and of the places of their products
 
 
 @dataclass
 class Sector:
-    """phi(y, t) between low*y and high*y for y, a row over states and controls, and |y| <= `within`, if any."""
+    """phi(y, t) between low*y and high*y, y a row over states and controls; for |y| <= `within` only, if given."""
 
     entry: Row
     line: Row

@@ -84,7 +84,7 @@ def read_claims(value: Any, loop: Loop) -> dict[str, Fraction]:
 
 @dataclass(frozen=True)
 class Obligation:
-    """P >= 0 where the limits hold, and on cells all variables are non-negative; `size` is the number of variables."""
+    """P >= 0 where the limits hold and, on cells, no variable is negative; `size` is the number of variables."""
 
     name: str
     polynomial: Polynomial

@@ -13,9 +13,8 @@ disturbances of size sup(γκ)·sup|ŝ|. These claims give Y = sup α·Z + sup �
 
 |ŝ| is at most the sum of the shear stress, the rounding error of μ* and the term of inertia, sup|R|/λ₀, with R the κ of
 `sliding_small_gain`. In R, |w′| ≤ (K + 2Σk)V(e^Y − 1 + swing) + μ*q̇ replaces K|x′| + μ*|q′|, q̇ = 2Q/lag, Y the
-largest of all blocks. y, z, w and q
-are continuous and initially 0, and u is determined by samples before it acts. So if bounds below the claims Z, W and Q
-follow from these, no claim is ever reached. ∎
+largest of all blocks. y, z, w and q are continuous and initially 0, and u is determined by samples before it acts. So
+if bounds below the claims Z, W and Q follow from these, no claim is ever reached. ∎
 """
 
 from dataclasses import dataclass
@@ -247,9 +246,10 @@ class SlidingBlocks:
             name=name,
             remarks={
                 "plant": f"of {name}, in slow sliding with all constants as given, from steady sliding, with a lag of "
-                f"{shortly(self.lag)} s at the wells that the planned pressure does not include",
-                "disturbances": f"ratios of slip rate to V due to {LowerBound(self.stress).quantity('Pa', 4)} of shear "
-                f"stress and up to {more.quantity('Pa')} of inertia and rounding",
+                f"{shortly(self.lag)} s at the wells, which does not act on the planned pressure",
+                "disturbances": f"changes of slip rate, divided by V, due to "
+                f"{LowerBound(self.stress).quantity('Pa', 4)} of shear stress and up to {more.quantity('Pa')} of "
+                "inertia and rounding",
             },
         )
 

@@ -81,8 +81,8 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
             return _claimed(plant, part, law, cut, responses, inputs)
         for name in left:
             bounds[name] = _rounded(reached[name] * _WIDER)
-    name = free[0]
-    reason = f"the argument of {name} may exceed every bound that was tried, up to {UpperBound(bounds[name]):.3g}"
+    name = left[0]
+    reason = f"the argument of {name} may exceed every bound that was tried, up to about {float(bounds[name]):.3g}"
     return NoProof(reason=reason)
 
 

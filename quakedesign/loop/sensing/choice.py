@@ -136,9 +136,8 @@ def _function(unit: Differentiator) -> ca.Function:
 # is self-consistent. For signed powers up to 1 the difference is largest across the origin, at e = −ε/2. For a
 # linear law the left-hand side grows with λ_d as ε does, so that the sampling period decides; for a sliding mode it
 # grows more slowly, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and with
-# zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs no such
-# bound for a fault initially at rest, and its estimates are then proved for a linear law
-# (`quakedesign.loop.sensing.differentiator`).
+# zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs no such bound for a fault
+# initially at rest, and its estimates are then proved for a linear law (`quakedesign.loop.sensing.differentiator`).
 #
 # The condition is a premise of the differentiator. It does not prove that the loop with estimates is stable, and loops
 # may work without it. It neglects the stages before the differentiator; a mean of N readings lags by (N − 1)T/2 more.

@@ -88,7 +88,7 @@ def _check_proof(certificate: Evidence) -> None:
     allowed |= {"decay"} if second == "decrease" else set()
     require(
         required <= set(claims) <= required | allowed,
-        f"the claims must include positive and {second}, and may include only bounds of states and, on cells, decay.",
+        f"the claims must include positive and {second}; any others must be bounds of states or, on cells, decay.",
     )
     require(all(c > 0 for c in claims.values()), "a claim must be positive.")
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)

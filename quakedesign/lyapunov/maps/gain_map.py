@@ -74,7 +74,7 @@ class Screener:
         self._answered = 0
 
     def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
-        """Limit and feasible levels of every point, searched from the previous point's level; number of solves."""
+        """Limit and number of feasible levels of every point, from that of the previous one; number of solves."""
         limits, start, before = [], len(self.sheet.levels), self._solves()
         self._followed.clear()
         for place in places:

@@ -62,7 +62,7 @@ class Statement:
         )
         if () not in self.products or len(set(self.products)) != len(self.products) or not well_formed:
             raise PolynomialError(
-                f"products must be distinct increasing index sets that include (). Received {self.products}."
+                f"products must be distinct increasing index sets, one of them (). Received {self.products}."
             )
 
     @cached_property

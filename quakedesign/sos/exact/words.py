@@ -82,8 +82,8 @@ def _reason(answer: Answer) -> list[str]:
             ]
         case Functional():
             return [
-                f"no sum of squares with summands up to degree {statement.degree} proves this: a rational functional "
-                f"with {len(proof.values)} values is non-negative on all such sums and negative on this polynomial"
+                f"it has no sum of squares with summands up to degree {statement.degree}: a rational functional with "
+                f"{len(proof.values)} values is non-negative on all such sums and negative on this polynomial"
             ]
         case Point():
             point = ", ".join(

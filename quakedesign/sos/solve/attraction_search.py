@@ -312,7 +312,7 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
     field : mapping of str or Symbol to str, SymPy expression or mapping
         Rate of every state: a polynomial in the states with rational coefficients that vanishes at the origin.
     V : str, SymPy expression or mapping, optional
-        Lyapunov function; by default the function searches for one.
+        Lyapunov function; by default one is sought.
     degrees : sequence of int
         Degrees of V that the search tries in turn.
 
@@ -357,8 +357,8 @@ def region_of_attraction(
     relative : float
         Relative width of the final bracket of the bisection; from 1e-6 to below 1.
     degree : int, optional
-        Even degree up to which other V are tried, starting from the given one, so that the region contains a larger
-        part of the shape.
+        Even degree up to which other V are tried, starting from `V` or its default, so that the region contains a
+        larger part of the shape.
     shape : str, SymPy expression or mapping, optional
         A polynomial that is positive except at the origin. The result contains the largest β found for which
         {shape ≤ β} is proved to lie in the region. By default Σ x_i² if a degree is given, otherwise none.

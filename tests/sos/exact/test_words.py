@@ -82,7 +82,7 @@ def test_conditions_and_multiplier_are_told():
 def test_a_functional_says_up_to_which_degree():
     found = sentences(Answer(statement=ASKED, proof=Functional(values={(0,): F(1), (2,): F(3)})))
     assert found[1] == (
-        "no sum of squares with summands up to degree 2 proves this: a rational functional with 2 values is "
+        "it has no sum of squares with summands up to degree 2: a rational functional with 2 values is "
         "non-negative on all such sums and negative on this polynomial"
     )
 
