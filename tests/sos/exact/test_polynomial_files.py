@@ -162,6 +162,10 @@ ILL_FORMED = {
     "basis of a monomial as a polynomial": with_square(basis=[{"1,0": "1"}, [0, 1]]),
     "basis of an empty polynomial": with_square(basis=[{}, [0, 1]]),
     "basis of another length": with_square(basis=[[1], [0, 1]]),
+    "basis with a negative exponent": with_square(basis=[[1, -1], [0, 1]]),
+    "basis of a polynomial in another number of variables": with_square(basis=[{"1": "2", "0": "1"}, [0, 1]]),
+    "cofactor in another number of variables": BY_HAND
+    | {"equalities": [{"1,0": "1"}], "sos": BY_HAND["sos"] | {"cofactors": [{"1": "1"}]}},
     "gram too short": with_square(gram=["1", "0"]),
     "gram too long": with_square(gram=["1", "0", "1", "0"]),
     "cofactor without equality": replaced(BY_HAND, ("sos", "cofactors"), [{}]),
@@ -174,6 +178,19 @@ def test_what_breaks_a_rule_is_not_read(case):
     load(json.dumps(BY_HAND))
     with pytest.raises(CertificateError):
         load(json.dumps(ILL_FORMED[case]))
+
+
+MANY = {f"{i},{j}": "1" for i in range(142) for j in range(142)}
+
+
+@pytest.mark.parametrize("key", ["polynomial", "functional"])
+def test_a_polynomial_of_a_file_has_at_most_20000_terms(key):
+    plain = {name: entry for name, entry in BY_HAND.items() if name != "sos"}
+    refuted = plain | {"not-sos": {"functional": {"0,0": "1"}}}
+    assert load(json.dumps(refuted))[1] == Functional(values={(0, 0): Fraction(1)})
+    long = refuted | ({"polynomial": MANY} if key == "polynomial" else {"not-sos": {"functional": MANY}})
+    with pytest.raises(CertificateError, match=f"{key} is longer than 20000 terms"):
+        load(json.dumps(long))
 
 
 @pytest.mark.parametrize("point", [[], ["1"], ["1", "0", "1"]])

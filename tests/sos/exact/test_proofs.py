@@ -16,6 +16,7 @@ from quakedesign.sos.exact.proofs import (
     holds,
     identity_holds,
     in_echelon_form,
+    localizing_matrix,
 )
 
 ONE = Fraction(1)
@@ -259,6 +260,23 @@ def test_a_functional_must_be_negative_at_the_target():
     assert holds(in_x({1: -1}), at_one)
     assert not holds(in_x({1: 1}), at_one)
     assert not holds(in_x({1: 1, 0: -1}), at_one)
+
+
+def test_a_functional_must_be_non_negative_on_the_squares_of_every_product():
+    """L(1) = 1, L(x) = -1 and L(x²) = 2 are non-negative on squares of degree 2; on 1·x they are not, L(x) = -1."""
+    values, target = {(0,): ONE, (1,): -ONE, (2,): Fraction(2)}, {2: 1, 1: 4, 0: 1}
+    assert holds(in_x(target), Functional(values=values))
+    assert not holds(in_x(target, inequalities=(X,), products=((), (0,))), Functional(values=values))
+    assert not holds(in_x(target), Functional(values=values | {(2,): -ONE}))
+
+
+def test_a_functional_is_zero_on_monomials_without_a_value():
+    """L(x²) = 1 alone; the target x²/2 - x⁴ has L = 1/2, its negative -1/2; in the matrix L(x³) and L(x⁴) are 0."""
+    values = {(2,): ONE}
+    assert not holds(in_x({2: Fraction(1, 2), 4: -1}), Functional(values=values))
+    asked = in_x({2: Fraction(-1, 2), 4: Fraction(1, 3)})
+    assert localizing_matrix({(0,): ONE}, [(1,), (2,)], values) == [[1, 0], [0, 0]]
+    assert holds(asked, Functional(values=values))
 
 
 def test_a_point_must_satisfy_every_condition():

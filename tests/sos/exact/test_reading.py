@@ -79,6 +79,11 @@ def test_everything_else_is_refused(polynomial, on, variables):
         read(polynomial, on, None, variables)
 
 
+def test_variables_differ_from_each_other():
+    with pytest.raises(PolynomialError, match=r"variables must be different\. Received x, y, x\. Rename one"):
+        read({(1, 0, 0): 1}, (), None, ("x", "y", "x"))
+
+
 def test_what_the_variables_lack_is_said():
     with pytest.raises(PolynomialError, match="needs its variables"):
         read({(1, 0): 1}, (), None, None)

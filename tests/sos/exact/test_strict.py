@@ -3,6 +3,7 @@
 import json
 import math
 import time
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated
 
@@ -10,12 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import Meta
+from msgspec.structs import replace
 
 from quakedesign.errors import CertificateError
+from quakedesign.exact import UpperBound
 from quakedesign.sos.exact.strict import (
     Entries,
     PolynomialEntries,
     common_grid,
+    headed,
     made,
     parse,
     polynomial_text,
@@ -216,3 +220,60 @@ def test_a_common_denominator_of_the_largest_length_is_read():
     for gram in ([Fraction(1, 2**16384)], [Fraction(1, 2**16383), Fraction(1, 3)]):
         with pytest.raises(CertificateError):
             common_grid(gram)
+
+
+def test_a_file_has_its_format_and_kind():
+    assert headed({"format": 1, "kind": "a", "x": 2}, "a") == {"x": 2}
+    assert headed({"format": 1, "kind": "a", "x": 2}) == {"kind": "a", "x": 2}
+    assert headed({"format": 1}) == {}
+    for raw in ({"format": 1, "kind": "b"}, {"format": 1}, {"format": 1, "kind": None}):
+        with pytest.raises(CertificateError, match="kind must be a"):
+            headed(raw, "a")
+    for raw in ({"kind": "a"}, {"format": 2, "kind": "a"}, {"format": True, "kind": "a"}, {"format": "1"}):
+        with pytest.raises(CertificateError, match="format must be 1"):
+            headed(raw, "a")
+    with pytest.raises(CertificateError, match="the file must be an object"):
+        headed([1], "a")
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """A value of the package, without rules of its own."""
+
+    top: UpperBound
+    low: Fraction = Fraction(0)
+    parts: tuple[Part, ...] = ()
+
+
+def test_a_value_is_read_and_written_by_the_types_of_its_fields():
+    least = read_as(Bounds, {"top": "1/3"})
+    assert (least, type(least.top), type(least.low)) == (Bounds(top=UpperBound(Fraction(1, 3))), UpperBound, Fraction)
+    assert written(least) == {"top": "1/3"}
+    whole = {"top": "2", "low": "-1", "parts": [{"size": "0", "name": "a"}, GIVEN]}
+    assert written(read_as(Bounds, whole)) == whole
+    assert type(read_as(Bounds, whole).low) is Fraction
+
+
+@pytest.mark.parametrize(
+    ("raw", "said"),
+    [
+        ({"top": "2", "low": "0"}, "^low must be a known key, and omitted where it has its default value"),
+        ({"top": "2", "parts": [{"size": "0", "name": "a", "count": 1}]}, r"^parts\[0\]\.count must be a known key"),
+        (
+            {"top": "2", "parts": [{"size": "0", "name": "a"}, {"size": "0", "name": "a", "count": 1}]},
+            r"^parts\[1\]\.count must be a known key",
+        ),
+        ({"top": "2", "b" * 50: "1"}, f"^{'b' * 40} must be a known key"),
+        ({"top": "2", "b" * 40: "1"}, f"^{'b' * 40} must be a known key"),
+    ],
+)
+def test_the_place_of_a_key_that_may_not_be_there_is_named(raw, said):
+    with pytest.raises(CertificateError, match=said):
+        read_as(Bounds, raw)
+
+
+def test_an_object_is_made_of_entries_then_of_sources_then_of_defaults():
+    part = read_as(Part, GIVEN)
+    assert made(Part, object(), size=Fraction(1), name="a") == read_as(Part, {"size": "1", "name": "a"})
+    assert made(Part, object(), part, replace(part, name="c"), count=3) == read_as(Part, GIVEN | {"count": 3})
+    assert made(Bounds, part, top=UpperBound(1)) == Bounds(top=UpperBound(1))
