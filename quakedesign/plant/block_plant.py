@@ -315,7 +315,7 @@ def _moving(
 def _closed(gains: Sequence[Sequence[Fraction]], first: Sequence[Fraction]) -> list[Fraction] | None:
     """F > 0 with first + gains·F < F, computed in floats and checked exactly; None if the check fails."""
     matrix = np.array(gains, dtype=float)
-    if not np.isfinite(matrix).all() or max(abs(np.linalg.eigvals(matrix))) >= 1:
+    if max(abs(np.linalg.eigvals(matrix))) >= 1:
         return None
     wider = np.array(first, dtype=float)
     wider = wider * _WIDER + 1e-9 * max(wider.max(), 1e-100)

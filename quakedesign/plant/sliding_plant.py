@@ -6,10 +6,9 @@ Quantities are per unit of area. The cells into which cuts divide the box of con
 from collections.abc import Mapping
 from dataclasses import replace
 from fractions import Fraction
-from typing import get_args
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError, require_known
+from quakedesign.errors import ParameterError
 from quakedesign.exact import apart, shortly, six_digits
 from quakedesign.loop import StateLaw
 
@@ -91,7 +90,6 @@ class SlidingPlant:
         for name in ("damping", "distance", "ramp", "stress"):
             self._require(getattr(self, name) >= 0, name, "0 or more", shortly(getattr(self, name)))
         self._require(0 <= self.swing < 1, "swing", "from 0 to below 1", shortly(self.swing))
-        require_known(self.state_law, get_args(StateLaw), "state_law")
 
     def _require(self, holds: bool, name: str, condition: str, value: str) -> None:
         if not holds:

@@ -159,3 +159,9 @@ def test_blocks_wells_and_springs_are_rejected(blocks, wells, coupling, said):
 def test_up_to_twenty_blocks_have_a_plant():
     assert len(UncertainPlant.from_blocks(PAPER, 20).A) == 40
     assert block_parts(PAPER, 2, "each", "3")["A"][2][:2] == [-3, 3]
+
+
+def test_the_disturbance_is_printed_rounded_down_to_four_digits():
+    fault = replace(PAPER, disturbance=replace(PAPER.disturbance, amplitude=3.23456e-4))
+    said = block_parts(fault, 2, "each", None)["remarks"]["disturbances"]
+    assert said.startswith("on a block: 323.4 µm/s² of disturbance")

@@ -384,10 +384,11 @@ def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
     except ValueError as error:
         reason = str(error).partition("\n")[0]
         raise PolynomialError(f"{path} must be TOML. Received: {reason}. Quote polynomials.") from None
-    field, function = raw.get("field"), raw.get("V")
+    field: Any = raw.get("field")
+    function = raw.get("V")
     sound = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
     if not raw.keys() <= {"field", "V"} or not sound or not isinstance(function, str | None):
         raise PolynomialError(
             f'{path} must have a table [field], such as x = "-x + x^3", and at most V = "x^2" before it.'
         )
-    return dict(field or {}), function
+    return dict(field), function

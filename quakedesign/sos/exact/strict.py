@@ -4,7 +4,7 @@ import json
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from fractions import Fraction
 from functools import cache, lru_cache
 from itertools import accumulate
@@ -203,24 +203,16 @@ def written(value: object) -> Any:
             return {key: written(entry) for key, entry in value.items()}
     if parts := _parts(cast(Any, type(value))):
         entries = ((key, getattr(value, name), default) for name, key, default in parts)
-        return {key: written(entry) for key, entry, default in entries if default is _NONE or entry != default}
+        return {key: written(entry) for key, entry, default in entries if entry != default}
     return value
-
-
-_NONE = object()
 
 
 @cache
 def _parts(kind: Any) -> tuple[tuple[str, str, Any], ...]:
-    """Name, key and default value of every field of an object; empty for other types."""
+    """Name, key and default value, or a mark for none, of every field of an object; empty for other types."""
     if issubclass(kind, msgspec.Struct):
-        parts = ((part.name, part.encode_name, part.default) for part in msgspec.structs.fields(kind))
-        return tuple((name, key, _NONE if default is msgspec.NODEFAULT else default) for name, key, default in parts)
-    if is_dataclass(kind):
-        return tuple(
-            (part.name, part.name, _NONE if part.default is MISSING else part.default) for part in fields(kind)
-        )
-    return ()
+        return tuple((part.name, part.encode_name, part.default) for part in msgspec.structs.fields(kind))
+    return tuple((part.name, part.name, part.default) for part in fields(kind)) if is_dataclass(kind) else ()
 
 
 class PolynomialEntries(dict[tuple[int, ...], Fraction]):
@@ -230,8 +222,7 @@ class PolynomialEntries(dict[tuple[int, ...], Fraction]):
 def _decoded(kind: type, raw: object) -> Any:
     if kind is PolynomialEntries:
         return PolynomialEntries(read_polynomial(raw))
-    number = read_rational(raw)
-    return number if kind is Fraction else kind(number)
+    return kind(read_rational(raw))  # a Fraction or a bound
 
 
 def _difference(raw: Any, again: Any) -> str:

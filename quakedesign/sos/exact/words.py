@@ -128,7 +128,7 @@ def region_words(region: Region) -> list[str]:
     shown = region.proved or region.refuted
     if shown is not None:
         lines += claim_words(shown)
-    if region.inclusion is not None and (level := region.shape_level) is not None:
+    if (level := region.shape_level) is not None:
         lines.append(f"the region contains {_shape(region)} <= {level} ({LowerBound(level)} rounded down)")
     if region.proved is not None and region.refuted is not None:
         lines += _point_words(region.refuted)

@@ -6,7 +6,7 @@ import pytest
 import sympy as sp
 
 from quakedesign.errors import ParameterError, PolynomialError
-from quakedesign.sos.exact.polynomial_text import read
+from quakedesign.sos.exact.polynomial_text import read, read_element
 
 x, y, z = sp.symbols("x y z")
 
@@ -89,3 +89,27 @@ def test_what_the_variables_lack_is_said():
         read({(1, 0): 1}, (), None, None)
     with pytest.raises(PolynomialError, match=r"variables must be among x, y\. Received z as well"):
         read(x * z, (), None, ("x", "y"))
+
+
+@pytest.mark.parametrize(
+    ("given", "element"),
+    [
+        ([1, 2], (1, 2)),
+        ((0, 0), (0, 0)),
+        ((1.0, 2), (1, 2)),
+        ((F(2), 1), (2, 1)),
+        ("x*y^2", (1, 2)),
+        ({(1, 2): 1}, (1, 2)),
+        (x * y**2, (1, 2)),
+        ("x - y", {(1, 0): 1, (0, 1): -1}),
+        ({(1, 2): 3}, {(1, 2): 3}),
+    ],
+)
+def test_an_element_of_a_basis_is_a_monomial_or_a_polynomial(given, element):
+    assert read_element(given, ("x", "y")) == element
+
+
+@pytest.mark.parametrize("given", [(1.5, 2), ("1", 2), (None, 1), (-1, 1), (1,)])
+def test_other_exponents_of_an_element_are_rejected(given):
+    with pytest.raises(PolynomialError):
+        read_element(given, ("x", "y"))

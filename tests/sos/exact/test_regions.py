@@ -11,7 +11,7 @@ from quakedesign.sos.exact.answer import Answer, Positivity
 from quakedesign.sos.exact.attraction import Attraction, LyapunovProof, Region, along, read_field
 from quakedesign.sos.exact.polynomial_statement import Statement, statement
 from quakedesign.sos.exact.proofs import Functional, Point, Square, SumOfSquares
-from quakedesign.sos.exact.words import claim_words, region_entries, region_words, statement_words
+from quakedesign.sos.exact.words import claim_words, region_entries, region_words, sentences, statement_words
 
 ONE = {(0,): F(1)}
 
@@ -157,6 +157,9 @@ def test_words_of_claims():
     assert claim_words(BEYOND) == [
         *cubic, "V does not fall at x = 2, so that no level above 4 (rounded up) holds",
     ]  # fmt: skip
+    assert claim_words(replace(BEYOND, lyapunov={(2,): F(1, 8)}))[-1] == (
+        "V does not fall at x = 2, so that no level above 0.5 (rounded up) holds"
+    )
     assert claim_words(replace(BEYOND, lyapunov={(2,): F(-1)}))[-1] == "V is not positive at x = 2"
     assert claim_words(replace(BEYOND, lyapunov={(2,): F(1), (1,): F(-2)}))[-1] == "V is not positive at x = 2"
 
@@ -174,6 +177,19 @@ def test_words_and_entries_of_a_region_with_both_ends_and_a_shape():
         "verdict": "proved", "variables": ["x"], "V": "x^2", "everywhere": False, "level": "1/3", "shape": "3*x^2",
         "shape_level": "1/8", "refuted_above": "4", "point": ["2"], "equilibrium": False, "remark": None,
     }  # fmt: skip
+
+
+def test_a_shape_in_two_variables_is_that_of_the_inclusion():
+    disc = {(0, 0): F(1, 8), (2, 0): F(-3), (0, 2): F(-1), (1, 1): F(1)}
+    inside = replace(
+        INSIDE,
+        statement=Statement(
+            variables=("x", "y"), polynomial={(0, 0): F(1)}, inequalities=(disc,), products=((), (0,)), degree=2,
+            multiplier={(0, 0): F(1)},
+        ),
+    )  # fmt: skip
+    entries = region_entries(Region(proved=PROVED, refuted=None, inclusion=inside))
+    assert (entries["shape"], entries["shape_level"]) == ("3*x^2 - x*y + y^2", "1/8")
 
 
 def test_words_and_entries_of_the_whole_space_a_refutation_and_neither():
@@ -253,6 +269,11 @@ def test_a_set_is_evidently_empty(given, empty):
     assert answer(**given).set_is_empty == empty
     assert not answer(**given, proof=None).set_is_empty
     assert not answer(**given, proof=Point(coordinates=(F(0), F(0)))).set_is_empty
+
+
+def test_a_proof_on_an_empty_set_says_so():
+    assert "the set is empty, so that this holds trivially" in sentences(answer(MINUS))
+    assert "the set is empty, so that this holds trivially" not in sentences(answer(X2))
 
 
 def test_a_verdict_is_that_of_the_proof():

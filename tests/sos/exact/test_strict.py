@@ -18,6 +18,7 @@ from quakedesign.exact import UpperBound
 from quakedesign.sos.exact.strict import (
     Entries,
     PolynomialEntries,
+    _difference,
     common_grid,
     headed,
     made,
@@ -277,3 +278,15 @@ def test_an_object_is_made_of_entries_then_of_sources_then_of_defaults():
     assert made(Part, object(), size=Fraction(1), name="a") == read_as(Part, {"size": "1", "name": "a"})
     assert made(Part, object(), part, replace(part, name="c"), count=3) == read_as(Part, GIVEN | {"count": 3})
     assert made(Bounds, part, top=UpperBound(1)) == Bounds(top=UpperBound(1))
+
+
+def test_entries_that_differ_are_placed_where_they_first_do():
+    assert _difference({"a": ["1", {"b": "2"}]}, {"a": ["1", {"b": "2"}]}) == ""
+    assert _difference({"a": ["1", {"b": "2"}]}, {"a": ["1", {"b": "3"}]}) == ".a[1].b "
+    assert _difference({"a": ["1", "2"]}, {"a": ["0", "2"]}) == ".a[0] "
+    assert _difference({"a": "1"}, ["a"]) == _difference(["a"], {"a": "1"}) == _difference("1", 1) == " "
+
+
+@pytest.mark.parametrize("value", [None, 1.5, object()])
+def test_a_value_of_another_type_is_written_as_it_is(value):
+    assert written(value) is value
