@@ -30,9 +30,9 @@ def tasks(least="0.3", largest="0.33", weakening="0.02"):
     ]
 
 
-def solved(diagonal, force, right_side):
+def solved(diagonal, force, right_side, spring=float(K)):
     """Slips and pressure of [[diagonal + springs, force], [weights, 0]]."""
-    pulls = np.array([[-float(K), float(K)], [2 * float(K), -2 * float(K)]])
+    pulls = np.array([[-spring, spring], [2 * spring, -2 * spring]])
     rows = np.zeros((3, 3))
     rows[:2, :2] = np.diag(np.array(diagonal, dtype=float)) + pulls
     rows[:2, 2] = [float(f) * float(s[0]) for f, s in zip(force, SHARES, strict=True)]
@@ -75,6 +75,25 @@ def test_moves_and_pressures_are_those_of_all_slopes_and_gains():
     assert (moves <= bounds).all()
     assert (bounds <= 1.6 * moves).all()
     assert pressures <= most <= 1.6 * pressures
+
+
+def test_the_deviations_start_from_those_at_the_middle_of_all_ranges(monkeypatch):
+    """Half of s times |1 + ξ|, and half of β times b|q|, of the solution with the middles."""
+    both, given = tasks(), []
+    both[1] = replace(both[1], friction=replace(both[1].friction, weakening=F("0.4")))
+    stresses = [(F(3 * 10**7), F(5 * 10**7)), (F(4 * 10**7), F(5 * 10**7))]
+    monkeypatch.setattr(block_plant, "_closed", lambda gains, first: given.append(first))
+    soft = [(i, j, spring / 400) for i, j, spring in SPRINGS]
+    block_plant._moving(both, soft, SHARES, WEIGHTS, stresses)
+    slopes = [task.slip_slopes(stress) for task, stress in zip(both, stresses, strict=True)]
+    s, beta = ([float(low + high) / 2 for low, high in ends] for ends in (slopes, [task.beta for task in both]))
+    force = [float(task.authority) for task in both]
+    *xi, q = solved(s, [b * f for b, f in zip(beta, force, strict=True)], [*(-v for v in s), 0], 0.1)
+    assert abs(xi[0] - xi[1]) > 0.2
+    for i, first in enumerate(given[0]):
+        halves = [float(high - low) / 2 for low, high in (slopes[i], both[i].beta)]
+        exact = halves[0] * abs(1 + xi[i]) + halves[1] * abs(force[i] * float(SHARES[i][0]) * q)
+        assert float(first) == pytest.approx(exact, rel=1e-4)
 
 
 def test_without_a_solution_nothing_is_bounded(monkeypatch):

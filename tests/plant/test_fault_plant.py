@@ -38,16 +38,17 @@ def test_constants_per_mass_have_their_own_spreads():
     assert (PLANT.authority, PLANT.beta) == (F(15, 256), (1, F(17, 5)))
 
 
+@pytest.mark.parametrize("growth", [F(1, 2), F(21, 8)])  # with the second the disturbance exceeds the spring
 @pytest.mark.parametrize("law", LAWS)
-def test_the_stress_is_that_of_every_friction_stiffness_and_slip(law):
+def test_the_stress_is_that_of_every_friction_stiffness_and_slip(law, growth):
     """(μ*σ' - (k - φ1)/n·r)/μ on a grid of slips that contains all kinks of the bounds of friction."""
     values = [
-        (law.static * 10 - (k - F(1, 2)) / n * r) / mu
+        (law.static * 10 - (k - growth) / n * r) / mu
         for r in (F(3 * i, 192) for i in range(193))
         for k, n in product(STIFFNESS, AREA)
         for mu in (max(law.least, law.static - law.weakening * r), min(law.largest, law.static + law.strengthening * r))
     ]
-    plant = replace(PLANT, friction=law)
+    plant = replace(PLANT, friction=law, growths=(growth, F(1, 3)))
     assert plant.stress == (min(values), max(values))
     assert plant.rest_pressure == (10 - max(values), 10 - min(values))
 

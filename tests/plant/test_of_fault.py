@@ -28,6 +28,8 @@ def test_a_plant_like_another_has_its_class_of_disturbances(rate_limited):
 def test_static_friction_is_that_at_rest_at_the_initial_slip():
     law = SlipRateWeakening(residual=0.25, drop=0.08, critical_rate=1.0)
     assert static_friction(replace(load_fault("real-fault"), friction=law)) == F("0.33")
+    third = SimpleNamespace(exact=lambda: SimpleNamespace(coefficient=lambda slip, rate: sp.Rational(1, 3) + slip))
+    assert static_friction(SimpleNamespace(friction=third)) == F(1, 3)
     irrational = SimpleNamespace(exact=lambda: SimpleNamespace(coefficient=lambda slip, rate: sp.sqrt(2) / 4 + slip))
     with mpmath.workdps(60):
         error = mpmath.mpf(static_friction(SimpleNamespace(friction=irrational)).numerator)

@@ -272,6 +272,11 @@ def test_a_root_with_a_range_stands_under_signs_alone_and_leaves_no_sign_open():
         open_ = {"n": (power(1, ("x", 1, "s"), parameters=("r",)), power(number, ("x", 1, "s")))}
         with pytest.raises(CertificateError, match="the sign of a coefficient in the argument of n depends on a root"):
             _ = lifted(open_, ("n", 0, "s"), states=("x",), **RANGE).cells
+    for number in ("1/5", "-1/5"):  # 0 at the lower end of the range
+        from_zero = {"n": (power(1, ("x", 1, "s")), power(number, ("y", 1, "s"), parameters=("r",)))}
+        wide = RANGE | {"roots": {"r": ("k", (F(0), F(3, 2)))}}
+        with pytest.raises(CertificateError, match="the sign of a coefficient in the argument of n depends on a root"):
+            _ = lifted(from_zero, ("n", 0, "s"), **wide).cells
     point = RANGE | {"gains": {"k": F(9, 4)}, "roots": {"r": ("k", (F(3, 2), F(3, 2)))}}
     assert lifted(ROOTED, ("n", 1, "s"), **point).cells[0].equalities == (
         {(0, 0, 1): 1, (1, 0, 0): -1, (0, 1, 0): F(-3, 10)},
