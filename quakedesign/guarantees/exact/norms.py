@@ -661,10 +661,10 @@ def _but(column: arb_mat, place: int) -> arb_mat:
 # ----------------------------------------------------------------------
 # L1 norms of a periodic loop: bounds of every output for an input bounded by 1, in ball arithmetic.
 #
-# **Statement.** Let x′ = Ax + b·w between jumps, x(0) = 0, and w be measurable with |w| ≤ W on [0, t]. Then |cx(t)| ≤
-# g·W with the g that `norms` returns for the part of the period in which t lies.
+# **Statement.** Let x′ = Ax + b·w between jumps, x(0) = 0, and w be measurable with |w| ≤ ŵ on [0, t]. Then |cx(t)| ≤
+# g·ŵ with the g that `norms` returns for the part of the period in which t lies.
 #
-# **Proof.** x(t) = ∫₀ᵗ Φ(t, τ)b·w(τ)dτ, so |cx(t)| ≤ W·∫|cΦ(t, τ)b|dτ over [0, t], which grows when the loop is
+# **Proof.** x(t) = ∫₀ᵗ Φ(t, τ)b·w(τ)dτ, so |cx(t)| ≤ ŵ·∫|cΦ(t, τ)b|dτ over [0, t], which grows when the loop is
 # continued periodically to the past and the integral taken over (−∞, t]. That integral is bounded from above in parts:
 #
 # - *A piece of length h of a flow.* y(σ) = row·e^{Aσ}b is within (σ − α)(β − σ)/2·max|y″| of its chord on [α, β], so
@@ -681,11 +681,11 @@ def _but(column: arb_mat, place: int) -> arb_mat:
 #   constant of its chord. The total is below a chord plus remainders, hence at most the larger of the two ends plus
 #   remainders. ∎
 #
-# **Sampled inputs.** Where Σ j·w_k enters with the jumps at kT and |w_k| ≤ W for every k up to t, |cx(t)| ≤ W·Σ|cΦ(t,
+# **Sampled inputs.** Where Σ j·w_k enters with the jumps at kT and |w_k| ≤ ŵ for every k up to t, |cx(t)| ≤ ŵ·Σ|cΦ(t,
 # kT)j|, as above with a sum in place of the integral. A period has one column, e^{Aτ}j, without a remainder. The flow
 # since the last jump adds |ce^{Aθ}j|, which is within (β − α)²/8·max|cA²e^{Aσ}j| of its chord.
 #
-# **Decaying inputs.** Where |w(τ)| ≤ W·ω(τ) with a weight ω of the phase, let Ω ≥ ∫ω and Ω′ ≥ ∫(τ − α)ω over a piece
+# **Decaying inputs.** Where |w(τ)| ≤ ŵ·ω(τ) with a weight ω of the phase, let Ω ≥ ∫ω and Ω′ ≥ ∫(τ − α)ω over a piece
 # that begins at α. There |cΦ(t, τ)b| ≤ |cΦ(t, α)b| + (τ − α)·max|cΦA·b|, so Ω|cΦ(t, α)b| + Ω′·max|…| replaces the
 # trapezoidal sum. In the flow since the last jump, a past piece adds Ω|ce^{A(θ − α)}b|, which is within (β −
 # α)²/8·Ω·max|cA²e^{Aσ}b| of its chord, and Ω′ times the largest slope; the piece that contains θ adds at most
@@ -694,7 +694,7 @@ def _but(column: arb_mat, place: int) -> arb_mat:
 #
 # **Pulses.** Let w be nonzero from `early` before a jump J to `late` after it. After the jump, an impulse of w at −σ or
 # σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area before the jump
-# over `before` plus the area after it over `after` is at most W. So both together give at most the larger of the
+# over `before` plus the area after it over `after` is at most ŵ. So both together give at most the larger of the
 # responses to `before`·Jb and `after`·b, and of these remainders. With x and y for the two that is |x + y|/2 + |x −
 # y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added
 # to the outputs of the pieces within `early`.

@@ -18,10 +18,11 @@ B = TypeVar("B")
 class Proof(ABC, Generic[B]):
     """Claims about one loop that check themselves; base of one class for each theorem.
 
-    **Principle.** A theorem bounds the claimed quantities up to time t, on every cell of the box of constants. It may
-    assume the claims up to t: slow sliding does so for all inputs, tracking only for an implicit step and a slowly
-    varying input gain. The claims follow if each bound is below its claim, or at most equal to it where earlier samples
-    alone determine the input: as the quantities are continuous and initially within the claims, they stay within them.
+    **Principle.** A theorem bounds the claimed quantities for all t, and the claims follow if each bound is at most its
+    claim. Some theorems assume the claims up to time t: that of slow sliding for all inputs, on every cell of its box
+    of constants, and that of tracking for an implicit step and for a slowly varying input gain. There each bound has to
+    be below its claim, or at most equal to it where earlier samples alone determine the input: as the quantities are
+    continuous and initially within the claims, they stay within them.
 
     Attributes
     ----------
@@ -60,7 +61,7 @@ class Proof(ABC, Generic[B]):
 
     @abstractmethod
     def recomputed(self) -> "B | NoProof":
-        """Bounds that the theorem gives on all cells, in ball arithmetic, or the reason why it gives none."""
+        """Bounds that the theorem gives, in ball and rational arithmetic, or the reason why it gives none."""
 
     @abstractmethod
     def supported(self, bounds: B) -> bool:

@@ -76,7 +76,7 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingClaims:
-    """Claimed bounds of absolute values, for all t ≥ 0.
+    """Claimed bounds of absolute values, while the reference moves over the distance of the plant.
 
     Attributes
     ----------
@@ -364,7 +364,7 @@ def _ageing(task: SlidingPlant) -> Range:
 
 
 def _off(task: SlidingPlant) -> Fraction:
-    """r = sup|ρ/ρ₀ − 1|, ρ₀ the midpoint of the range of ρ."""
+    """χ = sup|ρ/ρ₀ − 1|, ρ₀ the midpoint of the range of ρ."""
     slow, fast = _ageing(task)
     return (fast - slow) / (fast + slow)
 

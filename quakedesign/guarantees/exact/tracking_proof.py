@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _DIGITS = 4
 _ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
-MARGIN = Fraction(1001, 1000)  # so that a checker with slightly larger bounds proves the same claim
+MARGIN = Fraction(1001, 1000)  # the standalone checker has slightly larger bounds, and is to prove the same claims
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
