@@ -29,7 +29,13 @@ PLANT = FaultPlant(
     growths=(F(1, 2), F(1, 3)),
 )
 STIFFNESS, DAMPING, AREA = (F(3, 2), F(5, 2)), (F(7, 4), F(9, 4)), (F(15, 64), F(17, 64))
-LAWS = [LAW, replace(LAW, strengthening=F(1, 8)), replace(LAW, weakening=F(0)), replace(LAW, weakening=F(1, 64))]
+LAWS = [
+    LAW,
+    replace(LAW, strengthening=F(1, 8)),
+    replace(LAW, strengthening=F(1, 4)),
+    replace(LAW, weakening=F(0)),
+    replace(LAW, weakening=F(1, 64)),
+]
 
 
 def test_constants_per_mass_have_their_own_spreads():

@@ -120,6 +120,8 @@ def sector(**changes):
         (sector(within=-1), "within must be positive"),
         (sector(row=[1, 1], within=1), "with a row of states alone"),
         (sector(row=[1, 1], within=-1), "with a row of states alone"),
+        ({"B": [[1, 1]]} | sector(row=[1, 1, 0], within=1), "with a row of states alone"),
+        ({"A": [[0] * 41] * 41, "B": [[1]] * 41, "C": [[0] * 41]}, "Received 41, 1 and 1"),
         (sector(slopes=lambda y: (y, -y)), "sector s must have slopes low <= high"),
         (MANY | {"A": [[0] * 41] * 41, "B": [[1]] * 41}, "1 to 40 states, controls and measure.* 41, 1 and 41"),
         (MANY | {"B": [[1] * 41] * 40}, "Received 40, 41 and 40"),
