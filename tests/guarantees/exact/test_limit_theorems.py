@@ -592,9 +592,12 @@ def test_a_proved_well_is_at_the_distance_of_its_diffusion_time_rounded_down():
     distance = nearest_proved_well(LowerBound(2), F(3))
     assert 0 <= 6 - distance**2 < 1e-12
     assert 0 <= farthest_well(UpperBound(2), F(3)) ** 2 - 6 < 1e-12
-    for diffusivity in (F(0), F(-1)):
-        with pytest.raises(ParameterError, match="a diffusivity above 0"):
-            nearest_proved_well(LowerBound(2), diffusivity)
+    assert 0 <= farthest_well(UpperBound(2), F(1, 2)) - 1 < 1e-12
+    assert 0 <= 1 - nearest_proved_well(LowerBound(2), F(1, 2)) < 1e-12
+    for well, time in ((nearest_proved_well, LowerBound(2)), (farthest_well, UpperBound(2))):
+        for diffusivity in (F(0), F(-1)):
+            with pytest.raises(ParameterError, match="a diffusivity above 0"):
+                well(time, diffusivity)
 
 
 def law_for(task, step):
