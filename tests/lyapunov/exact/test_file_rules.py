@@ -42,6 +42,7 @@ CASES = {
         "names must differ",
     ),
     "a name twice": (lambda: hand.relay() | {"constants": {"k": "1"}}, "names must differ"),
+    "weight 0": (lambda: hand.relay() | {"states": {"x": 0}}, "weights must be"),
     "weight 13": (lambda: hand.relay() | {"states": {"x": 13}}, "weights must be"),
     "one weight of two": (lambda: hand.weighted_pair() | {"states": {"x": 3, "y": 13}}, "weights must be"),
     "weight 2 on reals": (lambda: hand.decay() | {"states": {"x": 2}}, "weights must be"),
@@ -60,6 +61,35 @@ CASES = {
         "not as many as its loop",
     ),
     "times on reals": (lambda: hand.edited(hand.decay(), ("witnesses", 0, "squares", 0, "times", [1])), "from 0 to 0"),
+    "times 2 on cells": (
+        lambda: hand.edited(hand.relay(), ("witnesses", 1, "squares", 0, "times", [2])),
+        "from 0 to 1",
+    ),
+    "times 2 of one of two": (
+        lambda: hand.edited(hand.weighted_pair(), ("witnesses", 0, "squares", 0, "times", [0, 2])),
+        "from 0 to 1",
+    ),
+    "times of another length": (
+        lambda: hand.edited(hand.weighted_pair(), ("witnesses", 0, "squares", 0, "times", [1])),
+        "from 0 to 1",
+    ),
+    "basis of which one is longer": (
+        lambda: hand.edited(
+            hand.relay(), ("witnesses", 0, "squares", 0, hand.square([0], [[1], [1, 1]], "1/8", "1/16", "1/4"))
+        ),
+        "different exponents",
+    ),
+    "cofactor of another number of variables": (
+        lambda: hand.edited(hand.settling_relay(), ("witnesses", 2, "equalities", [{"0": "1"}])),
+        "a cofactor has another number of variables",
+    ),
+    "cofactor of too many terms": (
+        lambda: hand.edited(
+            hand.settling_relay(),
+            ("witnesses", 2, "equalities", [{f"{i},{j}": "1" for i in range(142) for j in range(142)}]),
+        ),
+        "a cofactor is longer than 20000 terms",
+    ),
     "basis repeated": (
         lambda: hand.edited(
             hand.relay(), ("witnesses", 0, "squares", 0, hand.square([0], [[1], [1]], "1/8", "1/16", "1/4"))
@@ -239,3 +269,11 @@ def test_a_bound_under_inputs_is_no_longer_read_and_its_successor_is_named(tmp_p
     assert out == ""
     assert len(err.splitlines()) == 1
     assert "certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE" in err
+
+
+@pytest.mark.parametrize("more", [{}, {"format": 1}])
+def test_an_object_of_inputs_and_outputs_alone_is_of_the_older_kind(more):
+    with pytest.raises(UnsupportedError, match="no longer read"):
+        read({"inputs": {}, "outputs": {}} | more)
+    with pytest.raises(CertificateError):
+        read({"inputs": {}} | more)
