@@ -1,7 +1,9 @@
 """Bounds on ratios of forms: closed forms, and dense sampling by numpy."""
 
+import math
 from fractions import Fraction as F
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import sympy as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from quakedesign.lyapunov.exact.forms import Form, largest_ratio
+from quakedesign.lyapunov.exact.forms import Form, _bound, _FormPower, largest_ratio
 
 
 def form(polynomial, variables, degree, sizes=None):
@@ -143,3 +145,13 @@ def test_halves_have_the_coefficients_of_what_is_substituted(edge):
         inside = sum(sp.Rational(c) * sp.prod(x**k for x, k in zip(at, e, strict=True)) for e, c in polynomial.items())
         whole = form({e: F(int(c.p), int(c.q)) for e, c in sp.Poly(inside, *t).terms()}, 3, 3)
         assert [c * half.scale for c in half.coefficients] == [c * whole.scale for c in whole.coefficients]
+
+
+@pytest.mark.parametrize("exponent", [2, 3])
+def test_a_bound_below_the_smallest_normal_float_is_rounded_up(exponent):
+    """Subnormal numbers have few digits: the nearest one is below the bound in about half of all cases."""
+    power = _FormPower.of(F(exponent))
+    for k in range(1, 60):
+        size = float(f"{k}e-{322 // exponent}")
+        bound = _bound([SimpleNamespace(largest=lambda size=size: size)], [power])
+        assert F(math.nextafter(bound, 0)) < F(size) ** exponent <= F(bound)
