@@ -185,21 +185,16 @@ def solved(rows: Sequence[Sequence[Fraction]], unknowns: int) -> Row:
     ParameterError
         When there is none.
     """
-    if not rows or not unknowns:
-        consistent, solution = all(row[-1] == 0 for row in rows), [Fraction(0)] * unknowns
-    else:
-        reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows]).rref()
-        solution, consistent = [Fraction(0)] * unknowns, True
-        for i in range(rank):
-            pivot = next(j for j in range(unknowns + 1) if reduced[i, j] != 0)
-            consistent = consistent and pivot < unknowns
-            if pivot < unknowns:
-                solution[pivot] = Fraction(int(reduced[i, unknowns].p), int(reduced[i, unknowns].q))
-    if not consistent:
+    reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows]).rref()
+    pivots = [next(j for j in range(unknowns + 1) if reduced[i, j] != 0) for i in range(rank)]
+    if unknowns in pivots:
         raise ParameterError(
             "a law must balance every load at zero error. Received a law without integral action for one load. "
             "Add an integral, or an estimate of the load."
         )
+    solution = [Fraction(0)] * unknowns
+    for i, pivot in enumerate(pivots):
+        solution[pivot] = Fraction(int(reduced[i, unknowns].p), int(reduced[i, unknowns].q))
     return tuple(solution)
 
 
