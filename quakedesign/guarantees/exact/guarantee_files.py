@@ -112,7 +112,7 @@ class SampledLoopEntries(Entries, kw_only=True):
         if pump is not None:
             need(astuple(pump) != astuple(PumpEntries()), "a pump must have limits or a rate")
             need(
-                (pump.rate is not None) == (pump.ramp != 0) and pump.ramp >= 0,
+                (pump.rate is not None) == (pump.ramp != 0),
                 "the rate of a pump and a ramp above 0 must be given together",
             )
         return made(

@@ -212,7 +212,7 @@ class PlantEntries(Entries):
     def part(self) -> LinearPart:
         """The plant, after a check of its sizes."""
         n, m = len(self.A), len(self.B[0]) if self.B else 0
-        need(1 <= n <= MOST and 1 <= m, f"a plant must have 1 to {MOST} states, and a control")
+        need(1 <= n <= MOST and 1 <= m <= MOST, f"a plant must have 1 to {MOST} states, and 1 to {MOST} controls")
         for name in ("C", "disturbances", "loads", "sectors", "outputs"):
             need(len(getattr(self, name)) <= MOST, f"{name} must have at most {MOST} entries")
         sizes = (

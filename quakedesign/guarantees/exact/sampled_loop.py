@@ -176,7 +176,7 @@ class SampledLoop(ExactSetup):
     @property
     def noise(self) -> dict[str, Fraction]:
         """Bounds of the measurement noise by name of the input; with a timing error also those that are 0."""
-        measured = NOISES[: 1 if self.law.of_slip_alone else 2] if self.off else ()
+        measured = (NOISES[:1] if self.law.of_slip_alone else NOISES) if self.off else ()
         return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
 
     @property

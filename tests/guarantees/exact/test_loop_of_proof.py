@@ -10,6 +10,7 @@ from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, TrackingProof, guarantee
 from quakedesign.guarantees.exact import tracking_proof
+from quakedesign.guarantees.exact.guarantee_files import guarantee_document
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.tracking_proof import ContinuousProof, sentence_of
@@ -141,6 +142,17 @@ def test_the_shear_of_a_disturbance_is_that_which_is_covered_for_every_area_per_
 def test_a_proof_in_continuous_time_is_not_of_a_sampled_loop():
     assert (TrackingProof.sampled, ContinuousProof.sampled) == (True, False)
     assert (TrackingProof.covers_healing, NONE.pressed) == (False, False)
+
+
+def test_a_file_states_a_pump_with_its_limits_and_the_ramp_of_its_rate():
+    def entries(**changes):
+        return guarantee_document(proof(**changes))["loop"]
+
+    limits = Pump(least=F(-1), largest=F(2))
+    assert "pump" not in entries(pump=Pump())
+    assert entries(pump=limits)["pump"] == {"least": "-1", "largest": "2"}
+    assert entries(pump=limits, ramp=F(1, 50))["pump"] == {"least": "-1", "largest": "2"}
+    assert entries(pump=Pump(rate=F(5)), ramp=F(1, 50))["pump"] == {"rate": "5", "ramp": "1/50"}
 
 
 # ---------------------------------------------------------------- results

@@ -603,6 +603,27 @@ def test_every_cell_must_give_the_claims(place, monkeypatch):
     assert two.check() is Verdict.UNDECIDED
 
 
+def test_pressures_follow_the_plan_and_the_claims():
+    """p* rises by K·distance/μ* = 6e6·0.01/0.6 Pa."""
+    assert CLAIM.slides
+    assert CLAIM.pressures == CLAIM.valve_pressures == (-380_000, 480_000)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"), [({}, "25 kPa"), ({"stress": F(0)}, "without disturbance"), ({"distance": F(0)}, "vacuous")]
+)
+def test_a_sentence_names_a_disturbance_and_an_empty_reference(changes, said):
+    sentence = replace(CLAIM, task=replace(task(), **changes)).sentence()
+    expected = {"25 kPa": "stress" not in changes, "without disturbance": said == "without disturbance"}
+    assert {words: words in sentence for words in expected} == expected
+    assert sentence.startswith("vacuous") is (said == "vacuous")
+
+
+def test_a_file_keeps_the_cells():
+    two = replace(CLAIM, cuts=(("direct_effect", F("0.01")), None, None))
+    assert parse_guarantee(guarantee_text(two)) == two
+
+
 PATHS = {"with a delay of 20 s": {"delay": F(20)}, "through a lag of 10 s": {"lag": F(10)}}
 PATHS["through a diffusion path of L^2/D = 40 s"] = {"diffusion": F(40)}
 
