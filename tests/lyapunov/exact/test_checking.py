@@ -194,6 +194,16 @@ def test_what_is_no_equilibrium_is_refused_for_its_reason(loop, equilibrium, rea
         _check_equilibrium(loop, equilibrium)
 
 
+def test_a_refutation_is_decided_by_its_equilibrium():
+    d = sp.Symbol("d", real=True)
+    field = {x: d - SignedPower(x, 0)}
+    model = LoopField(states={x: 1}, field=field, gains=(), constants=(), uncertain=(d,), domain="cells")
+    loop = loop_of("custom", model, gains={}, uncertain={"d": (F(-1), F(1))})
+    assert Certificate(loop=loop, refutation=rest()).check(model) is Verdict.REFUTED
+    with pytest.raises(CertificateError, match="does not vanish"):
+        Certificate(loop=loop, refutation=rest(d=0)).check(model)
+
+
 def test_weights_are_convex():
     """y' = 2⌈x⌋⁰ on x = 0, y = 1 rests with half of each side; -1 and 2 also add up to 1, 0 and 1 do not rest."""
     loop = resting(states={"x": 1, "y": 1}, uncertain={}, field={"x": (), "y": (Term(F(2), (), (("x", F(0), "s"),)),)})

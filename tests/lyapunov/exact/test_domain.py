@@ -165,6 +165,7 @@ def test_feed_forward_enlarges_the_domain(variants):
     assert slip["centred"] > 30 * slip["none"]
     assert rate["centred"] > rate["nominal"] > 5 * rate["none"]
     assert "viscosity" in variants["none"].domain.limited_by
+    assert "minus" not in variants["none"].domain.limited_by
     assert "minus its feed-forward" in variants["nominal"].domain.limited_by
 
 

@@ -89,3 +89,8 @@ def test_both_sides_are_said_on_their_outer_sides_and_one_number_once(unit, said
     assert one.sides == (f"0.3334{said}", f"0.6666{said}")
     same = Premise(name="x", required=F(1, 3), certified=F(1, 3), unit=unit)
     assert same.sides == (f"at most 0.3334{said}", "equal")
+
+
+@pytest.mark.parametrize(("value", "sides"), [(0, ("0", "0")), (1, ("at most 1", "equal"))])
+def test_equal_sides_are_said_once_unless_they_are_zero(value, sides):
+    assert Premise(name="x", required=F(value), certified=F(value), unit="-").sides == sides

@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 import quakedesign as qd
-from quakedesign.errors import CertificateError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import rational, to_sympy
 from quakedesign.fault import Disturbance, UncertaintyBox, friction_law, load_fault
 from quakedesign.laws import published
@@ -171,3 +171,12 @@ def test_a_premise_holds_up_to_its_bound():
     assert not premise(0.5, 1.0).measured
     assert premise(1.0, 4.0).ratio == 0.25
     assert premise(0.0, 1.0).ratio == 0
+
+
+@pytest.mark.parametrize("name", ["beta", "slip", "rate"])
+def test_each_range_of_sectors_is_in_order(name):
+    found = sectors(REAL)
+    point = {name: (F(1), F(1))}
+    assert getattr(replace(found, **point), name) == (1, 1)
+    with pytest.raises(ParameterError, match="ranges must be ordered"):
+        replace(found, **{name: (F(1), F(999, 1000))})
