@@ -5,6 +5,7 @@ from fractions import Fraction as F
 from types import SimpleNamespace
 
 import pytest
+import sympy as sp
 
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import Disturbance, load_fault
@@ -12,6 +13,7 @@ from quakedesign.laws.feed_forward import NONE
 from quakedesign.lyapunov.exact import domain
 from quakedesign.lyapunov.exact.domain import Domain, DomainProblem, _largest_split, _level, certified_domain
 from quakedesign.lyapunov.exact.perturbation_bounds import Errors, least_authority
+from quakedesign.symbolic import plant
 
 REAL = load_fault("real-fault")
 FAR = F(10**9)
@@ -172,6 +174,31 @@ def test_the_cause_of_a_rate_at_zero_errors_is_the_larger_part(disturbance, caus
     fault = REAL.with_disturbance(disturbance)
     controller = SimpleNamespace(divisor=least_authority(fault), feedforward=NONE)
     assert domain._whole_limit(SimpleNamespace(fault=fault, controller=controller), Errors()) == cause
+
+
+@pytest.mark.parametrize(
+    ("spring", "slope", "growth", "name", "cause"),
+    [
+        (-4, -1, 0, "none", "the slip error, through the spring"),
+        (-4, -1, 0, "nominal", "the slip error, through the spring minus its feed-forward"),
+        (-2, -1, 0, "none", "the slip error, through friction"),
+        (-2, -1, 9, "none", "the slip error, through the growth of the disturbance"),
+    ],
+)
+def test_the_cause_of_the_larger_share_is_the_largest_of_its_terms(spring, slope, growth, name, cause, monkeypatch):
+    """The sensitivity is 3 times the slope of friction, and the spring, and the growth of the disturbance."""
+    stiffness = sp.Symbol("stiffness", real=True)
+    expression = 3 * plant.slip_slope + stiffness + plant.phi_1
+    ranges = {plant.slip_slope: (F(slope), F(0)), stiffness: (F(spring),) * 2, plant.phi_1: (F(growth),) * 2}
+    monkeypatch.setattr(domain, "sensitivity_expressions", lambda *_: (expression, sp.Integer(0)))
+    monkeypatch.setattr(domain, "parameter_ranges", lambda _: ranges)
+    made = SimpleNamespace(
+        split=lambda _: {"rate": F(1, 4), "slip": F(1, 2)},
+        fault=None,
+        controller=SimpleNamespace(divisor=None, feedforward=SimpleNamespace(name=name)),
+        sets=SimpleNamespace(errors=lambda _: Errors()),
+    )
+    assert domain._split_limit(made, F(1)) == cause
 
 
 def test_plain_values_are_floats_and_texts():
