@@ -155,3 +155,8 @@ def test_a_bound_below_the_smallest_normal_float_is_rounded_up(exponent):
         size = float(f"{k}e-{322 // exponent}")
         bound = _bound([SimpleNamespace(largest=lambda size=size: size)], [power])
         assert F(math.nextafter(bound, 0)) < F(size) ** exponent <= F(bound)
+
+
+def test_the_form_of_zero_is_zero():
+    assert (form({}, 2, 3).least(), form({}, 2, 3).largest()) == (0, 0)
+    assert float(largest_ratio([([form({}, 2, 2), form(power(2, 2), 2, 2)], [F(1), F(-1)])])) < 1e-9

@@ -1,5 +1,6 @@
 """Nested powers as polynomial conditions on cells."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 
 import pytest
@@ -8,6 +9,7 @@ import sympy as sp
 from quakedesign.errors import CertificateError
 from quakedesign.laws import LoopField
 from quakedesign.lyapunov import Loop, loop_of
+from quakedesign.lyapunov.exact.certificate import _same_field
 from quakedesign.lyapunov.exact.obligations import Obligations
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 from quakedesign.symbolic.terms import Term
@@ -100,3 +102,15 @@ def test_a_lift_inside_another_stays():
     inner = SignedPower(X + Y * AbsolutePower(Y, 1), HALF)
     assert len(loop_with(SignedPower(inner + Y, 1)).lifts) == 1
     assert len(loop_with(SignedPower(SignedPower(inner + Y, 2) + X, HALF) * SignedPower(X - Y, 0) ** 2).lifts) == 3
+
+
+def test_other_arguments_of_lifts_are_another_field():
+    inner = SignedPower(X + Y * AbsolutePower(Y, 1), HALF)
+    field = {X: Y - 3 * inner, Y: -2 * SignedPower(X, 0)}
+    model = LoopField(states={X: 2, Y: 1}, field=field, gains=(), constants=(), uncertain=(), domain="cells")
+    known = loop_of("own", model, gains={}, uncertain={})
+    _same_field(known, model)
+    ((name, terms),) = known.lifts.items()
+    for other in (terms[:1], tuple(replace(term, coefficient=2 * term.coefficient) for term in terms)):
+        with pytest.raises(CertificateError, match="the field is not that of own"):
+            _same_field(replace(known, lifts={name: other}), model)
