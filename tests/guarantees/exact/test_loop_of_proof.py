@@ -5,12 +5,12 @@ from fractions import Fraction as F
 
 import pytest
 
-from quakedesign.errors import ParameterError
+from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, TrackingProof, guarantee
 from quakedesign.guarantees.exact import tracking_proof
-from quakedesign.guarantees.exact.guarantee_files import guarantee_document
+from quakedesign.guarantees.exact.guarantee_files import guarantee_document, read_guarantee
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.tracking_proof import ContinuousProof, sentence_of
@@ -153,6 +153,29 @@ def test_a_file_states_a_pump_with_its_limits_and_the_ramp_of_its_rate():
     assert entries(pump=limits)["pump"] == {"least": "-1", "largest": "2"}
     assert entries(pump=limits, ramp=F(1, 50))["pump"] == {"least": "-1", "largest": "2"}
     assert entries(pump=Pump(rate=F(5)), ramp=F(1, 50))["pump"] == {"rate": "5", "ramp": "1/50"}
+
+
+@pytest.mark.parametrize("pump", [{"rate": "5"}, {"least": "-1", "largest": "2", "ramp": "1/50"}, {}])
+def test_a_pump_of_a_file_has_a_ramp_if_and_only_if_it_has_a_rate(pump):
+    raw = guarantee_document(proof(pump=Pump(rate=F(5)), ramp=F(1, 50), delay_jitter=F(1, 300)))
+    raw["claims"]["largest_step"] = "1"
+    assert read_guarantee(raw).held.ramp == F(1, 50)
+    raw["loop"]["pump"] = pump
+    with pytest.raises(CertificateError, match="must be given together" if pump else "must have limits or a rate"):
+        read_guarantee(raw)
+
+
+@pytest.mark.parametrize(
+    ("changes", "jitter"),
+    [
+        ({"jitter": F(1, 50)}, {"measured": "1/50", "delay": "0"}),
+        ({"delay_jitter": F(1, 50)}, {"measured": "0", "delay": "1/50"}),
+        ({"averaging": F(1, 50)}, {"measured": "0", "delay": "0", "mean": "1/50"}),
+        ({}, None),
+    ],
+)
+def test_a_file_states_jitter_of_each_kind(changes, jitter):
+    assert guarantee_document(proof(**changes))["loop"].get("jitter") == jitter
 
 
 # ---------------------------------------------------------------- results

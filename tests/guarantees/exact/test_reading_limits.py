@@ -348,6 +348,7 @@ def test_a_plant_of_a_file_may_have_its_largest_sizes(given):
     ("given", "said"),
     [
         (plant_of(A=[], B=[]), "a plant must have 1 to 40 states, and 1 to 40 controls"),
+        (plant_of(A=[], B=[["1"]]), "a plant must have 1 to 40 states, and 1 to 40 controls"),
         (plant_of(n=41), "a plant must have 1 to 40 states, and 1 to 40 controls"),
         (plant_of(B=[[]]), "a plant must have 1 to 40 states, and 1 to 40 controls"),
         (plant_of(m=41), "a plant must have 1 to 40 states, and 1 to 40 controls"),
