@@ -60,7 +60,7 @@ WRITTEN = (
     ("400 facets of at most 6 entries with at most 20 digits each", invariant_set.MOST_SIZE, 6),
     ("400 facets of at most 6 entries with at most 20 digits each", invariant_set.LARGEST, 10**20),
     ("32 pieces and 4000 bases of a reach", invariant_set.MOST_BASES, 4000),
-    ("At most 40 states, measurements, disturbances, loads, sectors and outputs", plant_values.MOST, 40),
+    ("At most 40 states, controls, measurements, disturbances, loads, sectors and outputs", plant_values.MOST, 40),
     ("48 states of the law, 96 of the loop", plant_proof._MOST_LAW_STATES, 48),
     ("48 states of the law, 96 of the loop", plant_loop.MOST_LOOP_STATES, 96),
     ("1 to 64 `pieces`, a delay of at most 8 steps", plant_proof.MOST_PIECES, 64),
