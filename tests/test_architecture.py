@@ -467,7 +467,7 @@ BUDGETS = {
     "laws": 3112,
     "loop": 4184,
     "plant": 1455,
-    "guarantees": 13304,
+    "guarantees": 13307,
     "lyapunov": 6961,
     "linear": 2401,
     "synthesis": 1952,

@@ -252,7 +252,7 @@ class TrackingGuarantee(Guarantee):
         bounds, held = self.proof.recomputed(), self.proof.held
         small = None if not bounds.found else float_above(bounds.small_gain)
         return {
-            "verdict": str(self.proof.check()),
+            "verdict": str(self.proof.verdict_of(bounds)),
             "sentence": self.proof.sentence(),
             **self.proof.claims.to_dict(),
             "small_gain": small,

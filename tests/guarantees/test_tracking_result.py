@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import TrackingGuarantee, WorstCase, guarantee, with_worst_case
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
@@ -14,6 +15,7 @@ from quakedesign.lyapunov.exact.claim import Verdict
 
 MODULE = import_module("quakedesign.guarantees.tracking_result")
 FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "guarantee_real-fault.json"
+REAL = load_fault("real-fault")
 SLOW = parse_guarantee(FILE.read_text())
 WIDE = guarantee(SLOW.task, SLOW.held)
 ANYHOW = WIDE.claims
@@ -29,7 +31,7 @@ def stuck(monkeypatch, slip, rate):
     seen = WorstCase(slip_error=slip, slip_rate_error=rate)
     quiet = WorstCase(slip_error=0.0, slip_rate_error=0.0)
     monkeypatch.setattr(MODULE, "worst_tracking", lambda _, sticks=False: seen if sticks else quiet)
-    return with_worst_case(load_fault("real-fault"), SLOW)
+    return with_worst_case(REAL, SLOW)
 
 
 def test_claims_that_no_course_leaves_stay(monkeypatch):
@@ -96,3 +98,13 @@ def test_a_law_that_would_wind_up_is_warned_of_unless_its_pressure_is_limited_at
     assert any(line.startswith("MAY WIND UP") for line in answer.lines())
     monkeypatch.setattr(type(SLOW), "rest_limit", property(lambda _: "a limit"))
     assert not any(line.startswith("MAY WIND UP") for line in answer.lines())
+
+
+def test_the_verdict_of_a_result_is_that_of_its_proof_and_found_once(monkeypatch):
+    """A proof that was read from a file is decided when it is written; bounds are not computed twice for this."""
+    computed, bounds = [], type(SLOW).recomputed
+    monkeypatch.setattr(type(SLOW), "recomputed", lambda proof: computed.append(proof) or bounds(proof))
+    assert TrackingGuarantee(fault=REAL, proof=SLOW).to_dict()["verdict"] == "proved"
+    sharper = replace(SLOW, claims=replace(SLOW.claims, slip_error=UpperBound(SLOW.claims.slip_error / 2)))
+    assert TrackingGuarantee(fault=REAL, proof=sharper).to_dict()["verdict"] == "undecided"
+    assert computed == [SLOW, sharper]

@@ -69,7 +69,10 @@ class Proof(ABC, Generic[B]):
 
     def check(self) -> Verdict:
         """PROVED if the claims follow from the bounds of the theorem; else UNDECIDED."""
-        bounds = self.recomputed()
+        return self.verdict_of(self.recomputed())
+
+    def verdict_of(self, bounds: "B | NoProof") -> Verdict:
+        """Verdict for the bounds that `recomputed` returned."""
         if isinstance(bounds, NoProof) or not self.supported(bounds):
             return Verdict.UNDECIDED
         return Verdict.PROVED
