@@ -48,7 +48,7 @@ ALONE = {
     "errata": "errata --json",
     "certify-cta": "certify cta --gains 7 5 2.3 1.1 --lipschitz 1 --json",
     "certify-dia": "certify dia --gains 2 5 1 0.1 --lipschitz 0.5 --json",
-    "certify-elqr": "certify elqr lab-fault --gains 1e10/24 25e6/36 1e9/24 1e7/72 --json",
+    "certify-elqr": "certify elqr lab-fault --gains 10000000000/24 25000000/36 1000000000/24 10000000/72 --json",
     "sos": "sos x^4-2*x^2+1 --json",
     "sos-not": "sos x^4*y^2+x^2*y^4+1-3*x^2*y^2 --json",
     "attraction": "attraction {folder}/field.toml --json",
