@@ -87,7 +87,7 @@ def seismic_cycle():
     axes.semilogy(run.time / 31556952, run.slip_rate, label="no control")
     bound = qd.design(fault, "elqr").guarantee.peak_slip_rate
     axes.axhline(float(bound), color="black", linestyle="--", label="proved with the designed law, at 1 µm/s")
-    axes.set(xlabel="time [a]", ylabel="slip rate [m/s]", title=fault.name)
+    axes.set(xlabel="time [year]", ylabel="slip rate [m/s]", title=fault.name)
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 

@@ -83,8 +83,8 @@ def stuck_and_sliding(law, step, start, periods):
 
 def sampled(claim):
     """Slip rate, its measurements and the pressure over a cycle of rest and slip, in the middle of the task."""
-    step, shown, before = float(claim.held.step), 50, 450
-    rates, pressures = stuck_and_sliding(claim.held.law, step, 3.3e5, before + shown)
+    step, shown, before = float(claim.sampled_loop.step), 50, 450
+    rates, pressures = stuck_and_sliding(claim.sampled_loop.law, step, 3.3e5, before + shown)
     rates, pressures = rates[FINE * before :], pressures[before:]
     time = step / FINE * np.arange(len(rates))
     drawing, ((rate,), (pressure,)) = figure(2, 3.6)
@@ -106,10 +106,10 @@ def sampled(claim):
 
 def matrices(claim):
     """Flow of a part of a period of the nominal plant, and the law."""
-    law, model = claim.held.law, claim.task.model
+    law, model = claim.sampled_loop.law, claim.task.model
     flow = np.array([[0, 1], [float(model.slip), -float(model.rate)]])
     into = np.array([[0.0], [1.0]])
-    fine = float(claim.held.step) / FINE
+    fine = float(claim.sampled_loop.step) / FINE
     joint = expm(fine * np.block([[flow, into], [np.zeros((1, 3))]]))
     as_floats = lambda rows: np.array([[float(v) for v in row] for row in rows])  # noqa: E731
     update, measured = as_floats(law.update), as_floats(law.measured)
@@ -129,7 +129,7 @@ def course(claim, disturbance, start=(0.0, 0.0)):
         states.append(x)
         pressures.append(p)
         x = flow @ x + into * (gain * p + d)
-    fine = float(claim.held.step) / FINE
+    fine = float(claim.sampled_loop.step) / FINE
     return fine * np.arange(len(disturbance)), np.array(states), np.array(pressures), fine
 
 
@@ -143,7 +143,7 @@ def small_gain(claim):
         kernel[:, part] = course(claim, disturbance)[1][FINE::FINE, 1][:periods]
     ages = kernel[:, ::-1].ravel()  # the latest impulse first
     drawing, ((norm,), (seen,)) = figure(2, 4.2, sharex=False)
-    fine = float(claim.held.step) / FINE
+    fine = float(claim.sampled_loop.step) / FINE
     norm.plot(
         fine * np.arange(ages.size),
         1e6 * amplitude * np.cumsum(np.abs(ages)),
@@ -151,7 +151,7 @@ def small_gain(claim):
         label=f"L1 norm up to this age, times the amplitude: {np.ceil(1e6 * amplitude * np.abs(ages).sum()):.0f} µm/s",
     )
     proved = 1e6 * float(claim.claims.slip_rate_error)
-    text = f"proved for all friction of the box, and between samples: {np.ceil(proved):.0f} µm/s"
+    text = f"proved for every friction law of the box, also between samples: {np.ceil(proved):.0f} µm/s"
     norm.axhline(proved, color=ORANGE, linestyle="--", label=text)
     norm.set(xlabel="age of the disturbance [s]", ylabel="slip-rate error [µm/s]", xlim=(0, 8), ylim=(0, 1.15 * proved))
     norm.legend(fontsize=SMALL, loc="lower right")
@@ -168,7 +168,7 @@ def small_gain(claim):
 
 def invariant_set(claim):
     """Projection of the polytope on slip error and slip rate, and the run of the task inside of it."""
-    facets = np.array([[float(v) for v in row] for row in claim.reach.facets] + [[0.0, -1.0, 0.0]])
+    facets = np.array([[float(v) for v in row] for row in claim.invariant_set.facets] + [[0.0, -1.0, 0.0]])
     scale = 1 / np.abs(facets).max(axis=0)
     bounds = np.append(-np.ones(len(facets) - 1), 0.0)
     inside = np.array([0.0, 1e-3, 0.0])
@@ -177,7 +177,7 @@ def invariant_set(claim):
     flat = 1e6 * corners[:, :2]
     ring = ConvexHull(flat).vertices
     axis.fill(*flat[np.append(ring, ring[0])].T, color=BLUE, alpha=0.2, label="invariant polytope (projected)")
-    law = StickSlipController(law=claim.held.law, step=claim.held.step)
+    law = StickSlipController(law=claim.sampled_loop.law, step=claim.sampled_loop.step)
     run = qd.simulate(FAULT, law)
     label = "run of the task"
     axis.plot(1e6 * run.slip_error, 1e6 * run.slip_rate, ".", markersize=1, color=ORANGE, label=label)
