@@ -335,7 +335,7 @@ def guarantees() -> dict[str, TrackingGuarantee]:
 
 def as_proved(one: Apparatus, proof: TrackingProof) -> Apparatus:
     """An apparatus with the delay and the lag of a proof, without jitter."""
-    held = proof.held
+    held = proof.sampled_loop
     return replace(one, delay=int(held.delay / held.step), jitter=0, lag=float(held.lag))
 
 
@@ -357,7 +357,7 @@ def guaranteed_problem(
     one: Apparatus, proof: TrackingProof, seed: int, *, duration: float | None = None
 ) -> CampaignProblem:
     """Campaign of a guaranteed law in an apparatus; duration in s, the whole task unless given."""
-    noise = Measurement(slip_noise=float(proof.held.slip_noise), bounded=True)
+    noise = Measurement(slip_noise=float(proof.sampled_loop.slip_noise), bounded=True)
     return one.problem(proof.controller, seed, duration=duration, measurement=noise)
 
 

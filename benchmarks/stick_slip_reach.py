@@ -80,7 +80,7 @@ def row(name, fault, options):
         f"{claims.peak_slip_rate:.3g} m/s",
         f"{claims.slip_behind:.3g} … {claims.slip_ahead:.3g} m",
         f"{answer.worst.peak_slip_rate / float(claims.peak_slip_rate):.2f}",
-        str(len(answer.proof.reach.facets)),
+        str(len(answer.proof.invariant_set.facets)),
         f"{spent:.1f} s",
         "proved" if checked.returncode == 0 else "REFUSED",
         f"{seen['facet']:.3f} ({seen['long_facet']:.3f})",

@@ -34,7 +34,7 @@ print(f"task: {fault.reference.target_slip} m in {fault.reference.operation_time
 
 # %% [markdown]
 # ## The equations
-# $x_1$ is the slip since the start, $x_2$ the slip rate, $p$ the injected pressure; a hat means per unit mass.
+# $x_1$ is the slip since the start, $x_2$ the slip rate, $p$ the pore pressure relative to its initial value; a hat means per unit mass.
 # The origin is unstable if **either** inequality of the last line holds: here the first, with one positive eigenvalue.
 
 # %%
@@ -47,7 +47,7 @@ print("eigenvalues [1/s]:", [f"{z.real:.3f}" for z in model.eigenvalues])
 
 # %% [markdown]
 # ## A sliding mode with a proof
-# `design` first proves the gains of the continuous twisting algorithm (2-CTA), before they are scaled by $\lambda$, in continuous time. It then proves the guarantee of the sampled loop, with an implicit step and zero-order hold. A solver proposes; rational arithmetic decides.
+# `design` first proves stability in continuous time with the gains of the continuous twisting algorithm (2-CTA) for $\lambda = 1$. It then proves the guarantee of the sampled loop, with an implicit step and zero-order hold. A solver proposes; rational arithmetic decides.
 
 # %%
 cta = qd.design(fault, "cta")
@@ -99,7 +99,7 @@ display(elqr)
 # %% [markdown]
 # ## Simulations
 # We simulate the first ten hours of the task, then the whole task. For the whole task, errors are evaluated only after its first quarter. In the first hours the fault rests most of the time:
-# the reference is slow compared with the disturbance. The table has samples at which the fault moves.
+# the reference is slow compared with the disturbance. The table lists samples at which the fault moves.
 
 # %%
 display(qd.simulate(fault, cta.controller, duration=36_000).plot())

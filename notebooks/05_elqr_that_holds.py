@@ -36,7 +36,7 @@ from quakedesign.lyapunov import Verdict
 from quakedesign.plant import (uncertain_plant)
 from quakedesign.report import verdict_lines
 from quakedesign.simulation import natural_earthquake
-from quakedesign.guarantees import design_held, worst_tracking
+from quakedesign.guarantees import design_sampled_law, worst_tracking
 from own.printed_theorem import both_tests
 from quakedesign.linear import uncertainty_bounds
 from quakedesign.linear import judge
@@ -45,8 +45,8 @@ from own import printed_examples as examples  # beside this notebook
 
 # %% [markdown]
 # ## Friction that the bound does not contain
-# The first entry of $G$, as printed, contains the *uncertainty* of $\hat N$ instead of the value of $\hat N$. For the real fault with $\hat N$ known the bound is zero
-# for any friction. The theorem then accepts a $K$ that leaves the fault unstable.
+# The first entry of $G$, as printed, contains the *uncertainty* of $\hat N$ instead of the value of $\hat N$. For the real fault with $\hat N$ known, friction does not enter this bound
+# at all. The theorem then accepts a $K$ that leaves the fault unstable.
 
 # %%
 missing = examples.printed_bound_example()
@@ -69,10 +69,10 @@ def transient(problem, gains, vertices, durations, steps=200):
 
 
 worst = judged.unstable_at
-for name, gains in {"accepted by the print": accepted.gains, "corrected": repaired.gains}.items():
+for name, gains in {"accepted as printed": accepted.gains, "corrected": repaired.gains}.items():
     t, x1 = transient(missing.problem, gains, [worst], [20.0])
     plt.semilogy(t, np.abs(x1), label=name)
-plt.xlabel("time [s]"), plt.ylabel("|x1| relative to its start"), plt.title("real fault, constant parameters"), plt.legend()
+plt.xlabel("time [s]"), plt.ylabel("|x1| relative to its initial value"), plt.title("real fault, constant parameters"), plt.legend()
 plt.show()
 
 # %% [markdown]
@@ -89,10 +89,10 @@ print(judged_row.table())
 # %%
 turns = 15
 vertices, durations = row.switching.vertices * turns, [float(d) for d in row.switching.durations] * turns
-for name, gains in {"accepted by the print": accepted_row.gains, "corrected": repaired_row.gains}.items():
+for name, gains in {"accepted as printed": accepted_row.gains, "corrected": repaired_row.gains}.items():
     t, x1 = transient(row.problem, gains, vertices, durations, steps=40)
     plt.semilogy(t, np.abs(x1), label=name)
-plt.xlabel("time [s]"), plt.ylabel("|x1| relative to its start"), plt.title("parameters that switch"), plt.legend()
+plt.xlabel("time [s]"), plt.ylabel("|x1| relative to its initial value"), plt.title("parameters that switch"), plt.legend()
 plt.show()
 
 # %% [markdown]
@@ -133,14 +133,14 @@ print("\n".join(verdict_lines(printed)))
 
 # %% [markdown]
 # `design` with `continuous=True` designs gains as the paper does, for a pressure without delay. They are proved for every constant reference. With zero-order hold they are
-# unstable, like the published ones. By default `design` is about the sampled loop with zero-order hold. It proves bounds for all
-# friction, stiffness and damping inside their ranges.
+# unstable, like the published ones. By default `design` is about the sampled loop with zero-order hold. It proves bounds for every
+# friction law, stiffness and damping in the box.
 
 # %%
 design = qd.design(fault, "elqr", continuous=True)
 free = judge(fault, design.controller)
 print("\n".join(verdict_lines(free)))
-sampled = design_held(uncertain_plant(fault), Fraction("0.184"))
+sampled = design_sampled_law(uncertain_plant(fault), Fraction("0.184"))
 print(sampled.sentence())
 
 # %% [markdown]
@@ -157,7 +157,7 @@ peaks = {kind: design.certified_peaks(kind) for kind in ("amplitude", "rate")}
 bad = {kind: worst_tracking(found) for kind, found in peaks.items()}
 for kind, found in peaks.items():
     most, known = found.claims.slip_rate_error, bad[kind].slip_rate_error
-    print(f"{kind}: never farther from the reference's rate than {most:.3g} m/s, proved; {known:.3g} m/s is reached by a bad course (ratio {float(most) / known:.2f})")
+    print(f"{kind}: slip-rate error at most {most:.3g} m/s, proved; worst case found {known:.3g} m/s (ratio {float(most) / known:.2f})")
 print(f"earthquake without control: {natural_earthquake(fault).metrics.peak_slip_rate:.3g} m/s")
 
 # %%

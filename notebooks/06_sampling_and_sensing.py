@@ -38,7 +38,7 @@ print(design.verdict, {name: f"{float(value):.4g}" for name, value in design.gai
 
 # %% [markdown]
 # ## One run and its energy budget
-# The runs cover the first 2000 s of the task, on the plant without stick, for which the orders of schemes are known. `continuous` evaluates the law in every stage of the integrator. The energy budget is integrated along with the motion, so its
+# The runs cover the first 2000 s of the task, on the plant without stick, for which the orders of accuracy are known. `continuous` evaluates the law in every stage of the integrator. The energy budget is integrated along with the motion, so its
 # residual is the integration error. If the law switches inside a step, the energy of the chatter is wrong; with zero-order hold
 # no accuracy is lost. Runs with `continuous` show the ideal law, not a digital controller.
 
@@ -69,7 +69,7 @@ table = pd.DataFrame(
         key: {
             "slip error [m]": run.metrics.max_slip_error,
             "rate error [m/s]": run.metrics.max_slip_rate_error,
-            "path of p [GPa]": run.metrics.pressure_total_variation / 1e9,
+            "pressure variation [GPa]": run.metrics.pressure_total_variation / 1e9,
             "|dh/dt| / bound": run.metrics.max_h_rate / bound if "designed" in key[0] else np.nan,
         }
         for key, run in rows.items()
@@ -118,7 +118,7 @@ print(gain.to_pandas())
 rock = Diffusion(length=1.0, diffusivity=7.0, storage=1e-9, cells=3)
 actuator = Actuator(stages=(Saturation(lowest=-5e6, highest=5e6), rock))
 lagged = qd.simulate(fault, law, scheme="implicit", actuator=actuator, substeps=20, **SHORT)
-print(f"through rock with L²/D = {rock.time * 1e3:.0f} ms: slip error {lagged.metrics.max_slip_error:.2g} m")
+print(f"through a diffusion path of L²/D = {rock.time * 1e3:.0f} ms: slip error {lagged.metrics.max_slip_error:.2g} m")
 display(lagged.to_xarray()[["well_pressure", "injected_volume", "flow_rate"]].isel(time=-1))
 
 # %% [markdown]
@@ -156,7 +156,7 @@ with tempfile.TemporaryDirectory() as folder:
 replay = qd.simulate(fault, law, scheme="compensated", duration=200 * 0.184, samples=200)
 memory, pressure, asked = list(exported.start.values()), exported.start["held_0"], []
 for x1, x2 in zip(replay.slip, replay.slip_rate, strict=True):
-    memory, pressure = exported.function([x1, x2], pressure, memory)  # what was asked for is what was applied
+    memory, pressure = exported.function([x1, x2], pressure, memory)  # the commanded pressure is applied
     asked.append(float(pressure))
 largest_difference = np.max(np.abs(asked - replay.pressure)) / np.max(np.abs(replay.pressure))
 print(f"largest difference over {len(asked)} samples: {largest_difference:.1e}")

@@ -52,7 +52,7 @@ print("taken from the files:", whole.resumed)
 other = tempfile.TemporaryDirectory()
 again = run_campaign(problem, 32, Path(other.name) / "campaign", executor=ThreadPoolExecutor(2), batch=16)
 same = whole.quantiles() == again.quantiles()
-print("the same digits in batches of another size:", same)
+print("bitwise equal with another batch size:", same)
 
 # %% [markdown]
 # ## The worst samples

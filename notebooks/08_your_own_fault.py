@@ -18,7 +18,7 @@
 #
 # **A laboratory has sheared the gouge of a reservoir fault at two rates. Can the fault slip slowly instead of in earthquakes, and what can be guaranteed?** This page goes from
 # a CSV file of velocity steps to a fault file, then to stability, the earthquake cycle and the performance limits of every controller. Then come a controller with a
-# guarantee for all friction that the record allows, a campaign, and figures for a paper.
+# guarantee for every a, b and D_c that the record allows, a campaign, and figures for a paper.
 #
 # The record here is synthetic, with noise, so that the result can be checked; replace it by your own file. The same steps apply to a record of slip weakening
 # (`--law exponential-slip-weakening`).
@@ -75,7 +75,7 @@ save_fault(found, qd.load_fault("geothermal-fault"), folder / "gouge.toml")
 fault = qd.load_fault(folder / "gouge.toml")
 spread = max(abs(end / e.value - 1) for e in map(found.estimates.get, truth) for end in (e.least, e.most))
 spread = Fraction(int(1000 * spread) + 1, 1000)
-print(f"unstable: {qd.derive(fault).unstable}; a, b and D_c are off by at most {float(spread):.1%}")
+print(f"unstable: {qd.derive(fault).unstable}; a, b and D_c lie within the best fit ± {float(spread):.1%}")
 natural = natural_run(fault)
 cycle = natural.cycle
 print(f"{natural.outcome.kind}s of magnitude {cycle['magnitude']:.2f}, {1e3 * cycle['slip']:.0f} mm each, up to {natural.natural_peak:.2g} m/s")
@@ -98,13 +98,13 @@ print(design.guarantee.sentence())
 
 # %% [markdown]
 # ## Sixteen faults that the record allows
-# Each run lasts half a day. Friction is anywhere within the spread; the stress is sinusoidal with a period of ten hours, any phase, and any amplitude within its bound.
+# Each run lasts half a day. a, b and D_c are anywhere within the spread; the stress is sinusoidal with a period of ten hours, any phase, and any amplitude within its bound.
 
 # %%
 problem = qd.campaign_problem(fault, design.controller, spread=spread, stress=15e3, stress_period=36e3, duration=43200.0, seed=7)
 campaign = qd.run_campaign(problem, 16, folder / "campaign", executor=ThreadPoolExecutor(2), batch=8)
 fastest = max(campaign.values("peak_slip_rate"))
-print(f"fastest of {len(campaign.results)}: {fastest:.3g} m/s, where {float(design.guarantee.peak_slip_rate):.3g} m/s is never exceeded")
+print(f"largest slip rate of {len(campaign.results)} runs: {fastest:.3g} m/s; proved bound: {float(design.guarantee.peak_slip_rate):.3g} m/s")
 
 # %% [markdown]
 # ## A figure for a paper
@@ -122,7 +122,7 @@ figure.savefig(folder / "gouge.pdf")
 plt.show()
 
 # %% [markdown]
-# **Result:** an e-LQR measures the slip every 400 s and sets the pressure of a well near the fault. The fault then slips 20 mm in 20 days. It is proved, for all friction that the record allows, that the slip rate
+# **Result:** an e-LQR measures the slip every 400 s and sets the pressure of a well near the fault. The fault then slips 20 mm in 20 days. It is proved, for every a, b and D_c that the record allows, that the slip rate
 # never exceeds the planned rate by more than a quarter. Without control the fault has earthquakes of magnitude 3.5, with slip rates of decimetres per second.
 
 # %%

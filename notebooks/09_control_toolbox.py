@@ -42,7 +42,7 @@ period = fault.sampling_time  # T_s [s]
 # %%
 plant = qd.to_statespace(fault)
 sampled = control.sample_system(plant, period, method="zoh")
-print("poles [1/s]:", np.round(plant.poles(), 4), " held:", np.round(sampled.poles(), 4))
+print("poles [1/s]:", np.round(plant.poles(), 4), " zero-order hold:", np.round(sampled.poles(), 4))
 
 # %% [markdown]
 # ## A discrete-time LQR with two integrals
@@ -69,7 +69,7 @@ opened = control.ss(A, B, K, 0, period)
 lower, phase = control.stability_margins(opened)[:2]
 at_once_lower, at_once_phase = control.stability_margins(qd.loop_transfer(fault, law))[:2]
 print(f"sampled: stable down to {lower:.3f} of the input gain, phase margin {phase:.0f} degrees")
-print(f"at once: stable down to {at_once_lower:.3f} of the input gain, phase margin {at_once_phase:.0f} degrees")
+print(f"continuous time: stable down to {at_once_lower:.3f} of the input gain, phase margin {at_once_phase:.0f} degrees")
 control.bode_plot(opened, dB=True, Hz=True, title="Open loop, real fault")
 plt.gcf().set_size_inches(7, 5)
 plt.tight_layout()
@@ -110,7 +110,7 @@ at_once = control.input_output_response(loop, time, [r, r_rate], solve_ivp_metho
 run = qd.simulate(fault, law, scheme="explicit", duration=duration, plant="printed")  # without stick, as the plant of to_iosystem
 
 fig, (upper, below) = plt.subplots(2, sharex=True, figsize=(7, 5))
-upper.plot(time, 1e6 * (at_once.outputs[0] - r), label="python-control, pressure at once")
+upper.plot(time, 1e6 * (at_once.outputs[0] - r), label="python-control, pressure without delay")
 upper.plot(run.time, 1e6 * run.slip_error, label=f"simulate, with zero-order hold over {1e3 * period:g} ms")
 upper.set_ylabel("slip error [µm]"), upper.set_xlim(0, 60), upper.legend(loc="lower center", bbox_to_anchor=(0.5, 1), ncols=2)
 below.plot(time, 1e-3 * at_once.outputs[1])
@@ -119,12 +119,12 @@ below.set_ylabel("pressure [kPa]"), below.set_xlabel("time [s]")
 plt.show()
 
 # %% [markdown]
-# ## Uniform instants
-# `resample` gives a run at uniform instants, for spectra and filters. The pressure responds to the disturbance at its frequency.
+# ## Uniform sampling
+# `resample` samples a run uniformly, for spectra and filters. The pressure responds to the disturbance at its frequency.
 
 # %%
 even = run.resample(0.25)
-later = even.time >= 50  # when the start is over
+later = even.time >= 50  # after the initial transient
 spectrum = np.abs(np.fft.rfft((even.pressure[later] - even.pressure[later].mean()) * np.hanning(int(later.sum()))))
 angular = 2 * np.pi * np.fft.rfftfreq(int(later.sum()), 0.25)
 strongest = angular[spectrum.argmax()]
@@ -136,7 +136,7 @@ plt.show()
 print(f"strongest at {strongest:.2f} rad/s; the disturbance has {fault.disturbance.frequency} rad/s")
 
 # %% [markdown]
-# **Result:** yes. Six lines of python-control give an LQR with a slip-rate error that is proved to stay below 0.2 mm/s for every fault of the box. The uncontrolled
+# **Result:** yes. Six lines of python-control give an LQR whose slip-rate error is proved to stay below 0.2 mm/s for every fault of the box. The uncontrolled
 # fault reaches the slip rate of an earthquake. Margins alone do not give this bound.
 
 # %%

@@ -151,7 +151,7 @@ def _accepted(function: Callable[..., object], name: str, hint: Any, value: Any)
     if not matches(value, hint):
         remedies = (_REMEDIES[part] for part in _parts(hint) if part in _REMEDIES)
         raise ParameterError(
-            f"{name} of {_name(function)} must be {_said(hint)}. Received {shown(value)}. {next(remedies, '')}"
+            f"{name} of {_name(function)} must be {_type_text(hint)}. Received {shown(value)}. {next(remedies, '')}"
         )
     if type(value) in _PLAIN:
         return value
@@ -316,20 +316,20 @@ def _parts(hint: Any) -> list[str]:
     return [hint.__name__]
 
 
-def _said(hint: Any) -> str:
+def _type_text(hint: Any) -> str:
     """A type in words."""
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):
-        return " or ".join(_said(part) for part in inner)
+        return " or ".join(_type_text(part) for part in inner)
     if origin is Literal:
         return " or ".join(map(repr, inner))
     if hint is None:
         return "None"
     name = getattr(origin or hint, "__name__", str(hint))
     if origin and inner and name not in ("Callable", "type"):
-        return f"a {name.lower()} of {', '.join(_said(part) for part in inner if part is not Ellipsis)}"
+        return f"a {name.lower()} of {', '.join(_type_text(part) for part in inner if part is not Ellipsis)}"
     if name == "type":
-        return f"a class derived from {', '.join(_said(part) for part in inner)}"
+        return f"a class derived from {', '.join(_type_text(part) for part in inner)}"
     return _WORDS.get(name, f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
 
 

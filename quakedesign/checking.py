@@ -138,9 +138,9 @@ def _other_step(claim: Any, fault: "Fault") -> str:
         return ""
     text = f", box {fault.box.name}"
     own = rational(fault.sampling_time)
-    if not claim.sampled or claim.held.step == own:
+    if not claim.sampled or claim.sampled_loop.step == own:
         return text
-    proved, its = apart(claim.held.step, own)
+    proved, its = apart(claim.sampled_loop.step, own)
     return f"{text}; proved at T_s = {proved} s, NOT at its T_s = {its} s"
 
 

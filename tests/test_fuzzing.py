@@ -44,7 +44,7 @@ from quakedesign.exact import rational
 from quakedesign.fault import parse_fault
 from quakedesign.guarantees import SampledLoop, farthest_rock, guarantee, longest_delay
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.small_gain import SlowGain
+from quakedesign.guarantees.exact.small_gain import VaryingGain
 from quakedesign.laws import summed_integrals
 from quakedesign.laws.sampled_law import ErrorModel, RestLimit
 from quakedesign.parallel import SIGNALS
@@ -553,7 +553,16 @@ MINUTES = {"design", "compare", "certify", "assess", "natural_earthquake", "run_
 MINUTES |= {"decide", "largest", "accuracy", "gain_sensitivity", "noise_sensitivity", "velocity_step"}
 
 
-MINUTES |= {"limits", "guarantee", "design_held", "worst_tracking", "judge", "gain_map", "settling", "natural_run"}
+MINUTES |= {
+    "limits",
+    "guarantee",
+    "design_sampled_law",
+    "worst_tracking",
+    "judge",
+    "gain_map",
+    "settling",
+    "natural_run",
+}
 MINUTES |= {"largest_lipschitz", "stability_map", "gain_map_figure", "uncertainty_bounds", "check_files"}
 
 
@@ -570,7 +579,7 @@ def values():
     compared = Comparison(fault=FAULT, uncontrolled=run, entries=entries)
     fault = (FAULT, FAULT.friction, FAULT.reference, FAULT.disturbance, FAULT.box)
     laws = (cta, elqr, *designs, *entries, compared, certificate, certificate.loop)
-    loop = (claim, claim.task, claim.held, claim.claims, claim.held.controller)
+    loop = (claim, claim.task, claim.sampled_loop, claim.claims, claim.sampled_loop.controller)
     several = (campaign_problem(FAULT, elqr, scheme="explicit", duration=0.02), Space.of(FAULT))
     return (
         *fault,
@@ -666,8 +675,8 @@ FOUND = [
     (real_symbols, ((i for i in range(3)),)),
     (sos.Program(["x"], ["a"]).proposal, (0.5,)),
     (sos.Program(["x"], ["a"]).proposal, (float("nan"),)),
-    (partial(SlowGain, parts=10**400, growth=Fraction(1)), ()),
-    (partial(SlowGain, parts=-1, growth=Fraction(10**400)), ()),
+    (partial(VaryingGain, parts=10**400, growth=Fraction(1)), ()),
+    (partial(VaryingGain, parts=-1, growth=Fraction(10**400)), ()),
     (partial(RestLimit, width=3, per_slip=10**400, resolution=0, least=1, largest=10**400), ()),
     (ErrorModel, {"update": (), "command": (), "gain": 1}),
     (ErrorModel.delayed, (EYE, (), 1)),

@@ -53,7 +53,7 @@ def test_a_linear_law_of_ones_own_is_proved_by_its_class_alone():
     assert {"control_coefficient", "friction_slope"} <= {p.name for p in found.premises if p.holds}
     assert found.guarantee.sentence().startswith("none: no analysis of PID")
     assert found.title == "PID"
-    assert (found.held_loop(), found.compensation, found.feedforward_variants()) == (None, None, ())
+    assert (found.sampled_stability(), found.compensation, found.feedforward_variants()) == (None, None, ())
 
 
 def test_a_law_that_states_another_loop_than_its_own_is_not_proved():

@@ -81,7 +81,7 @@ def blocks(
         new_file(path, "certificate file", force=force)
     result = one_block(loaded, range(least, most + 1), wells=wells, coupling=coupling, step=step)
     for count, proof in result.proofs.items():
-        if files and proof.found:
+        if files and proof.available:
             with made_folder(files[count].parent):
                 save_guarantee(proof, files[count])
     output.show(result.to_dict(), result.lines())
@@ -152,7 +152,7 @@ def _scope(proof: Any, chain: "BlockChain") -> list[str]:
 
 
 def _values(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> Json:
-    if not proof.found:
+    if not proof.available:
         return {"verdict": "undecided", "reason": proof.reason}
     proved = {} if one is None else one.proved_values()
     values = {"verdict": "proved", "sentence": proof.sentence(), **proof.to_dict()}
@@ -161,7 +161,7 @@ def _values(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | 
 
 def _lines(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | None" = None) -> list[str]:
     """Guarantee and its conditions, with a run if there is one; else the reason why nothing is proved."""
-    if proof.found:
+    if proof.available:
         conditions = [*proof.statement(), *_scope(proof, chain)]
         return conditions if one is None else one.screen(conditions)
     far = "the command limits gives the pressures that every controller of this file needs with its diffusivity"
@@ -226,16 +226,16 @@ def guarantee_chain(
             tell("design and proof", 0.0)
             result = guarantee(chain, law, step=step, **sliding)
     proof = result.proof
-    if out is not None and proof.found:
+    if out is not None and proof.available:
         with made_folder(out.parent):
             result.save(out)
-    unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not proof.found else []
-    written = None if out is None or not proof.found else str(out)
+    unwritten = [f"{out} is not written, as nothing is proved"] if out is not None and not proof.available else []
+    written = None if out is None or not proof.available else str(out)
     from quakedesign.studies.several_blocks import ChainRun
 
     one = None if sliding is not None else ChainRun(chain=chain, controller=law, proof=proof, run=None)
     output.show({**_values(proof, chain, one), "certificate": written}, [*_lines(proof, chain, one), *unwritten])
-    return 0 if proof.found else 1
+    return 0 if proof.available else 1
 
 
 _HEADS = ("law", "proved", "", "in the run", "", "pressure", "")
@@ -310,7 +310,7 @@ def export_chain(
     with progress() as tell:
         tell("design and proof", 0.0)
         proof = chain_law(chain, controller, law.certificate)
-    if not proof.found:
+    if not proof.available:
         output.show(_values(proof, chain), [*_lines(proof, chain), "nothing is exported, as no law is proved"])
         return 1
     step = block_step(chain, proof.law, remarks=(*proof.statement(), *_scope(proof, chain)))
@@ -340,7 +340,7 @@ def run_chain(
     proof: Any = one.proof
     values = _run_values(one)
     lines = [] if proof is None else _lines(proof, chain, one)
-    lines += one.lines() if proof is None or not proof.found else []
+    lines += one.lines() if proof is None or not proof.available else []
     if out is not None and one.run is not None:
         from quakedesign.files import whole_folder
         from quakedesign.guarantees.exact.guarantee_files import save_guarantee

@@ -52,7 +52,7 @@ class DesignOptions(WellOptions):
         peak: the smallest certified slip-rate error. tracking: a smaller slip error under a drifting disturbance, with
         a somewhat larger slip-rate error.
     continuous
-        Design in continuous time, as in the paper, instead of for the sampled loop with a guarantee.
+        Design in continuous time, as in the paper, instead of a sampled loop with a guarantee.
     measured
         Measurement of the sampled e-LQR: slip-and-rate, or slip, from which it estimates the slip rate. Sliding modes
         measure both.
@@ -231,7 +231,7 @@ def positive(comparison: Any) -> bool:
     needed = {"along_reference", "control_coefficient", "friction_slope", "sampling_time"}
     return all(
         str(entry.design.verdict) == "proved"
-        and (entry.design.runs is None or entry.design.runs.found)
+        and (entry.design.runs is None or entry.design.runs.available)
         and all(p.holds for p in entry.design.conditions if p.name in needed)
         and (entry.run is None or entry.run.outcome.harmless)
         for entry in comparison.of("designed")

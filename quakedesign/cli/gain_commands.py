@@ -127,7 +127,7 @@ def _sampled(
 
 
 def _values(synthesis: "Synthesis | None") -> Json:
-    """Answer as JSON: gains and ranges as texts, measured values as numbers."""
+    """Answer as JSON: gains and ranges as strings, measured values as numbers."""
     if synthesis is None:
         return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
     ranges = synthesis.certificate.loop.uncertain

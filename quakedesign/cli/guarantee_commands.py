@@ -53,7 +53,7 @@ def guarantee(
     law: Path | None = None,
     scheme: str | None = None,
     measured: Literal["slip-and-rate", "slip", "differentiator"] = "slip-and-rate",
-    around: SetupOptions = _IDEAL,
+    setup_options: SetupOptions = _IDEAL,
     disturbance_class: DisturbanceClass = "amplitude",
     plant: Literal["stick-slip", "printed"] | None = None,
     stress: ExactPascals | None = None,
@@ -67,7 +67,7 @@ def guarantee(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Prove bounds of slip, slip rate and pressure of the sampled loop, for all t >= 0.
+    """Prove bounds on slip, slip rate and pressure of the sampled loop, for all t >= 0.
 
     The bounds hold along the reference for every friction law and all constant parameters of the box, for every
     disturbance of the class, and from rest or from bounded initial errors. The controller is designed for the loop
@@ -119,14 +119,14 @@ def guarantee(
 
     accepted = ("step", "out", "controller", "stress", "lag")
     if (blocks := several_blocks(fault, globals()["guarantee"], options, accepted, box)) is not None:
-        setup = around.setup()
+        setup = setup_options.setup()
         loads = {"stress": stress, "lag": setup.lag}
         require_loads(blocks, loads)
         return guarantee_chain(blocks, controller, setup.step, loads if blocks.has_state else None, out, force, output)
     began, faults = perf_counter(), [load_fault(name, box=box, disturbance=disturbance) for name in (fault, *more)]
     faults = [with_accepted_fit(one, accept_poor_fit) for one in faults]
     files = _files(out, [one.name for one in faults], force=force)
-    setup = around.setup(measured=measured)
+    setup = setup_options.setup(measured=measured)
     arguments: dict[str, Any] = {"gains": gains, "objective": objective, "scheme": scheme, "stress": stress}
     arguments |= {"disturbance_class": disturbance_class, "spread": spread, "plant": plant}
     if law is not None:
@@ -216,7 +216,7 @@ def limits(
     /,
     *,
     pressure: Pascals | None = None,
-    around: SetupOptions = _IDEAL,
+    setup_options: SetupOptions = _IDEAL,
     stress: Pascals | None = None,
     spread: str = "0",
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate",
@@ -255,10 +255,10 @@ def limits(
     from quakedesign.cli.block_commands import chain_at_step, chain_limits, several_blocks
     from quakedesign.fault import load_fault
 
-    spreads, accepted = around.diffusivity, ("step", "stress", "pressure", "diffusivity")
+    spreads, accepted = setup_options.diffusivity, ("step", "stress", "pressure", "diffusivity")
     if (chain := several_blocks(fault, globals()["limits"], options, accepted, box)) is not None:
         rock = None if spreads is None else float(rational(spreads))
-        chain = chain_at_step(chain, replace(around, diffusivity=None).setup())
+        chain = chain_at_step(chain, replace(setup_options, diffusivity=None).setup())
         return chain_limits(chain, output, stress=stress, pressure=pressure, diffusivity=rock)
     loaded = load_fault(fault, box=box, disturbance=disturbance)
     if out is not None:
@@ -272,7 +272,7 @@ def limits(
 
     result = all_limits(
         loaded,
-        replace(around, diffusivity=(spreads or "1") if around.well else None).setup(measured=measured),
+        replace(setup_options, diffusivity=(spreads or "1") if setup_options.well else None).setup(measured=measured),
         pressure=pressure,
         diffusivity=float(rational(spreads or "1")),
         stress=stress,

@@ -800,10 +800,10 @@ def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
     """
     from quakedesign.exact import rational
 
-    if claim.held.delay or claim.held.slip_noise:
+    if claim.sampled_loop.delay or claim.sampled_loop.slip_noise:
         raise ParameterError(
             "a campaign of slow sliding needs a loop without delay and slip noise. Received a certificate with a delay "
-            f"of {float(claim.held.delay):g} s and slip noise of {float(claim.held.slip_noise):g} m. "
+            f"of {float(claim.sampled_loop.delay):g} s and slip noise of {float(claim.sampled_loop.slip_noise):g} m. "
             "Use simulate --certificate."
         )
     low, high = claim.task.ranges["direct_effect"]
@@ -821,9 +821,9 @@ def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], optio
     claim = options["law"].choose(fault).claim
     reject({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, whose law has its own")
     entries = {"stress": float(claim.task.stress)} | options["state"].of_control()
-    entries |= _instruments(fault, {**changed, "step": float(claim.held.step)}, options)
-    if entries["transducer"] is None and claim.held.slip_noise:
-        entries["transducer"] = Transducer(quantum=2 * float(claim.held.slip_noise))
+    entries |= _instruments(fault, {**changed, "step": float(claim.sampled_loop.step)}, options)
+    if entries["transducer"] is None and claim.sampled_loop.slip_noise:
+        entries["transducer"] = Transducer(quantum=2 * float(claim.sampled_loop.slip_noise))
     return {**entries, "step": None, "claim": claim}
 
 

@@ -200,7 +200,7 @@ def sos(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Prove that a polynomial is a sum of squares, or that it is not, or report neither. Exit code 0 only if it is.
+    """Decide whether a polynomial is a sum of squares, with a proof. Exit code 0 only if it is proved to be one.
 
     Parameters
     ----------

@@ -176,9 +176,9 @@ def simulate(
 
 def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
     """Options of a run, including its plant, that the proof of its law does not cover."""
-    sampled, changed = claim.held, changed | {"plant": plant}
+    sampled, changed = claim.sampled_loop, changed | {"plant": plant}
     times = {name: float(time) for name, time in sampled.path.items()}
-    starts = zip(("initial_slip", "initial_slip_rate"), map(float, sampled.start), strict=True)
+    starts = zip(("initial_slip", "initial_slip_rate"), map(float, sampled.initial_errors), strict=True)
     within = {name for name, most in starts if abs(changed.get(name, 0.0)) <= most}
     within |= {name for name, time in times.items() if changed.get(name) == time}
     within |= {"plant"} if plant == claim.plant else set()
@@ -442,12 +442,12 @@ def campaign(
         done = run_campaign(problem, samples, folder, tell=tell, **options)
         drawn = done.plot()
         done.save(folder, {f"distribution.{kind}": figure_bytes(drawn, kind, "distribution") for kind in format})
-        values = done.to_dict() | _again(done, rerun, folder)
+        values = done.to_dict() | _rerun(done, rerun, folder)
     output.show(values, lambda: _print(problem, done, values, f"{folder}/ ({_written(values, format)})"))
     return 1 if done.failures else 0
 
 
-def _again(done: "Campaign", index: str | None, folder: Path) -> Json:
+def _rerun(done: "Campaign", index: str | None, folder: Path) -> Json:
     """Run one sample again and store it."""
     if index is None:
         return {}

@@ -38,7 +38,7 @@ class FaultBlock:
     length : float
         Length of the block along the fault [m].
     effective_normal_stress : float
-        σ'_n [Pa], positive in compression; that of the fault if left out.
+        σ'_n [Pa], positive in compression; that of the fault if omitted.
     friction : FrictionLaw
     """
 
@@ -134,7 +134,7 @@ class BlockChain:
 
     @cached_property
     def flow(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Coefficients of q' [1/s]: first of the pressures q of blocks without a well in the middle, then of the wells.
+        """Coefficients of q' [1/s]: of the pressures q of blocks without a well at their middle, then of the wells.
 
         Empty without a diffusivity.
         """
@@ -180,7 +180,7 @@ class BlockChain:
 
     @cached_property
     def faults(self) -> tuple[Fault, ...]:
-        """The fault with friction and stress of each block; of its other values those per area hold for the block."""
+        """One fault per block, with its friction and stress; of the other values only those per unit area apply."""
         return tuple(
             replace(self.fault, friction=b.friction, effective_normal_stress=b.effective_normal_stress)
             for b in self.blocks

@@ -155,7 +155,7 @@ class Problems:
         except QuakedesignError as error:
             self.errors += error.parts or (error,)
 
-    def refuse(self, where: str = "") -> None:
+    def raise_collected(self, where: str = "") -> None:
         """Raise the collected errors, if any, as one exception, whose message starts with `where` and numbers them."""
         if not self.errors:
             return
@@ -170,7 +170,7 @@ class Problems:
 
     def resolved(self, value: _Value | None, where: str = "") -> _Value:
         """Raise the collected errors, see `refuse`, or return the value; it may be None only if there are errors."""
-        self.refuse(where)
+        self.raise_collected(where)
         assert value is not None
         return value
 
@@ -181,7 +181,7 @@ def require_all(*checks: Callable[[], None]) -> None:
     for check in checks:
         with problems.collected():
             check()
-    problems.refuse()
+    problems.raise_collected()
 
 
 def require_positive(remedy: str = "", **values: float | Fraction) -> None:
@@ -211,10 +211,10 @@ def require_ordinary(least: float = 1 / _LARGEST, **values: float | Fraction) ->
         with problems.collected():
             if value and not is_ordinary(max(value, -value), least):
                 raise ParameterError(
-                    f"{name} must be of a size between {least:g} and {_LARGEST:g} in SI units. "
+                    f"{name} must have a magnitude between {least:g} and {_LARGEST:g} in SI units. "
                     f"Received {shown(value)}. Check its unit."
                 )
-    problems.refuse()
+    problems.raise_collected()
 
 
 def require_count(most: int, **values: int) -> None:
@@ -232,7 +232,7 @@ def _require(values: dict[str, Any], condition: Callable[[Any], bool], what: str
                 raise ParameterError(f"{name} must be a number in SI units, {what}. Received {shown(value)}.")
             if not (is_finite(value) and condition(value)):
                 raise ParameterError(f"{name} must be {what}. Received {shown(value)} (SI units). {remedy}".strip())
-    problems.refuse()
+    problems.raise_collected()
 
 
 def is_finite(value: Real | float) -> bool:
@@ -321,7 +321,7 @@ class Reference:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingReference:
-    """Slip r(t) = d_max((1 − λ)t/t_op + λ·shape(t/t_op)) of a fault that slides at r′(0) at first and at the end.
+    """Slip r(t) = d_max((1 − λ)t/t_op + λ·shape(t/t_op)) of a fault whose initial and final slip rate is r′(0).
 
     Attributes
     ----------
@@ -552,7 +552,7 @@ class Fault:
             require_plant(**{name: value for name in _UNITS if (value := getattr(self, name)) is not None})
         with problems.collected():
             require_ordinary(**{name: getattr(self.friction, name) for name in self.friction.quantities()})
-        problems.refuse()
+        problems.raise_collected()
         self.friction.require(ramp=self.reference.ramp)
         if self.reference.operation_time < 1000 * self.sampling_time:
             raise ParameterError(
@@ -610,7 +610,7 @@ class Fault:
 
     @property
     def exact_authority(self) -> Fraction:
-        """A/m = 1/(ρh) [m²/kg] of the decimals given."""
+        """A/m = 1/(ρh) [m²/kg], exact for the given decimals."""
         return 1 / (rational(self.density) * rational(self.side))
 
     @property
@@ -686,7 +686,7 @@ def require_plant(**numbers: float) -> None:
                 usual = f"It is in {_UNITS[name]} here; check sign and unit."
                 require_positive(compression if name == "effective_normal_stress" else usual, **{name: value})
             require_ordinary(**{name: value})
-    problems.refuse()
+    problems.raise_collected()
 
 
 def magnitude(seismic_moment: float) -> float:

@@ -9,7 +9,7 @@ from .exact.sliding_proof import SlidingProof as SlidingProof
 from .exact.sliding_small_gain import SlidingClaims as SlidingClaims
 from .exact.sliding_small_gain import cell_bounds as cell_bounds
 from .exact.small_gain import Bounds as Bounds
-from .exact.small_gain import SlowGain as SlowGain
+from .exact.small_gain import VaryingGain as VaryingGain
 from .exact.small_gain import certified_bounds as certified_bounds
 from .exact.stick_slip_proof import FaultProof as FaultProof
 from .exact.stick_slip_proof import StickSlipProof as StickSlipProof
@@ -33,7 +33,7 @@ from .search.linear_design import best_guarantee as best_guarantee
 from .search.linear_design import certified_peaks as certified_peaks
 from .search.linear_design import continued as continued
 from .search.linear_design import design_at as design_at
-from .search.linear_design import design_held as design_held
+from .search.linear_design import design_sampled_law as design_sampled_law
 from .search.linear_design import farthest_rock as farthest_rock
 from .search.linear_design import longest_delay as longest_delay
 from .search.linear_design import longest_step as longest_step

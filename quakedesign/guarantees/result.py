@@ -31,7 +31,7 @@ class Guarantee:
     not_at_rest, stick_slip_gap : str
         Why there is no proof on the stick–slip plant, and what is not searched there.
     least_slip_rate : LowerBound or None
-        Slip rate, or its error [m/s], that the fault reaches at this T_s under every controller.
+        Slip rate, or its error [m/s], below which no controller can keep the fault at this T_s.
     """
 
     __slots__ = ()
@@ -47,7 +47,7 @@ class Guarantee:
     @property
     def proved(self) -> bool:
         """Whether there is a guarantee."""
-        return bool(self.proof.found)
+        return bool(self.proof.available)
 
     @property
     def verdict(self) -> Verdict:
@@ -111,7 +111,7 @@ class Guarantee:
         return Verdict(self.proof.check())
 
     def to_dict(self) -> Json:
-        """Plain values, SI; exact numbers as texts."""
+        """Plain values, SI; exact numbers as strings."""
         result = {"verdict": str(self.verdict), "sentence": self.sentence()}
         return result | (self.proof.to_dict() if self.proved else {"reason": self.reason})
 
@@ -142,7 +142,7 @@ class Guarantee:
     def _proof(self) -> Any:
         if not self.proved:
             raise CertificateError(
-                f"a result must be proved to have a law and a certificate. Received {self.sentence()}."
+                f"the result must be proved, or it has no law and no certificate. Received {self.sentence()}."
             )
         return self.proof
 
@@ -161,7 +161,7 @@ class PlantGuarantee(Guarantee):
 
     def lines(self) -> list[str]:
         """Lines of text: the guarantee, then changes of the law."""
-        return self.proof.statement() if self.proof.found else super().lines()
+        return self.proof.statement() if self.proof.available else super().lines()
 
     @property
     def controller(self) -> Any:

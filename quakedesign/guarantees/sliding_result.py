@@ -21,16 +21,16 @@ from quakedesign.guarantees.result import Guarantee
 from quakedesign.guarantees.search.lqg import sliding_model
 from quakedesign.guarantees.search.sliding_design import (
     LOG_RATES,
+    FarthestWell,
     Prove,
-    WellReach,
+    admissible_step,
     designed_sliding,
     farthest,
     largest_stress,
+    possible_remedy,
     proved_sliding,
     quieter,
-    suitable,
     two_digits,
-    what_would_do,
     with_noise,
 )
 from quakedesign.guarantees.search.worst_case import WorstCase, worst_sliding
@@ -54,19 +54,19 @@ class SlidingGuarantee(Guarantee):
     ----------
     proof : SlidingProof or NoProof
     task : SlidingPlant
-    held : SampledLoop or None
+    sampled_loop : SampledLoop or None
         The sampled law in its loop setup; None where no law was found.
     """
 
     proof: SlidingProof | NoProof
     task: SlidingPlant
-    held: SampledLoop | None
+    sampled_loop: SampledLoop | None
     compensation: None = None
 
     @cached_property
     def worst(self) -> WorstCase | None:
         """Worst case found (lower bound); takes some tenths of a second for every corner of the box."""
-        return worst_sliding(self.proof) if self.proof.found else None
+        return worst_sliding(self.proof) if self.proof.available else None
 
     def lines(self) -> list[str]:
         """Text for users."""
@@ -76,7 +76,7 @@ class SlidingGuarantee(Guarantee):
         return [f"proved: {self.proof.sentence()}", f"worst case found without inertia: {seen}"]
 
     def to_dict(self) -> Json:
-        """Plain values, SI; exact numbers as texts."""
+        """Plain values, SI; exact numbers as strings."""
         seen = self.worst and {"log_rate": self.worst.log_rate, "slip_error": self.worst.slip_error}
         return super().to_dict() | ({"worst_found": seen} if self.proved else {})
 
@@ -138,27 +138,27 @@ def guarantee_sliding(
         )
     prove = _proof(pump, tell, with_stress=stress is not None)
     tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
-    result, reach, remedy = _designed(task, period, LOG_RATES[0], setup, prove), WellReach(share=Fraction(1)), ""
-    if result.held is None:
+    result, well, remedy = _designed(task, period, LOG_RATES[0], setup, prove), FarthestWell(share=Fraction(1)), ""
+    if result.sampled_loop is None:
         tell("how far the well may be", 0.3)
-        reach = farthest(task, suitable(task, period), setup, stressed=stress is not None)
-        remedy = _remedy(fault, task, period, reach, setup, prove, spread)
+        well = farthest(task, admissible_step(task, period), setup, stressed=stress is not None)
+        remedy = _remedy(fault, task, period, well, setup, prove, spread)
     for log_rate in LOG_RATES[1:]:
-        if (result.proved and (stress or result.task.stress > _TRIFLE)) or reach.share < 1:
+        if (result.proved and (stress or result.task.stress > _TRIFLE)) or well.share < 1:
             break
         tell(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
-        smaller = _designed(task, period, log_rate, setup, prove, reach.numbers)
+        smaller = _designed(task, period, log_rate, setup, prove, well.numbers)
         more = smaller.proved and (not result.proved or smaller.task.stress > result.task.stress)
         result = smaller if more else result
-    if not result.proof.found and not remedy and stress:
+    if not result.proof.available and not remedy and stress:
         pumped = replace(setup, pump=pump)
         remedy = _under_less(guarantee_sliding(fault, step=step, spread=spread, tell=tell, setup=pumped))
-        if remedy and result.held is None:
+        if remedy and result.sampled_loop is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
             result = replace(result, proof=NoProof(reason=none))
-    if not result.proof.found and not remedy:
+    if not result.proof.available and not remedy:
         remedy = _with_less_noise(task, period, setup, prove)
-    if not result.proof.found:
+    if not result.proof.available:
         why = (stress and _beyond(fault, stress, setup)) or result.proof.reason
         return replace(result, proof=replace(result.proof, reason="; ".join(filter(None, (why, remedy)))))
     return result
@@ -198,15 +198,15 @@ def _remedy(
     fault: Fault,
     task: SlidingPlant,
     step: Fraction,
-    reach: WellReach,
+    well: FarthestWell,
     setup: ExactSetup,
     prove: Prove,
     spread: Fraction,
 ) -> str:
     """Remedy: another T_s, V or diffusion path that has a proof; empty if none is needed."""
-    if reach.share < 1:
-        return what_would_do(fault, task, reach, setup, prove, spread=spread)
-    suits = suitable(task, step)
+    if well.share < 1:
+        return possible_remedy(fault, task, well, setup, prove, spread=spread)
+    suits = admissible_step(task, step)
     near = f"T_s near D_c/({AGEINGS:g} V), here {float(suits):.2g} s, suits: set sampling_time in [task]"
     return "" if suits == step else near
 
@@ -214,19 +214,19 @@ def _remedy(
 def _proof(pump: Pump | None, tell: Tell, *, with_stress: bool) -> Prove:
     """Proof within the pump limits, under the task's stress or near the largest stress."""
 
-    def tried(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
+    def tried(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
         tell(f"{under}: proof", _SEARCHED)
-        proof = _within_pump(pump, proved_sliding(task, held, log_rate=log_rate))
-        tell(f"{under}: {'proved' if proof.found else 'not proved'}", _SEARCHED)
+        proof = _within_pump(pump, proved_sliding(task, sampled_loop, log_rate=log_rate))
+        tell(f"{under}: {'proved' if proof.available else 'not proved'}", _SEARCHED)
         return proof
 
-    def about_the_largest(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
-        most = largest_stress(task, held, log_rate=log_rate)
+    def about_the_largest(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
+        most = largest_stress(task, sampled_loop, log_rate=log_rate)
         proof: SlidingProof | NoProof
         for share in _SHARES if most else _SHARES[:1]:
-            proof = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), held, log_rate)
-            if proof.found:
+            proof = tried(replace(task, stress=two_digits(share * (most or _TRIFLE))), sampled_loop, log_rate)
+            if proof.available:
                 break
         return proof
 
@@ -244,14 +244,14 @@ def _designed(
     """Guarantee of a designed law with |ln(v/V)| ≤ `log_rate`; `near` is a further initial law."""
     design = designed_sliding(task, step, log_rate=log_rate, near=near, setup=setup)
     if isinstance(design, NoProof):
-        return SlidingGuarantee(proof=design, task=task, held=None)
+        return SlidingGuarantee(proof=design, task=task, sampled_loop=None)
     proved = prove(task, design, log_rate)
-    return SlidingGuarantee(proof=proved, task=proved.task if proved.found else task, held=design)
+    return SlidingGuarantee(proof=proved, task=proved.task if proved.available else task, sampled_loop=design)
 
 
 def _within_pump(pump: Pump | None, proof: SlidingProof | NoProof) -> SlidingProof | NoProof:
     """A guarantee if its valve pressures lie within the pump limits."""
-    if pump is None or not proof.found:
+    if pump is None or not proof.available:
         return proof
     too_much = pump.exceeded(*proof.valve_pressures)
     return NoProof(reason=too_much) if too_much else proof

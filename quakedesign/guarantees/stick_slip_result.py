@@ -44,24 +44,24 @@ class StickSlipGuarantee(Guarantee):
     @property
     def least_slip_rate(self) -> LowerBound | None:
         """Performance limit of the slip rate [m/s] at this T_s; None without a guarantee."""
-        if not self.proof.found:
+        if not self.proof.available:
             return None
         task = replace(self.proof.task, amplitude=self.proof.disturbance)  # healing does not increase this limit
-        return smallest_stick_slip_rate(task, self.proof.held.longest)
+        return smallest_stick_slip_rate(task, self.proof.sampled_loop.longest)
 
     def limit_lines(self) -> list[str]:
         """Performance limit at the same T_s, as text; empty if unknown."""
         least = self.least_slip_rate
-        if least is None or not self.proof.found:
+        if least is None or not self.proof.available:
             return []
         return [
-            f"no controller with zero-order hold over T_s = {float(self.proof.held.longest):.6g} s keeps the slip rate "
-            f"below {least.quantity('m/s')} for all disturbances"
+            f"no controller with zero-order hold over T_s = {float(self.proof.sampled_loop.longest):.6g} s keeps the "
+            f"slip rate below {least.quantity('m/s')} for all disturbances"
         ]
 
     def lines(self) -> list[str]:
         """Text for users: the sentence first, then the worst case found and the performance limit."""
-        if not self.proof.found:
+        if not self.proof.available:
             return [self.proof.sentence(), "the plant without stick may have a guarantee: use --plant printed"]
         healing = self.proof.covered_healing()
         parts = [
@@ -79,7 +79,7 @@ class StickSlipGuarantee(Guarantee):
         return parts if self.compensation is None else [*parts, self.compensation.sentence()]
 
     def to_dict(self) -> Json:
-        """Plain values, SI; exact numbers as texts."""
+        """Plain values, SI; exact numbers as strings."""
         if not self.proved:
             return super().to_dict()
         worst, least = self.worst, self.least_slip_rate
@@ -150,5 +150,5 @@ def stick_slip_with_worst_case(
     fault: Fault, proof: StickSlipProof | NoProof, compensation: Compensation | None = None
 ) -> StickSlipGuarantee:
     """A guarantee with the worst case found on its loop."""
-    worst = worst_stick_slip(proof) if proof.found else None
+    worst = worst_stick_slip(proof) if proof.available else None
     return StickSlipGuarantee(fault=fault, proof=proof, worst=worst, compensation=compensation)

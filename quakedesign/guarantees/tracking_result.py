@@ -83,9 +83,9 @@ class TrackingGuarantee(Guarantee):
     def worst_with_stick(self) -> WorstCase | None:
         """Worst case found on the stick–slip plant; for a given law the search runs on access.
 
-        None for a law that uses the slip, the slip rate or the reference itself, or that is unstable by itself.
+        None for a law that uses slip, slip rate or reference directly, or that is itself unstable.
         """
-        if not (self.given and self.proof.found) or self.proof.held.law.of_reference or self.grows_at_rest:
+        if not (self.given and self.proof.available) or self.proof.sampled_loop.law.of_reference or self.grows_at_rest:
             return self.stick_search
         return worst_tracking(self.proof, sticks=True)
 
@@ -99,12 +99,12 @@ class TrackingGuarantee(Guarantee):
         return [*self._lines(), *tried, *(healed if excess else ()), *(self.notes or ())]
 
     def _lines(self) -> list[str]:
-        if not self.proof.found:
+        if not self.proof.available:
             lines = [self.proof.sentence()]
             if self.unproved_step is not None:
                 lines = [f"not guaranteed at T_s = {float(self.unproved_step):g} s: {self.proof.reason}"]
             if self.shorter is not None:
-                lines.append(f"with T_s = {float(self.shorter.held.step):g} s: {self.shorter.sentence()}")
+                lines.append(f"with T_s = {float(self.shorter.sampled_loop.step):g} s: {self.shorter.sentence()}")
             if self.nearest is not None:
                 other = f"this law {_with_nearest(*self.nearest)}" if self.given else _with_nearest(*self.nearest)
                 if self.factor is not None:
@@ -133,7 +133,7 @@ class TrackingGuarantee(Guarantee):
     def stick_slip_gap(self) -> str:
         """Quantities neither proved nor searched on the stick–slip plant; empty for a design."""
         seen = self.worst_with_stick
-        if not self.proof.found or (seen is not None and not (self.given and seen.pressures is None)):
+        if not self.proof.available or (seen is not None and not (self.given and seen.pressures is None)):
             return ""
         searched = "case" if seen is None else "pressure"
         return (
@@ -147,16 +147,18 @@ class TrackingGuarantee(Guarantee):
 
         The measurements do not respond to the pressure at rest, so that the law runs in open loop.
         """
-        if not self.proof.found:
+        if not self.proof.available:
             return None
-        return growth_at_rest(self.proof.held.law, self.proof.held.step)
+        return growth_at_rest(self.proof.sampled_loop.law, self.proof.sampled_loop.step)
 
     @property
     def differentiator_bound(self) -> UpperBound | None:
         """Least λ_d [m/s³] of the differentiator for the guarantee; None for a law without one."""
-        if not self.proof.found or measured_by(self.proof.held.law) != MEASURED[2]:
+        if not self.proof.available or measured_by(self.proof.sampled_loop.law) != MEASURED[2]:
             return None
-        return UpperBound(least_bound(self.proof.slip_acceleration, self.proof.held.slip_noise, self.proof.held.step))
+        return UpperBound(
+            least_bound(self.proof.slip_acceleration, self.proof.sampled_loop.slip_noise, self.proof.sampled_loop.step)
+        )
 
     def _differentiator_lines(self) -> list[str]:
         """Line of text on the differentiator; none for a law without one."""
@@ -171,19 +173,21 @@ class TrackingGuarantee(Guarantee):
 
     def _at_rest(self) -> list[str]:
         """Warning about a law whose states grow while the fault is at rest; none for other laws."""
-        if not self.proof.found:
+        if not self.proof.available:
             return []
         limited = self.proof.rest_limit is not None
-        return list(filter(None, [warning_at_rest(self.proof.held.law, self.proof.held.step, limited=limited)]))
+        return list(
+            filter(None, [warning_at_rest(self.proof.sampled_loop.law, self.proof.sampled_loop.step, limited=limited)])
+        )
 
     def limit_lines(self) -> list[str]:
         """Performance limits at the same T_s, as text; empty if unknown."""
         limit = self.limit
-        if limit is None or not self.proof.found:
+        if limit is None or not self.proof.available:
             return []
-        held = self.proof.held
-        step = f"{float(max(held.step, held.longest_step)):.6g} s"
-        step += " with the noise of the guarantee" if held.noise else ""
+        sampled_loop = self.proof.sampled_loop
+        step = f"{float(max(sampled_loop.step, sampled_loop.longest_step)):.6g} s"
+        step += " with the noise of the guarantee" if sampled_loop.noise else ""
         both = "" if limit.slip_error is None else f" while the slip error stays below {limit.slip_error.quantity('m')}"
         rate = limit.slip_rate_error.quantity("m/s")
         return [
@@ -198,7 +202,7 @@ class TrackingGuarantee(Guarantee):
     def _narrower_class(self) -> list[str]:
         """Line of text which says that the fault's own disturbance is of the class ``rate``; none otherwise."""
         disturbance = self.fault.disturbance
-        own = self.proof.found and self.proof.task.change is None
+        own = self.proof.available and self.proof.task.change is None
         if not own or disturbance.constant or not disturbance.largest_rate:
             return []
         change = UpperBound(self.fault.disturbance_bounds[1])
@@ -210,12 +214,14 @@ class TrackingGuarantee(Guarantee):
     @property
     def limit(self) -> SmallestPeak | None:
         """Performance limit at the same T_s, delay and measurements; None for the class ``rate``."""
-        if not self.proof.found or self.proof.task.change is not None:
+        if not self.proof.available or self.proof.task.change is not None:
             return None
-        held = self.proof.held
-        rate_noise = None if held.law.of_slip_alone else held.rate_noise
-        step = max(held.step, held.longest_step)
-        return smallest_peak(self.proof.task, step, held.delay, slip_noise=held.slip_noise, rate_noise=rate_noise)
+        sampled_loop = self.proof.sampled_loop
+        rate_noise = None if sampled_loop.law.of_slip_alone else sampled_loop.rate_noise
+        step = max(sampled_loop.step, sampled_loop.longest_step)
+        return smallest_peak(
+            self.proof.task, step, sampled_loop.delay, slip_noise=sampled_loop.slip_noise, rate_noise=rate_noise
+        )
 
     @property
     def least_slip_rate(self) -> LowerBound | None:
@@ -225,7 +231,7 @@ class TrackingGuarantee(Guarantee):
     @property
     def leaves_with_stick(self) -> bool:
         """Whether the stick–slip plant exceeds the claims in the worst case found."""
-        if not self.proof.found or self.worst_with_stick is None:
+        if not self.proof.available or self.worst_with_stick is None:
             return False
         claims, seen = self.proof.claims, self.worst_with_stick
         (least, largest), ends = claims.pressures[-1], seen.pressures
@@ -234,11 +240,11 @@ class TrackingGuarantee(Guarantee):
         return seen.slip_error > claims.slip_error or (seen.slip_rate_error or 0.0) > claims.slip_rate_error
 
     def to_dict(self) -> Json:
-        """Plain values, SI; exact numbers as texts."""
-        if not self.proof.found:
+        """Plain values, SI; exact numbers as strings."""
+        if not self.proof.available:
             gain = self.proof.small_gain
             other = self.shorter
-            shorter = None if other is None else {"step": str(other.held.step), **other.claims.to_dict()}
+            shorter = None if other is None else {"step": str(other.sampled_loop.step), **other.claims.to_dict()}
             return {
                 "verdict": "undecided",
                 "sentence": self.proof.sentence(),
@@ -249,8 +255,8 @@ class TrackingGuarantee(Guarantee):
                 **({} if self.notes is None else {"notes": list(self.notes)}),
                 **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
-        bounds, held = self.proof.recomputed(), self.proof.held
-        small = None if not bounds.found else float_above(bounds.small_gain)
+        bounds, sampled_loop = self.proof.recomputed(), self.proof.sampled_loop
+        small = None if not bounds.available else float_above(bounds.small_gain)
         return {
             "verdict": str(self.proof.verdict_of(bounds)),
             "sentence": self.proof.sentence(),
@@ -261,11 +267,11 @@ class TrackingGuarantee(Guarantee):
             "grows_at_rest": self.grows_at_rest,
             "rest_limit": _rest_limit(self.proof.rest_limit),
             "limit": _limit(self.limit),
-            "measured": measured_by(held.law),
+            "measured": measured_by(sampled_loop.law),
             "differentiator_bound": None if self.differentiator_bound is None else self.differentiator_bound.exact,
-            **{name: str(getattr(held, name)) for name in _SETUP_KEYS},
-            "pump": None if held.pump is None else held.pump.to_dict(),
-            "law": _law(held.law),
+            **{name: str(getattr(sampled_loop, name)) for name in _SETUP_KEYS},
+            "pump": None if sampled_loop.pump is None else sampled_loop.pump.to_dict(),
+            "law": _law(sampled_loop.law),
             **({} if self.notes is None else {"notes": list(self.notes)}),
             **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             **({} if self.compensation is None else {"controller": self.compensation.to_dict()}),
@@ -290,7 +296,7 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
     if name == GAINS:
         return "with designed gains"
     if name in _QUANTITIES:
-        (title, unit), value = _QUANTITIES[name], getattr(proof.held, name)
+        (title, unit), value = _QUANTITIES[name], getattr(proof.sampled_loop, name)
         if not value:
             return f"without any {title}"
         if name not in ("delay", "lag", "diffusion"):
@@ -306,7 +312,7 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
         return f"with the box {wide}"
     if name == AMPLITUDE:
         return f"with a disturbance of at most {LowerBound(proof.task.amplitude):.3g} m/s^2"
-    pump = proof.held.pump
+    pump = proof.sampled_loop.pump
     if name == SATURATION and pump is not None and pump.limits is not None:
         low, high = pump.limits
         return f"with a pump from {LowerBound(low).quantity('Pa')} or less to {UpperBound(high).quantity('Pa')} or more"
@@ -316,8 +322,8 @@ def _with_nearest(name: str, proof: TrackingProof) -> str:
 
 
 def _nearest(name: str, proof: TrackingProof, factor: Fraction | None) -> Json:
-    """Plain values, SI; exact numbers as texts; a list for a box and for limits of a pump."""
-    pump, value = proof.held.pump, None
+    """Plain values, SI; exact numbers as strings; a list for a box and for limits of a pump."""
+    pump, value = proof.sampled_loop.pump, None
     if name == FACTOR:
         value = str(factor)
     elif name == AMPLITUDE:
@@ -326,36 +332,36 @@ def _nearest(name: str, proof: TrackingProof, factor: Fraction | None) -> Json:
         several = proof.task.spreads if name == BOX else (pump and pump.limits) or ()
         return {"quantity": name, "value": [str(v) for v in several], **proof.claims.to_dict()}
     else:
-        one = getattr(proof.held, name, None) if name in _QUANTITIES else pump and pump.rate
+        one = getattr(proof.sampled_loop, name, None) if name in _QUANTITIES else pump and pump.rate
         value = None if one is None else str(one)
     return {"quantity": name, "value": value, **proof.claims.to_dict()}
 
 
 def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGuarantee:
-    """A guarantee with the worst case found on its loop; about a second.
+    """A guarantee with the worst case found on its loop; takes about a second.
 
     If a trajectory with stick exceeds claims that were proved with a slowly varying input gain, those for an arbitrary
     input gain replace them, provided that they contain the trajectory.
     """
-    if not proof.found:
+    if not proof.available:
         return TrackingGuarantee(fault=fault, proof=proof)
     seen = TrackingGuarantee(
         fault=fault, proof=proof, worst=worst_tracking(proof), stick_search=worst_tracking(proof, sticks=True)
     )
-    return seen if proof.slow_gain is None or not seen.leaves_with_stick else _with_room(seen, proof)
+    return seen if proof.varying_gain is None or not seen.leaves_with_stick else _with_room(seen, proof)
 
 
 def given_law_with_worst_case(
     fault: Fault, proof: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
 ) -> TrackingGuarantee:
     """The guarantee of a given law; for a law of the errors alone also the worst case found."""
-    worst = worst_tracking(proof) if proof.found and not proof.held.law.of_reference else None
+    worst = worst_tracking(proof) if proof.available and not proof.sampled_loop.law.of_reference else None
     return TrackingGuarantee(fault=fault, proof=proof, worst=worst, notes=notes, given=True)
 
 
 def _with_room(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
-    arbitrary, worst = guarantee(proof.task, proof.held), seen.worst_with_stick
-    if not arbitrary.found or worst is None:
+    arbitrary, worst = guarantee(proof.task, proof.sampled_loop), seen.worst_with_stick
+    if not arbitrary.available or worst is None:
         return seen
     exceeded = ["slip_error"] if worst.slip_error > proof.claims.slip_error else []
     faster = (worst.slip_rate_error or 0.0) > proof.claims.slip_rate_error
@@ -383,7 +389,7 @@ def _rest_limit(limit: RestLimit | None) -> dict[str, str] | None:
 
 
 def _law(law: LinearLaw) -> Json:
-    root = law.root
+    root = law.implicit_step
     of_root = {} if root is None else {"slopes": written(root.slopes), "remainder": exact_text(root.remainder)}
     matrices = {name: written(getattr(law, name)) for name in ("update", "measured")}
     rows = {name: written(getattr(law, name)) for name in ("output", "feedback", "applied")}

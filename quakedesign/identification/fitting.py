@@ -51,7 +51,7 @@ class Fit:
 
     @property
     def scaled(self) -> ndarray:
-        """Residuals [-] scaled to one measurement; if the noise is correlated, less their prediction from neighbours.
+        """Residuals [-] scaled to one measurement; if the noise is correlated, minus their prediction from neighbours.
 
         The noise of a mean of n falls with the square root of n.
         """
@@ -117,7 +117,7 @@ class Fit:
         return float(count * stats.f.isf(chance, count, self.freedom_of_noise))
 
     def distance(self, fitted: ndarray) -> float:
-        """`excess` of given coordinates; infinite if the experiment does not exist."""
+        """`excess` of given coordinates; infinite if the experiment cannot be simulated."""
         squares = float(np.sum(weighted(self.weights, self.measured - self.experiment.friction(fitted)) ** 2))
         return self.excess(squares) if np.isfinite(squares) else np.inf
 
@@ -178,7 +178,7 @@ def fit(
     """
     if len(measured) < 3 * len(experiment.coordinates):
         raise RecordError(
-            f"a record must have at least {3 * len(experiment.coordinates)} samples for what is fitted. "
+            f"a record must have at least {3 * len(experiment.coordinates)} samples for the fitted parameters. "
             f"Received {len(measured)}. Give a longer record."
         )
     counts = np.ones(len(measured)) if counts is None else counts
@@ -215,7 +215,7 @@ def _starts(
     usable = [candidates[i] for i in order if np.isfinite(costs[i])]
     if not usable:
         raise RecordError(
-            "sliding must be without a jump for at least one set of parameters. Received a record for which all "
+            "at least one set of parameters must give sliding without a jump. Received a record for which all "
             f"{_CANDIDATES} tested sets jump. Check the stiffness, or give a record with measured slip."
         )
     starts = usable if near is None else [near, *usable]
@@ -263,7 +263,7 @@ def minimised(
 
 
 def _finite(slopes: ndarray) -> ndarray:
-    """Slopes with 0 in place of non-finite ones, as those of transients between samples can be."""
+    """Slopes with 0 in place of non-finite ones, which transients between samples can cause."""
     return np.asarray(np.where(np.isfinite(slopes), slopes, 0.0))
 
 
@@ -327,7 +327,7 @@ _FAR = 0.5  # change of a logarithmic coordinate after which the experiment is r
 
 
 class BetterFit(Exception):
-    """A profile contains coordinates that fit better."""
+    """Coordinates on a profile fit better than the best fit."""
 
     def __init__(self, fitted: ndarray) -> None:
         super().__init__("a better fit")
@@ -354,7 +354,7 @@ class Profile:
     points: list[ProfilePoint] = field(default_factory=list)
 
     def interval(self, threshold: float) -> tuple[float, float]:
-        """Fitted coordinates where `Fit.excess` passes a threshold on both sides; infinite if the record sets no end.
+        """Fitted coordinates at which `Fit.excess` passes a threshold on both sides; infinite without a bound.
 
         Raises `BetterFit`.
         """

@@ -218,7 +218,7 @@ _ONE_TREND = {"displacement": {TREND}, "time": {TREND_IN_TIME}}
 TREND_CHOICES = "auto", *_ONE_TREND, "none"
 _STAYS = 0.5  # standard deviations: a smaller delay needs no correction
 _NEGLIGIBLE = 0.1  # negligible effect of a rate error, in standard deviations of the whole record
-_UNSEEN = 1e-5  # resolution that no machine reaches, as a share of the range of friction
+_UNSEEN = 1e-5  # resolution that no testing machine reaches, as a share of the range of friction
 _CHANCE = 0.01  # probability of fitting a trend or an unsteady beginning to noise; such a fit changes a - b
 
 
@@ -547,7 +547,8 @@ def profiled(
 def needed(best: Fit, squares: float, fewer: int = 1) -> bool:
     """Whether a fit is significantly better (level 1 %) than one that lacks `fewer` of its parameters.
 
-    `squares` is the latter's sum of squares. Fisher's F test; an improvement below machine resolution does not count.
+    `squares` is the latter's sum of squares. Fisher's F test; an improvement below the resolution of a testing machine
+    does not count.
     """
     resolution = _UNSEEN * float(np.ptp(best.measured))
     measurable = squares - best.squares > resolution**2 * best.freedom

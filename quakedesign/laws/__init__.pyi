@@ -11,7 +11,7 @@ from .catalogue import law as law
 from .catalogue import laws as laws
 from .catalogue import model_of as model_of
 from .catalogue import published as published
-from .implicit_root import ImplicitRoot as ImplicitRoot
+from .implicit_root import ImplicitStep as ImplicitStep
 from .implicit_root import Power as Power
 from .loop_field import LoopField as LoopField
 from .sampled_controller import SampledController as SampledController

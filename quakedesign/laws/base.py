@@ -87,7 +87,7 @@ L = TypeVar("L", bound="Law", covariant=True)
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class BaseGains(Generic[L]):
-    """Gains of a law with λ = 1, their bound on |h'|, and their source.
+    """Gains of a law with λ = 1, the bound on |h'| for which they are proved, and their source.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class BaseGains(Generic[L]):
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Law(ABC):
-    """A law with exact gains whose closed loop can be proved.
+    """A law with exact gains whose closed loop can be proved stable.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ class Law(ABC):
         if not isinstance(self.gains, Mapping):
             raise ParameterError(
                 f"gains of {self.name} must be a mapping of name to number. Received {shown(self.gains)}. "
-                "Take from_values for gains in order."
+                "Use from_values for gains in order."
             )
         if set(self.gains) != set(self.gain_units):
             raise ParameterError(
@@ -309,11 +309,11 @@ class Controller(Law):
         return cls.from_values(values)
 
     def scaled(self, scale: str | float | Fraction) -> Self:
-        """Return the same base gains with another λ; raises for a law without a scale."""
+        """Return the law with the same base gains and another λ; raises for a law without a scale."""
         raise ParameterError(f"scale is for sliding modes. Received a scale for {self.name}. Omit the scale.")
 
     def with_divisor(self, divisor: Fraction) -> Self:
-        """Return the same gains with another divisor; raises for a law without a divisor."""
+        """Return the law with another divisor; raises for a law without a divisor."""
         raise ParameterError(f"{self.name} has no divisor. Received the divisor {divisor}. Omit the divisor.")
 
     def with_feedforward(self, feedforward: FeedForward) -> Self:

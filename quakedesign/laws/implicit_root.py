@@ -51,7 +51,7 @@ class Power:
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class ImplicitRoot:
+class ImplicitStep:
     """Implicit step: the sum q, and a sector bound of its solution for the claimed errors.
 
     Attributes
@@ -100,7 +100,7 @@ def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
     return total
 
 
-def root_of(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
+def step_solution(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
     """w in floats or arrays of them, by bisection down to rounding; exact where the sign keeps the slip error at 0."""
     deadbeat = -slip / step
     after, before = (deadbeat - rate + pulled(terms, way * _TINY, deadbeat) for way in (1, -1))

@@ -20,7 +20,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import apart, fraction_of, to_sympy
 from quakedesign.laws.base import Controller, Sampling, Signals
-from quakedesign.laws.implicit_root import ImplicitRoot
+from quakedesign.laws.implicit_root import ImplicitStep
 from quakedesign.laws.loop_field import LoopField
 from quakedesign.laws.sampled_law import LinearLaw, RestLimit, require_gain
 from quakedesign.symbolic import plant
@@ -277,14 +277,14 @@ def compensation_answered(rate_error: Any, end_rate: Any, estimate: Any, gain: A
     return (end_rate - rate_error) / gain - estimate
 
 
-def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearLaw:
+def compensated(implicit_step: ImplicitStep, weight: Fraction, gain: Fraction) -> LinearLaw:
     """The compensated step as matrices, with the states e2⁻, T_sB0·p⁻ and T_sB0·d [m/s].
 
     The first sample has no predecessor and gives no information on the disturbance: there e2⁻ = e2.
 
     Parameters
     ----------
-    root : ImplicitRoot
+    implicit_step : ImplicitStep
         Gives the solution w of the step.
     weight : Fraction
         a [-], above 0 and at most 1.
@@ -307,7 +307,7 @@ def compensated(root: ImplicitRoot, weight: Fraction, gain: Fraction) -> LinearL
         measured=tuple(row[3:] for row in rows),
         output=output[:3],
         feedback=output[3:],
-        root=root,
+        implicit_step=implicit_step,
         first=tuple(tuple(Fraction(k == 1 == entry) for k in (0, 1)) for entry in (1, 0, 0)),
         applied=(Fraction(0), gain, Fraction(0)),
     )

@@ -1,7 +1,7 @@
 """Sampled linear control laws as exact matrices: p = Cz + Dy, z⁺ = Fz + Gy.
 
 Chapters: sizes, steady states and the sampled e-LQR; LQG compensators with an estimate of the disturbance,
-behind a delay, a lag or a diffusion path; a pressure limit at rest that prevents integrator windup.
+for a delay, a lag or a diffusion path; a pressure limit at rest that prevents integrator windup.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from flint import fmpq, fmpq_mat
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import fraction_of, shortly
-from quakedesign.laws.implicit_root import ImplicitRoot
+from quakedesign.laws.implicit_root import ImplicitStep
 
 # ----------------------------------------------------------------------
 # Sampled linear laws as exact matrices.
@@ -45,7 +45,7 @@ class LinearLaw:
         C, so that Cz is in Pa.
     feedback : (Fraction, Fraction)
         D [Pa/m, Pa·s/m]; a third entry for w [Pa·s/m].
-    root : ImplicitRoot, optional
+    implicit_step : ImplicitStep, optional
         Equation of w; None for a linear law.
     first : tuple of rows
         S, two columns: z = S(e1, e2) with the errors measured at the first sample; z = 0 if empty.
@@ -58,7 +58,7 @@ class LinearLaw:
     Raises
     ------
     ParameterError
-        When the sizes do not fit, or there are more than 12 states.
+        When the dimensions do not match, or there are more than 12 states.
     """
 
     states: tuple[str, ...]
@@ -66,13 +66,13 @@ class LinearLaw:
     measured: Matrix
     output: Row
     feedback: Row
-    root: ImplicitRoot | None = None
+    implicit_step: ImplicitStep | None = None
     first: Matrix = ()
     applied: Row = field(default=(), compare=False)
     of_reference: Matrix = ()
 
     def __post_init__(self) -> None:
-        seen = len(MEASURED) + (self.root is not None)
+        seen = len(MEASURED) + (self.implicit_step is not None)
         require_sizes(self.states, self.update, self.measured, self.output, self.feedback, seen)
         if self.first and [len(row) for row in self.first] != [len(MEASURED)] * len(self.states):
             raise ParameterError(
@@ -94,7 +94,7 @@ class LinearLaw:
     @property
     def of_slip_alone(self) -> bool:
         """Whether the law does not use the slip rate."""
-        return self.root is None and not any(row[1] for row in (*self.measured, self.feedback))
+        return self.implicit_step is None and not any(row[1] for row in (*self.measured, self.feedback))
 
 
 def require_sizes(
@@ -104,7 +104,7 @@ def require_sizes(
     n = len(states)
     if n > MOST_STATES or len(set(states)) != n:
         raise ParameterError(
-            f"a linear law needs at most {MOST_STATES} states with different names. "
+            f"a linear law must have at most {MOST_STATES} states, with different names. "
             f"Received {n}: {', '.join(states[: MOST_STATES + 1])}."
         )
     matrices = {"F": (own, n, n), "G": (measured, n, seen), "C": ((output,), 1, n), "D": ((feedback,), 1, seen)}
@@ -236,7 +236,7 @@ def compensator(
     Raises
     ------
     ParameterError
-        When the sizes do not fit, or more than 12 states are left.
+        When the dimensions do not match, or more than 12 states are left.
     """
     n, seen = len(states), len(MEASURED)
     shapes = {"A": (update, n, n), "B": ((command,), 1, n), "C": (measured, seen, n), "L": (estimator, n, seen)}
@@ -264,7 +264,8 @@ class ErrorModel:
     """Sampled model of both errors and of the delayed pressures, under a constant disturbance d [m/s²].
 
     x⁺ = Ax + Bp + (As + B − s)d/b, x = (e1, e2, q), s = (0, 0, σ, …, σ). The constant pressure p = −d/b balances d: x =
-    sp is then a steady state. A law designed with other coefficients has the same steady state, with zero errors.
+    sp is then a steady state. This is so for any A and B, so a law designed with rounded coefficients also has zero
+    steady-state errors.
 
     Attributes
     ----------
@@ -282,7 +283,8 @@ class ErrorModel:
     Raises
     ------
     ParameterError
-        When the sizes do not fit, the gain is not positive, or a constant pressure has no effect on the slip rate.
+        When the dimensions do not match, the gain is not positive, or a constant pressure has no effect on the slip
+        rate.
     """
 
     update: Matrix
@@ -382,7 +384,7 @@ def disturbance_estimate(gains: Row, weight: Fraction, model: ErrorModel) -> Lin
 def slip_observer(gains: Row, corrections: tuple[Fraction, Fraction, Fraction], model: ErrorModel) -> LinearLaw:
     """Feedback of the slip alone: observer of slip error, slip-rate error and disturbance d.
 
-    States: π [m, m/s], d [m/s²] and q. The estimate of d has no trend.
+    States: π [m, m/s], d [m/s²] and q. d is modelled as constant, without a trend state.
 
     Parameters
     ----------

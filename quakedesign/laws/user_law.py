@@ -239,7 +239,7 @@ class SampledLaw(SampledController):
     # Files.
 
     def to_dict(self) -> Json:
-        """Content of a file of the law: exact numbers as texts, SI."""
+        """Content of a file of the law: exact numbers as strings, SI."""
         law, inputs = self.law, ["slip_error", "slip_rate_error"]
         rows = [*law.measured, law.feedback]
         if law.of_reference:

@@ -327,7 +327,7 @@ def riccati_design(fault: Fault, *, bandwidth: float | None = None) -> RiccatiDe
     Parameters
     ----------
     bandwidth : float, optional
-        Largest modulus of a closed-loop pole over the uncertainty [rad/s]; 1.5/T_s without.
+        Largest modulus of a closed-loop pole over the uncertainty [rad/s]; by default 1.5/T_s.
 
     Returns
     -------

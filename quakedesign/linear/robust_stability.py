@@ -204,7 +204,7 @@ class SlopeMargin:
     certificate: Certificate | None
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts, measured ones as numbers."""
+        """Exact numbers as strings, measured ones as numbers."""
         return {
             "friction_slope_margin": self.certified.exact,
             "linear_limit": self.limit.exact,
@@ -298,7 +298,7 @@ class GainRange:
     certificates: tuple[Certificate, ...]
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts."""
+        """Exact numbers as strings."""
         return {"beta_low": self.low.exact, "beta_high": self.high.exact, "beta_low_limit": self.low_limit.exact}
 
 
@@ -398,7 +398,7 @@ class Analysis:
         return {name: certificate for name, certificate in by_name.items() if certificate is not None}
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts, measured ones as numbers, SI."""
+        """Exact numbers as strings, measured ones as numbers, SI."""
         return {
             "verdict": str(self.verdict),
             "unstable_at": [float(v) for v in self.unstable_at] if self.unstable_at else None,

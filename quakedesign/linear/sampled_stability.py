@@ -59,13 +59,13 @@ FOUR_OVER_PI_SQUARED = Fraction(40529, 100000)  # not below (2/π)² = 0.4052847
 BITS = (30, 45, 60)
 """Binary digits to which proposals of a solver are rounded, tried in turn."""
 LEAST_MARGIN = 1e-9
-"""Of a proposal in its own units; a smaller one is noise of the solver."""
+"""Least margin of a proposal, in its own units; a smaller margin is solver noise."""
 _ZERO, _ONE = Fraction(0), Fraction(1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DelayProof:
-    """P and W that prove every sampling period up to the longest one, in SI, exact."""
+    """P and W that prove stability for every sampling period up to the longest one, in SI, exact."""
 
     longest: Fraction  # T [s]
     P: Matrix  # 4 × 4, in x1, x2, ξ1, ξ2
@@ -112,7 +112,7 @@ def _motion(problem: LinearProblem, K: Sequence[Fraction], vertex: Vertex) -> Ma
 
 
 def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float | str | Fraction) -> DelayProof | None:
-    """Search P and W by a semidefinite program, round them, and decide every vertex exactly; None on failure.
+    """Search for P and W by a semidefinite program, round them, and decide every vertex exactly; None on failure.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> l
 
 
 def solved(program: Any, margin: Any) -> bool:
-    """Whether a solver finds a solution with a margin; after a breakdown, retried with firmer factorisations."""
+    """Whether a solver finds a solution with a margin; after a breakdown, retried with stronger regularisation."""
     import cvxpy as cp
 
     record(program)
@@ -201,7 +201,7 @@ def law_unit(K: Sequence[Fraction], units: Sequence[Fraction]) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# The sampled law with a clock-dependent V, which proves longer periods than one V for all phases.
+# The sampled law with a clock-dependent V, which proves stability for longer periods than one V for all phases.
 #
 # Within a period, z = (x1, x2, q1, q2, p) moves by x1' = x2, x2' = s·x1 − w·x2 + βb·p while p and the sums q =
 # ξ(t_{k+1}), known since t_k, are constant; at its end z⁺ = Jz: p⁺ = −K(x1, x2, q), q⁺ = q + T(x1, q1). V = zᵀP(θ)z
@@ -214,12 +214,12 @@ def law_unit(K: Sequence[Fraction], units: Sequence[Fraction]) -> Fraction:
 # so that the ends of a range of periods prove every period in it, also periods that vary from sample to sample.
 
 DEGREE = 8
-"""Of P(θ): 4 reaches a longest period 2 % shorter, 12 one that is 0.5 % longer."""
+"""Degree of P(θ): with 4 the longest period is 2 % shorter, with 12 it is 0.5 % longer."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClockProof:
-    """P_0 … P_D that prove every sampling period of a range, in SI, exact."""
+    """P_0 … P_D that prove stability for every sampling period of a range, in SI, exact."""
 
     # shortest, longest: T [s]
     shortest: Fraction
@@ -291,7 +291,7 @@ def _jump(K: Sequence[Fraction], step: Fraction) -> Matrix:
 def clock_proof(
     problem: LinearProblem, gains: Sequence[Fraction], steps: tuple[Fraction, Fraction], *, degree: int = DEGREE
 ) -> ClockProof | None:
-    """Search P_0 … P_D by a semidefinite program, round them, and decide every form exactly; None on failure.
+    """Search for P_0 … P_D by a semidefinite program, round them, and decide every form exactly; None on failure.
 
     Parameters
     ----------
@@ -395,7 +395,7 @@ class HeldPoles:
         }
 
     def unstable(self, step: Fraction) -> Vertex | None:
-        """Corner at which a period [s] is proved not asymptotically stable; None without one."""
+        """Corner at which the loop is proved not asymptotically stable for a period [s]; None if there is none."""
         if not self.gains[3]:  # then z = 1 is a pole for every plant
             return self.problem.vertices()[0]
         return next((corner for corner, poles in self.at(step).items() if any(abs(z) > 1 for z in poles)), None)
@@ -478,7 +478,7 @@ def varying_verdict(
     *,
     longest: LargestVaryingStep | None = None,
 ) -> VaryingVerdict:
-    """Prove the sampled law, or refute it with constant parameters, at a sampling period.
+    """Prove stability of the sampled law at a sampling period, or refute it with constant parameters.
 
     Parameters
     ----------
@@ -561,16 +561,16 @@ def _short(step: Fraction) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# All results on a K with zero-order hold over a sampling period.
+# All results for a gain K with zero-order hold over a sampling period.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HeldLoop:
-    """Results on a K with zero-order hold over a sampling period."""
+class SampledStability:
+    """Results for a gain K with zero-order hold over a sampling period."""
 
     runs: VaryingVerdict  # Verdict with summed integrals and any time history of the parameters
     longest: LargestVaryingStep | None  # Longest proved period
-    radius: float  # Spectral radius of a period, largest over the vertices, measured
+    radius: float  # Spectral radius of a period, largest over the vertices, in floating point
 
     @property
     def step(self) -> Fraction:
@@ -605,8 +605,10 @@ def _number(bound: LowerBound | UpperBound | None) -> float | None:
     return None if bound is None else float(bound)
 
 
-def sampled_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float | str | Fraction) -> HeldLoop:
-    """Decide a K at a sampling period [s], with its longest proved period.
+def sampled_stability(
+    problem: LinearProblem, gains: Sequence[Fraction], step: float | str | Fraction
+) -> SampledStability:
+    """Decide stability for a gain K at a sampling period [s], with the longest proved period.
 
     Parameters
     ----------
@@ -623,7 +625,7 @@ def sampled_loop(problem: LinearProblem, gains: Sequence[Fraction], step: float 
     period = rational(step, "step")
     require_positive("Give it in seconds.", step=period)
     longest = largest_varying_step(problem, gains)
-    return HeldLoop(
+    return SampledStability(
         runs=varying_verdict(problem, gains, period, longest=longest),
         longest=longest,
         radius=HeldPoles(problem, gains).radius(period),

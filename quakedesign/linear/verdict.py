@@ -20,7 +20,7 @@ from quakedesign.linear.linear_problem import LinearProblem, Matrix
 from quakedesign.linear.riccati import smallest_gain
 from quakedesign.linear.riccati_bounds import uncertainty_bounds
 from quakedesign.linear.robust_stability import Analysis, analysis
-from quakedesign.linear.sampled_stability import HeldLoop, VaryingVerdict, sampled_loop
+from quakedesign.linear.sampled_stability import SampledStability, VaryingVerdict, sampled_stability
 from quakedesign.lyapunov import Certificate
 from quakedesign.sos import Answer
 from quakedesign.sos.exact.polynomial import constant
@@ -97,12 +97,12 @@ class LinearVerdict:
     controller: ExtendedLQR
     analysis: Analysis
     facts: Json  # See `linear_entries`
-    held: HeldLoop  # Results with zero-order hold over the requested sampling period
+    sampled: SampledStability  # Results with zero-order hold over the requested sampling period
     peaks: ContinuousProof | NoProof | None  # In continuous time; None if not requested
-    asked: str | None = None  # Class of the disturbance of requested peaks
+    peaks_class: str | None = None  # Class of the disturbance of requested peaks
 
     def to_dict(self) -> Json:
-        """Plain values: exact numbers as texts, measured ones as numbers, SI."""
+        """Plain values: exact numbers as strings, measured ones as numbers, SI."""
         return {
             **self.analysis.to_dict(),
             **self.facts,
@@ -115,7 +115,7 @@ class LinearVerdict:
         if isinstance(self.peaks, ContinuousProof):
             by_name["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
-        sampled = sampled_files(problem, gains, self.held.runs)
+        sampled = sampled_files(problem, gains, self.sampled.runs)
         return by_name | {f"held{f'-{n}' if n else ''}": answer for n, answer in enumerate(sampled)}
 
     def save(self, out: Path, *, force: bool = False) -> dict[str, str]:
@@ -173,24 +173,24 @@ def judge(
     fault.require_memoryless("a verdict on gains")
     period = rational(fault.sampling_time if step is None else step, "step")
     bounded = certified_peaks(fault, controller, disturbance_class=peaks) if peaks is not None else None
-    sampled = sampled_loop(LinearProblem.of(fault), tuple(controller.gains.values()), period)
+    sampled = sampled_stability(LinearProblem.of(fault), tuple(controller.gains.values()), period)
     return LinearVerdict(
         fault=fault,
         controller=controller,
         facts=linear_entries(fault, controller, sampled),
         analysis=analysis(fault, controller),
-        held=sampled,
+        sampled=sampled,
         peaks=bounded,
-        asked=peaks,
+        peaks_class=peaks,
     )
 
 
-def linear_entries(fault: Fault, controller: ExtendedLQR, sampled: HeldLoop) -> Json:
+def linear_entries(fault: Fault, controller: ExtendedLQR, sampled: SampledStability) -> Json:
     """Bounds of the uncertainty, smallest gains and sampled stability.
 
     Parameters
     ----------
-    sampled : HeldLoop
+    sampled : SampledStability
         Results on the same gains with zero-order hold.
 
     Returns

@@ -15,7 +15,7 @@ from .error_loop import StateLaw as StateLaw
 from .error_loop import at_once as at_once
 from .error_loop import continuous_loop as continuous_loop
 from .error_loop import exact_integrals as exact_integrals
-from .error_loop import held_loop as held_loop
+from .error_loop import sampled_error_loop as sampled_error_loop
 from .error_loop import sliding_loop as sliding_loop
 from .error_loop import starts as starts
 from .periodic import Fading as Fading

@@ -97,7 +97,7 @@ class Layer:
 
 
 def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
-    """A loop of `held_loop` through a layer, with x2 in place of e2, and Y in place of β0·R.
+    """A loop of `sampled_error_loop` through a layer, with x2 in place of e2, and Y in place of β0·R.
 
     The input ``awaited`` is bY divided by the ratio of its bound to that of bR, so that it is at most the output
     ``left_out`` (times its weight, with zero-order hold at the well). The sampled input ``awaited_told`` is its share

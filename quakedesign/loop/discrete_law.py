@@ -15,7 +15,7 @@ slip, rate = sp.symbols("slip rate", real=True)
 slip_error, rate_error = sp.symbols("slip_error rate_error", real=True)
 acceleration = sp.Symbol("reference_acceleration", real=True)
 next_reference, next_reference_rate = sp.symbols("next_reference next_reference_rate", real=True)
-held = sp.Symbol("held", real=True)
+applied_pressure = sp.Symbol("held", real=True)
 step = sp.Symbol("T_s", positive=True)
 authority = sp.Symbol("B_0", positive=True)
 

@@ -29,7 +29,7 @@ from quakedesign.loop.signals import Interconnection, Signal
 # Sampled linear law on a fault: sample, zero-order hold, delay, lag, and diffusion between well and fault.
 
 MOST_PERIODS = 8
-SHORTEST = 32  # largest T_s/(L²/D): faster modes decay within less than the resolution of the bounds
+SHORTEST = 32  # largest T_s/(L²/D): faster modes decay in less time than the bounds resolve
 BENT = tuple(
     Fraction(v, 128) for v in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)
 )  # denser at first, where a lag and the diffusion modes change fastest
@@ -37,7 +37,7 @@ HALVES = tuple(Fraction(v, 2) for v in (0, 1, 2))
 _ONE = Fraction(1)
 
 
-def held_loop(
+def sampled_error_loop(
     law: LinearLaw,
     model: NominalModel,
     authority: Fraction,
@@ -52,7 +52,8 @@ def held_loop(
     """Error loop of a fault about p*, the equilibrium pressure at the reference.
 
     At every multiple of T_s the law measures e1 and e2, computes p and updates its states. p reaches the valve after
-    the delay and is held for T_s. The well follows the valve with the lag, and the fault the well by diffusion.
+    the delay and is held for T_s. The well pressure follows the valve with the lag, and the fault pressure follows the
+    well by diffusion.
 
     States, in this order: e1; e2; the law's states; delayed pressures; valve pressure; with a lag, well minus valve
     pressure; with a diffusion path, mode minus well pressures, and without a lag the last step of the valve pressure.
@@ -71,14 +72,14 @@ def held_loop(
 
     With timing errors the last step of the valve pressure is a further state, and the output ``stepped`` [m/s²]. The
     input ``late`` is b times the deviation of the valve pressure from its schedule. It is at most the last or the next
-    step, and acts near the arrivals only. In the timing error plus the ramp p* drifts: ``push`` (or ``asked``, where
-    the fault pressure is not the valve pressure) changes by ``drift`` times this duration.
+    step, and acts near the arrivals only. During the timing error and the ramp, p* drifts: ``push`` (or ``asked``,
+    where the fault pressure is not the valve pressure) changes by ``drift`` times this duration.
 
     Parameters
     ----------
     law : LinearLaw
     model : NominalModel
-        Middle of the ranges.
+        Midpoints of the ranges.
     authority : Fraction
         b [m²/kg].
     step, delay, lag : Fraction
@@ -136,7 +137,7 @@ def starts(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Times:
-    """Times of the path of the pressure [s], and whether the last step of the valve is needed."""
+    """Times of the path of the pressure [s], and whether the last step of the valve pressure is needed."""
 
     step: Fraction
     delay: Fraction
@@ -204,7 +205,7 @@ def _connected(
         {
             "slip": {"e1": _ONE, "slip_noise": _ONE},
             "slip_rate": {"e2": _ONE, "rate_noise": _ONE},
-            "implicit": {} if law.root is None else {"slip": -law.root.middle / step, "root": _ONE},
+            "implicit": {} if law.implicit_step is None else {"slip": -law.implicit_step.middle / step, "root": _ONE},
             "asked": {name: authority * v for name, v in output.items()},
             "push": {"valve": _ONE}
             | ({"behind": _ONE} if lag else {})
@@ -228,7 +229,7 @@ def _connected(
         *rates_of_states, pressure = (-row[0] for row in law.of_reference)
         steady = steady_states(change, law.output, tuple(rates_of_states), pressure)
         inputs.setdefault("reference", {name: -v for name, v in zip(own, steady, strict=True)})
-    sampled = (*["root"] * (law.root is not None), *["reference_rate"] * bool(law.of_reference))
+    sampled = (*["root"] * (law.implicit_step is not None), *["reference_rate"] * bool(law.of_reference))
     left_out, fading = dict[str, Signal](), dict[str, Fading]()
     if modes and lag:
         left_out["left_out"] = {"behind": layer.truncation_integral / lag}
@@ -280,7 +281,7 @@ class ContinuousLaw:
     Raises
     ------
     ParameterError
-        When the sizes do not fit, or there are more than 12 states.
+        When the dimensions do not match, or there are more than 12 states.
     """
 
     states: tuple[str, ...]
@@ -325,7 +326,7 @@ def exact_integrals(gains: tuple[Fraction, ...], *, of_state: bool = False) -> C
 
 
 def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction) -> PeriodicLoop:
-    """The error loop about p*, with the inputs and outputs of `held_loop`; states e1, e2 and z − z*.
+    """The error loop about p*, with the inputs and outputs of `sampled_error_loop`; states e1, e2 and z − z*.
 
     z* = ζ(p* − R(r, r′)) − ηR(r, r′)′ with Fζ = 0, Cζ = 1, Fη = ζ and Cη = 0, so that Cz* + R(r, r′) = p*. The
     entries of R that are not 0 add the inputs ``reference_acceleration`` r″ and ``reference_jerk`` r‴, through
@@ -335,7 +336,7 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
     ----------
     law : ContinuousLaw
     model : NominalModel
-        Middle of the ranges.
+        Midpoints of the ranges.
     authority : Fraction
         b [m²/kg].
 
@@ -435,7 +436,7 @@ def sliding_loop(
     diffusion: Fraction = Fraction(0),
     noisy: Collection[str] = (),
 ) -> PeriodicLoop:
-    """The error loop about sliding at V, with the order of events and the path of the pressure of `held_loop`.
+    """The error loop about sliding at V, with the order of events and the path of the pressure of `sampled_error_loop`.
 
     States: the slip error x [m] and z [-] in place of e1 and e2; pressures in Pa. Inputs: ``stress`` e [Pa], ``rate`` f
     [-] in x′ = V(cy + f) and, for ageing, in z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, the ``drift``
@@ -447,7 +448,7 @@ def sliding_loop(
     Raises
     ------
     ParameterError
-        As for `held_loop`.
+        As for `sampled_error_loop`.
     """
     moving, aged = model.rate * model.slope, model.state_rate * model.evolution_slope
     stress = {"e1": moving / model.strength, "e2": -aged / model.strength}

@@ -92,7 +92,7 @@ class Pump:
         )
 
     def to_dict(self) -> dict[str, str]:
-        """Exact numbers as texts."""
+        """Exact numbers as strings."""
         values = {part.name: getattr(self, part.name) for part in fields(self)}
         return {name: str(value) for name, value in values.items() if value is not None}
 
@@ -281,7 +281,7 @@ class LoopSetup:
         return timed, replace(self, step=None)
 
     def to_dict(self) -> dict[str, str]:
-        """Fields that differ from their default, exact numbers as texts, in SI units."""
+        """Fields that differ from their default, exact numbers as strings, in SI units."""
         return {name: str(value) for name, value in self.given().items()}
 
     def __repr__(self) -> str:

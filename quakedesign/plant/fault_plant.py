@@ -29,12 +29,12 @@ _HALVINGS = 7
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Friction:
-    """Friction of a plant: μ at rest at t = 0 [-], its bounds [-], and bounds of its chords [1/m], [s/m].
+    """Friction of a plant: μ at rest at t = 0 [-], its bounds [-], and bounds of its chord slopes [1/m], [s/m].
 
     Attributes
     ----------
     weakening, strengthening : Fraction
-        Largest fall and rise of μ per slip.
+        Largest fall and rise of μ per unit slip.
     rate_slope : Fraction
         Largest |Δμ/Δrate|.
     """
@@ -60,7 +60,7 @@ class FaultPlant:
         Relative half-widths of k̂, η̂ and N̂ [-].
     friction : Friction
     shape : tuple of Fraction
-        Coefficients of r/target over t/t_op, lowest power first.
+        Coefficients of r/target as a polynomial in t/t_op, lowest power first.
     target_slip, operation_time : Fraction
         [m], [s].
     amplitude : Fraction
@@ -284,7 +284,7 @@ def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
 
 
 def _range_of(shape: tuple[Fraction, ...]) -> Range:
-    """Enclosure of a polynomial on [0, 1], by halving."""
+    """Enclosure of a polynomial on [0, 1], by subdivision."""
     return _range_by(shape, _HALVINGS)
 
 
@@ -314,39 +314,41 @@ _SAME = {
 _SPREADS = ("stiffness", "damping", "authority")
 
 
-def _other(proved: FaultPlant, asked: FaultPlant) -> list[str]:
+def _other(proved: FaultPlant, required: FaultPlant) -> list[str]:
     """Constants that differ."""
-    pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(asked, name)) for name, unit in _SAME.items()}
-    pairs["static friction [-]"] = proved.friction.static, asked.friction.static
-    for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, asked.growths, strict=True):
+    pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(required, name)) for name, unit in _SAME.items()}
+    pairs["static friction [-]"] = proved.friction.static, required.friction.static
+    for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, required.growths, strict=True):
         pairs[f"disturbance per {name} [{unit}]"] = both[0], both[1]
     found = [
         f"{name} {six_digits(one)} in the certificate, {six_digits(other)} in the fault"
         for name, (one, other) in pairs.items()
         if one != other
     ]
-    return found + ([] if proved.shape == asked.shape else ["the shape of the reference"])
+    return found + ([] if proved.shape == required.shape else ["the shape of the reference"])
 
 
-def _wider_than_needed(proved: FaultPlant, asked: FaultPlant) -> list[str]:
+def _wider_than_needed(proved: FaultPlant, required: FaultPlant) -> list[str]:
     """Ranges and disturbances beyond those of the proof."""
-    pairs = {f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, asked.spreads, strict=True)}
-    pairs["disturbance [m/s^2]"] = [proved.amplitude, asked.amplitude]
-    if proved.change is not None and asked.change is not None:
-        pairs["change of the disturbance [m/s^3]"] = [proved.change, asked.change]
+    pairs = {
+        f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, required.spreads, strict=True)
+    }
+    pairs["disturbance [m/s^2]"] = [proved.amplitude, required.amplitude]
+    if proved.change is not None and required.change is not None:
+        pairs["change of the disturbance [m/s^3]"] = [proved.change, required.change]
     found = [
         f"{name} up to {six_digits(one)} in the certificate, {six_digits(other)} in the fault"
         for name, (one, other) in pairs.items()
         if other > one
     ]
-    jumps = proved.change is not None and asked.change is None
+    jumps = proved.change is not None and required.change is None
     return found + (["class of the disturbance: rate in the certificate, amplitude in the fault"] if jumps else [])
 
 
-def _rougher(proved: Friction, asked: Friction) -> list[str]:
+def _rougher(proved: Friction, required: Friction) -> list[str]:
     """Bounds of friction beyond those of the proof."""
-    beyond = {part.name: getattr(asked, part.name) > getattr(proved, part.name) for part in fields(Friction)}
-    beyond |= {"static": False, "least": asked.least < proved.least}
+    beyond = {part.name: getattr(required, part.name) > getattr(proved, part.name) for part in fields(Friction)}
+    beyond |= {"static": False, "least": required.least < proved.least}
     names = [name for name, wider in beyond.items() if wider]
-    both = [(name, *(six_digits(getattr(one, name)) for one in (proved, asked))) for name in names]
+    both = [(name, *(six_digits(getattr(one, name)) for one in (proved, required))) for name in names]
     return [f"friction: {name} {theirs} in the certificate, {own} in the fault" for name, theirs, own in both]

@@ -30,9 +30,9 @@ class Sector:
     Attributes
     ----------
     entry : sequence of numbers
-        How it enters x′, one number for every state.
+        Its input column in x′, one number for every state.
     row : sequence of numbers
-        Its argument y: one number for every state, and for every control too where it depends on these.
+        Its argument y: one number for every state and, if y depends on the controls, for every control.
     slopes : (number, number) or callable
         Low and high. A callable returns them for a bound of |y|, such as ``lambda y: (-5 * y**2 / 2, 0)``, and a
         search finds the bound; y is a `Fraction`, and returned floats are read as the decimals that they print.
@@ -78,7 +78,7 @@ class Sector:
 class UncertainPlant:
     """A linear plant with sectors, gains and disturbances; `guarantee` bounds its peaks under a sampled law.
 
-    All numbers may be floats, texts or rationals, and are exact from then on.
+    All numbers may be floats, strings or rationals; they are stored exactly.
 
     Attributes
     ----------
@@ -88,13 +88,14 @@ class UncertainPlant:
         What is measured; all states unless given.
     sectors : mapping of str to Sector
     gains : mapping of str to (number, number)
-        Range of the gain on a control minus its loads, by the control's name; it may vary within it at any rate.
+        Range of the gain on a control minus its loads, by the control's name; the gain may vary within this range at
+        any rate.
     disturbances : mapping of str to (sequence, number)
-        How it enters x′, and its largest size.
+        Input column in x′, and largest magnitude.
     loads : mapping of str to (sequence, sequence or None, number)
         Controls that balance it, shift of the states at balance (0 for None) and largest rate; see `SlowLoad`.
     outputs : mapping of str to sequence
-        Rows over the states whose peaks are proved; the measurements unless given.
+        Output rows over the states, whose peaks are bounded; the measurements unless given.
     controls, measurements : sequence of str
         Names of u and Cx; u1 … and y1 … unless given.
     noise : mapping of str to number
@@ -110,7 +111,7 @@ class UncertainPlant:
     Raises
     ------
     ParameterError
-        For sizes that do not fit, unknown names, or numbers out of their range.
+        For dimensions that do not match, unknown names, or numbers out of their range.
     """
 
     A: Any
@@ -203,12 +204,12 @@ class UncertainPlant:
     def from_blocks(
         cls, fault: Fault | BlockChain, blocks: int | None = None, *, wells: str = "each", coupling: Any = None
     ) -> Self:
-        """Plant of the blocks of a fault, coupled by springs, each with its own friction of the box and disturbance.
+        """Plant of the blocks of a fault, coupled by springs, each with its own disturbance and friction.
 
         States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa].
         With an independent well for each block, errors are relative to the reference, and all are measured. With
         fewer wells, one average of the slips per well follows the reference. Slip errors are then relative to the
-        balance of the blocks at these averages, and the averages of slip and slip rate are measured.
+        equilibrium of the blocks at these averages, and the averages of slip and slip rate are measured.
 
         Parameters
         ----------
@@ -235,7 +236,7 @@ class UncertainPlant:
         return len(self.A), len(self.controls)
 
     def exact_sectors(self, bound: Callable[[str], Fraction]) -> dict[str, ExactSector]:
-        """Sectors, also those of the gains; `bound` returns the bound of the argument by name for callable slopes."""
+        """Sectors, including those of the gains; `bound` gives the bound of an argument by name for callable slopes."""
         n, m = self.sizes
         sectors = {name: sector.at(bound(name), (n, m), name) for name, sector in self.sectors.items()}
         for name, (low, high) in self.gains.items():
@@ -245,7 +246,7 @@ class UncertainPlant:
         return sectors
 
     def behind(self, lag: Any) -> "UncertainPlant":
-        """The plant with an actuator for each control, q′ = (u − q)/lag [s], where q are further states."""
+        """The plant with a first-order actuator for each control, q′ = (u − q)/lag, lag in s; q are further states."""
         time = rational(lag, "lag")
         if time <= 0:
             raise ParameterError(f"lag must be positive. Received {shortly(time)} s. Omit lag.")

@@ -252,10 +252,10 @@ def inline_svg(drawn: str, drawing: "Figure", name: str, description: str) -> Ma
     body = drawn[drawn.index("<defs>", drawn.index("</metadata>") if "</metadata>" in drawn else 0) :]
     width, height = (72 * float(size) for size in drawing.get_size_inches())
     head = f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(description)}" '
-    return Markup(f'{head}data-axes="{escape(json.dumps(_axes(drawing, height)))}">{_tightened(body, name)}')
+    return Markup(f'{head}data-axes="{escape(json.dumps(_axes(drawing, height)))}">{_compact(body, name)}')
 
 
-def _tightened(body: str, name: str) -> str:
+def _compact(body: str, name: str) -> str:
     """Compact SVG: two decimals of a point [1/72 in], colours of the page, unique identifiers, no indentation."""
     body = re.sub(r"<g id=\"figure_1\">\s*<g id=\"patch_1\">.*?</g>", '<g id="figure_1">', body, count=1, flags=re.S)
     body = re.sub(r"<[^>]*>", lambda tag: re.sub(r"-?\d+\.\d{3,}", _shorter, tag[0]), body)

@@ -172,7 +172,7 @@ def gain_map_units(drawn: GainMap) -> dict[str, str]:
 
 
 def gain_map_values(drawn: GainMap) -> Json:
-    """Numbers of a map; exact quantities are texts."""
+    """Numbers of a map; exact quantities are strings."""
     sheet, top = drawn.sheet, len(drawn.sheet.levels)
     return {
         "law": sheet.loop.law,

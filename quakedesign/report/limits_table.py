@@ -125,7 +125,7 @@ def _box(limits: Limits) -> str:
 
 def _path(proof: SlidingProof) -> str:
     """Lag or diffusion path of the proved design."""
-    ways = {"a lag of": proof.held.lag, "a diffusion path of L^2/D =": proof.held.diffusion}
+    ways = {"a lag of": proof.sampled_loop.lag, "a diffusion path of L^2/D =": proof.sampled_loop.diffusion}
     lines = [f"{way} {float(time):.4g} s" for way, time in ways.items() if time]
     return f" behind {' and '.join(lines)}" if lines else ""
 

@@ -199,13 +199,13 @@ def _slowly(entry: "Entry") -> list[str]:
 
 def _linear_law(entry: "Entry") -> "LinearLaw | None":
     """Sampled linear law of a guarantee; None for laws with an implicit step, and without a guarantee."""
-    law = getattr(getattr(entry.proof, "held", None), "law", None)
-    return law if isinstance(law, LinearLaw) and law.root is None else None
+    law = getattr(getattr(entry.proof, "sampled_loop", None), "law", None)
+    return law if isinstance(law, LinearLaw) and law.implicit_step is None else None
 
 
 def _at_samples(entry: "Entry") -> list[str]:
     """Symbols of the difference equations of a stick–slip law; empty for other laws."""
-    law = getattr(getattr(entry.proof, "held", None), "law", None)
+    law = getattr(getattr(entry.proof, "sampled_loop", None), "law", None)
     if not isinstance(law, StickSlipLaw):
         return []
     root = " (within the proved errors, where the implicit step of the sliding mode is deadbeat)" if law.pull else ""
@@ -218,7 +218,7 @@ def _at_samples(entry: "Entry") -> list[str]:
 
 def _equations(entry: "Entry") -> list[Markup]:
     """Equations of the law in continuous time, if any, and of a stick–slip law at its samples."""
-    sampled: Any = getattr(entry.proof, "held", None)
+    sampled: Any = getattr(entry.proof, "sampled_loop", None)
     controller, law = entry.design.controller, getattr(sampled, "law", None)
     latex = [] if isinstance(controller, StickSlipController) else law_latex(controller)
     if isinstance(law, StickSlipLaw):
@@ -250,7 +250,7 @@ def _python(entry: "Entry") -> list[str]:
     floats = [
         [[float(v) for v in row] for row in rows] for rows in (law.update, law.measured, [law.output], [law.feedback])
     ]
-    step = float(entry.proof.held.step)
+    step = float(entry.proof.sampled_loop.step)
     return [
         "import control",
         "",

@@ -101,7 +101,7 @@ def row_cells(row: SchemeRow) -> tuple[str, ...]:
 
 
 def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of a study as texts: one row a scheme and quantity, the errors at every level."""
+    """Heading and rows of a study as strings: one row a scheme and quantity, the errors at every level."""
     head = ("scheme", "error", *(f"{level:.2g}" for level in study.levels))
     rows = [
         (scheme, _quantity(name), *(f"{v:.1e}" for v in values))
@@ -112,7 +112,7 @@ def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 
 def order_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of the orders as texts: one row a scheme, with exponents and the errors at the longest T_s."""
+    """Heading and rows of the orders as strings: one row a scheme, with exponents and the errors at the longest T_s."""
     exponents = study.orders()
     names = list(next(iter(study.errors.values())))
     head = ("scheme", *(f"order of {QUANTITIES[n][0].removeprefix('max ')}" for n in names), *map(_quantity, names))

@@ -15,7 +15,7 @@ from quakedesign.files import Json
 from quakedesign.guarantees import ContinuousProof, NoProof, TrackingProof
 from quakedesign.laws import control_laws
 from quakedesign.linear.robust_stability import Analysis
-from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.linear.sampled_stability import SampledStability
 from quakedesign.linear.verdict import LinearVerdict
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.domain import Domain
@@ -162,7 +162,7 @@ def _percent(share: float) -> str:
 # Sentences about an e-LQR: certified margins, sampling and peaks.
 
 
-def hold_sentences(stability: HeldLoop) -> list[str]:
+def hold_sentences(stability: SampledStability) -> list[str]:
     """Stability of the running law with zero-order hold, and the largest proved T_s."""
     over = f"with zero-order hold over T_s = {float(stability.step):.12g} s"
     if stability.runs.verdict is Verdict.REFUTED and stability.runs.witness is not None:
@@ -173,7 +173,7 @@ def hold_sentences(stability: HeldLoop) -> list[str]:
     return [f"stable {over}, proved for {course}", _proved_up_to(stability)]
 
 
-def _proved_up_to(stability: HeldLoop) -> str:
+def _proved_up_to(stability: SampledStability) -> str:
     if stability.largest_step is None:
         return "no T_s is proved"
     proved = f"stability is proved for every T_s up to {stability.largest_step:.4g} s"
@@ -186,10 +186,10 @@ def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
         f"{proved.claims.peak_slip_rate:.3g} m/s (slip error {proved.claims.slip_error:.3g} m) for "
         + f"any disturbance of the fault's amplitude{' and rate' if name == 'rate' else ''}"
         for name, proved in peaks.items()
-        if proved.found
+        if proved.available
     ]
     if not lines:
-        reasons = {proved.reason for proved in peaks.values() if not proved.found}
+        reasons = {proved.reason for proved in peaks.values() if not proved.available}
         return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
     return "certified from rest in continuous time: slip rate below " + ", ".join(lines)
 
@@ -201,11 +201,11 @@ def verdict_lines(judged: LinearVerdict) -> list[str]:
     lines = [
         f'{judged.analysis.verdict}: elqr {gains} on "{fault.name}", box {fault.box.name}',
         *(f"  {line}" for line in margin_lines(judged.analysis)),
-        f"  {'; '.join(hold_sentences(judged.held))}",
+        f"  {'; '.join(hold_sentences(judged.sampled))}",
     ]
-    if judged.asked is None or judged.peaks is None:
+    if judged.peaks_class is None or judged.peaks is None:
         return lines
-    return [*lines, f"  {peaks_sentence({judged.asked: judged.peaks})}"]
+    return [*lines, f"  {peaks_sentence({judged.peaks_class: judged.peaks})}"]
 
 
 def margin_lines(analysis: Analysis) -> list[str]:
@@ -329,7 +329,7 @@ def part_of_task(run: Trajectory, fault: Fault) -> str:
 def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     """Verdict on the sampled loop or in continuous time, with the reason if it is not positive."""
     if design.verdict is Verdict.PROVED:
-        ran: FaultProof | None = design.runs if design.runs is not None and design.runs.found else None
+        ran: FaultProof | None = design.runs if design.runs is not None and design.runs.available else None
         lasts, proved = (ran.lasts, ran.plant) if ran else ("for all t >= 0", TrackingProof.plant)
         plant = "for the loop that ran"
         if run is not None and proved and run.provenance["plant"] != proved:

@@ -20,7 +20,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     Rows,
     Verifier,
     facet_rows,
-    pushes,
+    feedback_range,
     ranges,
     verifiers,
 )
@@ -37,11 +37,11 @@ _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (
 
 def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
     """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
-    task, loop, reach = claim.task, claim.held, claim.reach
+    task, loop, reach = claim.task, claim.sampled_loop, claim.invariant_set
     if loop.longest_step:
         raise UnsupportedError("Rocq verifies only periodic sampling. Received aperiodic sampling. Use check.py.")
     with ctx.workprec(BITS):
-        push, moved = _outward(*pushes(task, loop, reach)), task.reference_rates[0] * loop.step
+        push, moved = _outward(*feedback_range(task, loop, reach)), task.reference_rates[0] * loop.step
         bounds = ranges(task, reach.box[0] + moved, push, reach.box[1] * loop.step)
         bounds = replace(bounds, **{name: _outward(*getattr(bounds, name)) for name in ("slope", "damping", "chord")})
         (period,) = periods = Period.deciding(BALLS, task, loop, bounds, reach.box[1], push)
@@ -86,7 +86,7 @@ def _outward(low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
 
 
 def _loop(period: Period) -> str:
-    task, loop, bounds, law = period.task, period.held, period.plant, period.held.law
+    task, loop, bounds, law = period.task, period.sampled_loop, period.plant, period.sampled_loop.law
     fastest, bend = task.reference_rates
     bent = (_outward(Fraction(0), fraction_of(v.upper().fmpq()))[1] for v in period.bent)
     numbers = (
@@ -126,7 +126,10 @@ def _terms(period: Period) -> str:
     UnsupportedError
         For a period that is too long compared with the time scales of the plant.
     """
-    step, (s, w) = period.held.step, (sum(pair, Fraction(0)) / 2 for pair in (period.plant.slope, period.plant.damping))
+    step, (s, w) = (
+        period.sampled_loop.step,
+        (sum(pair, Fraction(0)) / 2 for pair in (period.plant.slope, period.plant.damping)),
+    )
     n, terms = ceil((3 + abs(s) + 2 * abs(w)) * step), 1
     x, y = Fraction(0), Fraction(1)
     while terms < _MOST_TERMS:
@@ -221,7 +224,7 @@ def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) 
 
 
 def _pushed(slices: list[Verifier], period: Period) -> str:
-    law = period.held.law
+    law = period.sampled_loop.law
     row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
     factors = EXACT.middle(EXACT.array([[-v for v in row], row]))
     pairs = []

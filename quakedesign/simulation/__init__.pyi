@@ -5,7 +5,7 @@ from .closed_loop import Load as Load
 from .closed_loop import Variation as Variation
 from .coupled_sliders import CoupledSliders as CoupledSliders
 from .coupled_sliders import natural_cycles as natural_cycles
-from .coupled_sliders import simulate_held_blocks as simulate_held_blocks
+from .coupled_sliders import simulate_sampled_blocks as simulate_sampled_blocks
 from .coupled_sliders import simulate_sliders as simulate_sliders
 from .earthquake import natural_earthquake as natural_earthquake
 from .export import ControllerStep as ControllerStep

@@ -420,7 +420,7 @@ def planned_per_slip(chain: BlockChain) -> float:
     return float(chain.fault.stiffness / chain.fault.area / steady)
 
 
-def simulate_held_blocks(
+def simulate_sampled_blocks(
     chain: BlockChain,
     law: Any,
     *,

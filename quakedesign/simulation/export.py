@@ -383,7 +383,7 @@ def write_step(
 
 
 def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) -> ControllerStep:
-    """Sampled step of a law for several blocks, as in `simulate_blocks` or `simulate_held_blocks`.
+    """Sampled step of a law for several blocks, as in `simulate_blocks` or `simulate_sampled_blocks`.
 
     Parameters
     ----------

@@ -62,8 +62,8 @@ def simulate(
     """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
 
     A fault with a friction state starts in steady sliding at the mean rate of its task. It needs a sampled law that
-    measures the slip alone, as from `design`, with its own scheme and step. Of the parameters below, only those up to
-    `progress` apply to it, and `plant`, `variation`, `actuator`, `measurement` (a `Transducer`) and `tide`.
+    measures the slip alone, such as one from `design`, with its own scheme and step. Of the parameters below, only
+    those up to `progress` apply to it, and `plant`, `variation`, `actuator`, `measurement` (a `Transducer`) and `tide`.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def simulate(
         paper's plant without stick, eq. shift continued to negative slip rates. With a friction state, which never
         rests: ``"smooth"`` or ``"quasi-dynamic"`` (without inertia). The first of each pair is the default.
     load : Load, optional
-        Drift of the far end and a perturbation, in addition to the fault's own disturbance.
+        Drift of the far end of the spring and a perturbation, besides the fault's own disturbance.
     variation : Variation or SlidingVariation, optional
         True parameters other than the nominal ones, within the fault's box; `SlidingVariation` for friction with a
         state. The compiled code is the same for all.

@@ -40,7 +40,7 @@ class SlidingRun(LoopTrajectory):
     """
 
     theta: "np.ndarray" = signal("state of friction", "s")
-    asked: "np.ndarray" = signal("feedback pressure commanded in addition to the planned pressure", "Pa")
+    feedback_pressure: "np.ndarray" = signal("feedback pressure commanded in addition to the planned pressure", "Pa")
     stress: "np.ndarray" = signal("shear stress disturbance", "Pa")
 
     def signals(self) -> "dict[str, tuple[np.ndarray, str, str]]":
@@ -179,7 +179,7 @@ def simulate_sliding(
         }
         | library_versions("casadi", "numpy", "quakedesign"),
         theta=np.exp(log_state),
-        asked=commanded,
+        feedback_pressure=commanded,
         stress=loop.tide.at(time),
     )
     if samples is None:

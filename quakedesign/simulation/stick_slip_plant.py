@@ -21,8 +21,8 @@ class StickSlipLoop(ClosedLoop):
     While the fault slips it obeys eq. shift, and results equal those of `ClosedLoop` bitwise as long as p < σ'. It
     stops when the slip rate falls to zero. It rests as long as friction can carry the load, with a slip rate of exactly
     zero. A step locates at most one release and one stop, to the order of the integrator. Backward slip is not
-    modelled: `reversing` tells when friction would be exceeded backward. Friction with healing carries `rest_excess` of
-    the law in addition at rest, which is lost at the release.
+    modelled: `reversing` indicates that the load would overcome friction backward. Friction with healing carries
+    `rest_excess` of the law in addition at rest, which is lost at the release.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class StickSlipLoop(ClosedLoop):
         return lambda time, x, p: plant(time, x, p) - ca.vertcat(0, normal * excess * ca.fmax(stress - p, 0))
 
     def resting_load(self, time: ca.SX, slip: ca.SX, pressure: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Load less friction, and load plus friction [m/s²], at rest (SX); the fault stays if they are ≤ 0 and ≥ 0."""
+        """Load minus friction and load plus friction [m/s²] at rest (SX); rest persists if they are ≤ 0 and ≥ 0."""
         forward = self.held(time, ca.vertcat(slip, 0), pressure)[1]
         _, normal, _, stress = self.hats()
         friction = self.friction(ca.vertcat(slip, 0)) + self.fault.friction.rest_excess
@@ -126,8 +126,8 @@ class _SplitStep:
     def stop(self, begin: Number, start: ca.SX, ahead: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Share of the step at which the slip rate falls to zero, and the state at this time.
 
-        The slip rate is the quartic in time with the values and slopes of both ends and the slip between them. States
-        of the law and of the pressure path are integrated to this time; without these, works are cubic in time.
+        The slip rate is interpolated by the quartic in time with the values and slopes at both ends and the same slip.
+        States of the law and of the pressure path are integrated to this time; without these, works are cubic in time.
         """
         length = (1 - begin) * self.step
         first, last = self.rates(begin, start), self.rates(1.0, ahead)

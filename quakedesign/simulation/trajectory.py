@@ -184,7 +184,7 @@ class Trajectory(ABC):
 KINDS = ("tracked", "slow slip", "earthquake", "diverged", "opened")
 HARMLESS = ("tracked", "slow slip")
 EARTHQUAKE_SHARE = 0.1
-"""Share of the natural peak: a run that exceeds the reference rate by it or more is an earthquake."""
+"""Share of the natural peak: a run that exceeds the reference rate by this much or more is an earthquake."""
 TRACKED_SHARE = 0.01
 """Share of the natural peak: a tracked run never exceeds the reference rate by more."""
 SLIP_BAND = 0.02

@@ -27,12 +27,12 @@ class BlocksResult:
     @property
     def proved(self) -> bool:
         """Whether all numbers of blocks have a guarantee."""
-        return all(one.found for one in self.proofs.values())
+        return all(one.available for one in self.proofs.values())
 
     def peaks(self, blocks: int) -> tuple[Any, Any] | None:
         """Largest proved slip error [m] and slip-rate error [m/s] of all blocks."""
         one = self.proofs[blocks]
-        if not one.found:
+        if not one.available:
             return None
         outputs = one.claims.outputs
         return max(outputs[:blocks]), max(outputs[blocks:])
@@ -48,7 +48,7 @@ class BlocksResult:
         ]
         for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
-            if not one.found or ends is None:
+            if not one.available or ends is None:
                 parts.append(f"{blocks:3} blocks: {one.sentence()}")
                 continue
             about = "its balance" if self.wells == "one" else "the reference"
@@ -63,8 +63,8 @@ class BlocksResult:
         rows = []
         for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)
-            entry: Json = {"blocks": blocks, "verdict": "proved" if one.found else "undecided"}
-            entry |= {"reason": None if one.found else one.reason}
+            entry: Json = {"blocks": blocks, "verdict": "proved" if one.available else "undecided"}
+            entry |= {"reason": None if one.available else one.reason}
             entry |= {"slip_error": ends and ends[0].exact, "slip_rate_error": ends and ends[1].exact}
             rows.append(entry)
         return {"fault": self.fault.name, "wells": self.wells, "step": str(self.step), "blocks": rows}

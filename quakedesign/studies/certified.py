@@ -50,7 +50,7 @@ class Certified:
     certificate : Certificate or None
         Proof or counterexample.
     facts : mapping
-        Exact quantities as texts, measured ones as numbers.
+        Exact quantities as strings, measured ones as numbers.
     lines : tuple of str
         The same as sentences.
     """
@@ -116,10 +116,10 @@ def _results(
     if maximize == "lipschitz":
         return _of_limit(name, gains, largest_lipschitz(name, gains, gain_range=ends), ends, lipschitz)
     if maximize in ("beta", "beta-factor"):
-        reach = largest_gain_range(
+        largest = largest_gain_range(
             name, gains, lipschitz=str(lipschitz), nominal=ends[0], symmetric=maximize == "beta-factor"
         )
-        return _of_limit(name, gains, reach, ends, lipschitz)
+        return _of_limit(name, gains, largest, ends, lipschitz)
     return _at(name, gains, str(lipschitz), ends, decay=maximize == "decay")
 
 
@@ -190,55 +190,55 @@ def _refutation_lines(certificate: Certificate | None, kind: str, excluded: list
 
 
 def _of_limit(
-    name: str, gains: tuple[Number, ...], reach: CertifiedLimit, ends: Ends, lipschitz: Number | None
+    name: str, gains: tuple[Number, ...], largest: CertifiedLimit, ends: Ends, lipschitz: Number | None
 ) -> Results:
     """Largest certified L̄ or range of β of given gains."""
-    tried = ends if reach.quantity == "lipschitz" else (ends[0], ends[0])
+    tried = ends if largest.quantity == "lipschitz" else (ends[0], ends[0])
     lowest = closed_loop(
-        name, gains, lipschitz=0 if reach.quantity == "lipschitz" else str(lipschitz), gain_range=tried
+        name, gains, lipschitz=0 if largest.quantity == "lipschitz" else str(lipschitz), gain_range=tried
     )
     limit = necessary_limit(lowest, name)
-    kind = reach.counterexample
-    excluded = _excluded(lowest) if reach.certificate is None else []
-    value, bound = reach.value, None if lipschitz is None else rational(lipschitz, "lipschitz")
-    scale = reach.smallest_scale(bound) if reach.quantity == "lipschitz" and bound else None
+    kind = largest.counterexample
+    excluded = _excluded(lowest) if largest.certificate is None else []
+    value, bound = largest.value, None if lipschitz is None else rational(lipschitz, "lipschitz")
+    scale = largest.smallest_scale(bound) if largest.quantity == "lipschitz" and bound else None
     least = bound / limit if bound and limit and scale is not None else None
-    if reach.quantity == "lipschitz":
+    if largest.quantity == "lipschitz":
         bound = value
     elif value is not None:
-        ends = (ends[0], value) if reach.quantity == "beta" else (ends[0] / value, ends[0] * value)
+        ends = (ends[0], value) if largest.quantity == "beta" else (ends[0] / value, ends[0] * value)
     values = _values(
         bound,
         ends,
         limit=_text(limit),
         counterexample=kind,
         dual=excluded,
-        maximized={"quantity": reach.quantity, "value": _text(value), "beyond": _text(reach.beyond)},
-        degrees=list(reach.degrees),
-        degree=reach.degree,
+        maximized={"quantity": largest.quantity, "value": _text(value), "beyond": _text(largest.beyond)},
+        degrees=list(largest.degrees),
+        degree=largest.degree,
         scale=_text(scale),
         scale_limit=_text(least),
-        solves=reach.solves,
+        solves=largest.solves,
     )
-    lines = [*_reach_lines(reach), *_refutation_lines(reach.certificate, kind, excluded), _limit_line(limit)]
+    lines = [*_limit_lines(largest), *_refutation_lines(largest.certificate, kind, excluded), _limit_line(limit)]
     if scale is not None:
         lines.append(f"the bound {lipschitz} needs gains scaled by lambda >= {UpperBound(scale)}")
-    return reach.certificate, values, lines
+    return largest.certificate, values, lines
 
 
-def _reach_lines(reach: CertifiedLimit) -> list[str]:
+def _limit_lines(largest: CertifiedLimit) -> list[str]:
     names = {"lipschitz": "bound on |h'|", "beta": "upper end of beta", "beta-factor": "factor f of beta in [b/f, b f]"}
-    degrees = ", ".join(map(str, reach.degrees))
-    if reach.value is None:
+    degrees = ", ".join(map(str, largest.degrees))
+    if largest.value is None:
         return [f"nothing is proved with Lyapunov functions of degree {degrees}"]
-    value = f"{LowerBound(reach.value)} (exactly {reach.value})"
-    text = f"largest {names[reach.quantity]}: {value}, V of degree {reach.degree}"
-    if reach.beyond is None and reach.sharp:
+    value = f"{LowerBound(largest.value)} (exactly {largest.value})"
+    text = f"largest {names[largest.quantity]}: {value}, V of degree {largest.degree}"
+    if largest.beyond is None and largest.sharp:
         return [text, "which is within 1e-4 of what no Lyapunov function can exceed"]
-    if reach.beyond is None:
+    if largest.beyond is None:
         return [text, "the search stopped there and met no upper limit"]
-    beyond = f"at {UpperBound(reach.beyond)} the search finds none of degree {degrees}"
-    return [text, beyond if reach.sharp else f"{beyond}; in between it is not known"]
+    beyond = f"at {UpperBound(largest.beyond)} the search finds none of degree {degrees}"
+    return [text, beyond if largest.sharp else f"{beyond}; in between it is not known"]
 
 
 def _limit_line(limit: Fraction | None) -> str:

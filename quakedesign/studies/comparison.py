@@ -27,7 +27,7 @@ from quakedesign.guarantees.stick_slip_result import stick_slip_with_worst_case
 from quakedesign.guarantees.tracking_result import given_law_with_worst_case
 from quakedesign.laws import Controller, published
 from quakedesign.linear.riccati import vertex_poles
-from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.linear.sampled_stability import SampledStability
 from quakedesign.loop import simulation_scheme
 from quakedesign.lyapunov import Verdict
 from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
@@ -71,8 +71,8 @@ class Entry:
         schemes, see `zero_order_hold`.
     variants : tuple of Variant
         For a designed sliding mode: certified properties of the same gains with every named feed-forward.
-    zero_order_hold : HeldLoop or None
-        For a linear law: stability with zero-order hold over T_s, see `Design.held_loop`.
+    zero_order_hold : SampledStability or None
+        For a linear law: stability with zero-order hold over T_s, see `Design.sampled_stability`.
     peaks : mapping of str to ContinuousProof
         For a designed linear law that is proved: peaks in continuous time by class; empty if there are none.
     given : bool
@@ -89,7 +89,7 @@ class Entry:
     largest_step: float | None = None
     growth_per_step: float | None = None
     variants: tuple[Variant, ...] = ()
-    zero_order_hold: HeldLoop | None = None
+    zero_order_hold: SampledStability | None = None
     peaks: Mapping[str, ContinuousProof] = field(default_factory=dict)
     given: bool = False
     guarantee: Guarantee | None = None
@@ -103,10 +103,10 @@ class Entry:
     def proof(self) -> FaultProof | None:
         """Proof of the guarantee; None without one."""
         proof = self.guarantee.proof if self.guarantee else None
-        return proof if proof is not None and proof.found else None
+        return proof if proof is not None and proof.available else None
 
     def to_dict(self) -> Json:
-        """JSON-able facts: exact quantities as texts, measured ones as numbers, SI; None if a report fills it."""
+        """JSON-able facts: exact quantities as strings, measured ones as numbers, SI; None if a report fills it."""
         design = self.design
         return {
             "guarantee": self.guarantee.to_dict() | {"certificate": None} if self.guarantee else None,
@@ -214,14 +214,14 @@ def _guarantee_of(fault: Fault, design: Design, *, given: bool) -> Guarantee | N
     proof: Any = design.guarantee
     if design.sliding is not None:
         return design.sliding
-    if proof.found and proof.kind == STICK_SLIP:
+    if proof.available and proof.kind == STICK_SLIP:
         return stick_slip_with_worst_case(fault, proof, design.compensation)
     if given:
         notes = getattr(design.controller, "notes", None)
         return replace(given_law_with_worst_case(fault, proof, notes), compensation=design.compensation)
     tried = str(design.details.get("not_at_rest", ""))
     result = replace(with_worst_case(fault, proof), compensation=design.compensation, not_at_rest=tried)
-    return result if proof.found or design.runs else replace(result, given=True)  # only T_s of the fault was tried
+    return result if proof.available or design.runs else replace(result, given=True)  # only T_s of the fault was tried
 
 
 def _slowly_compared(fault: Fault, designs: Sequence[Design], progress: Tell, *, whole: bool) -> Compared:
@@ -279,7 +279,7 @@ def _ended(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
 def _linear(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
     """Entry of a linear law in continuous time, with its stability under zero-order hold and its peaks."""
     design = entry.design
-    growth, sampled = None, design.held_loop()
+    growth, sampled = None, design.sampled_stability()
     if sampled is not None and run.provenance["scheme"] == AS_IN_THE_PAPER:
         poles = vertex_poles(sectors(design.fault), list(design.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
@@ -287,7 +287,7 @@ def _linear(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
     wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
     classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
-    proved = {kind: peak for kind, peak in peaks.items() if peak.found}
+    proved = {kind: peak for kind, peak in peaks.items() if peak.available}
     return replace(entry, growth_per_step=growth, zero_order_hold=sampled, peaks=proved)
 
 

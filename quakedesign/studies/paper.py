@@ -16,7 +16,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.fault import Fault
 from quakedesign.fault.equilibrium import by_equilibrium
 from quakedesign.files import Json
-from quakedesign.guarantees import TrackingProof, design_held
+from quakedesign.guarantees import TrackingProof, design_sampled_law
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
@@ -137,8 +137,8 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
         T_s [s].
     """
     task = uncertain_plant(fault)
-    designs = {"peak": design_held(task, step, objective="peak")}
-    designs |= {f"tracking, {room:g} times the peak": design_held(task, step, room=room) for room in ROOMS}
+    designs = {"peak": design_sampled_law(task, step, objective="peak")}
+    designs |= {f"tracking, {room:g} times the peak": design_sampled_law(task, step, allowance=room) for room in ROOMS}
     length = min(_PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
     return tuple(
         FrontPoint(

@@ -17,7 +17,7 @@ from quakedesign.guarantees import (
     TrackingProof,
     continued,
     design_at,
-    design_held,
+    design_sampled_law,
     farthest_rock,
     longest_delay,
     longest_step,
@@ -83,7 +83,7 @@ class Limit:
     holds_for: str
 
     def to_dict(self) -> dict[str, str | None]:
-        """Decimal texts, rounded outwards."""
+        """Decimal strings, rounded outwards."""
         beyond, proved = self.impossible_beyond, self.proved_up_to
         return {
             "impossible_beyond": None if beyond is None else str(beyond),
@@ -156,7 +156,7 @@ class Sensing:
         return f"{slip}, the slip rate with errors of no more than {UpperBound(self.rate_noise).quantity('m/s')}"
 
     def controllers(self) -> str:
-        """Controllers for which a smallest slip-rate error holds."""
+        """Controllers to which the limit of the slip-rate error applies."""
         return MEASURING.format(self.summary()) if self.noisy else KNOWING
 
 
@@ -205,7 +205,7 @@ class Limits:
     @property
     def achieved(self) -> list[tuple[Fraction, UpperBound]]:
         """T_s [s] and proved slip-rate error [m/s] of the designs, ordered by T_s."""
-        return sorted((g.held.step, g.claims.slip_rate_error) for g in self.proved)
+        return sorted((g.sampled_loop.step, g.claims.slip_rate_error) for g in self.proved)
 
     def named(self) -> dict[str, Limit]:
         """All limits by name."""
@@ -278,7 +278,7 @@ class SlidingLimits(Limits):
     def achieved(self) -> list[tuple[Fraction, UpperBound]]:
         """T_s [s] and proved slip-rate error [m/s] of the guarantee."""
         proof = self.guarantee
-        return [] if proof is None else [(proof.held.step, above_the_reference(proof))]
+        return [] if proof is None else [(proof.sampled_loop.step, above_the_reference(proof))]
 
     @property
     def stick_slip_rate(self) -> None:
@@ -376,14 +376,14 @@ def _limits_at_rest(
     late = ExactSetup.of(sensing.setup).delay
     peak, proved = smallest_peak(task, step, late, **sensing.bounds), dict[str, Bound | None]()
     if proofs:
-        proved["largest_step"] = LowerBound(proofs[-1].held.step)
+        proved["largest_step"] = LowerBound(proofs[-1].sampled_loop.step)
     if own is not None:
         proved["peak_slip_rate_error"] = own.claims.slip_rate_error
         longest = longest_delay(task, step, **sensing.wanted)
-        proved["largest_delay"] = LowerBound(longest.held.delay) if longest else None
+        proved["largest_delay"] = LowerBound(longest.sampled_loop.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
         if (farthest := farthest_rock(task, step, **sensing.wanted)) is not None:
-            proved["largest_diffusion_time"] = rock = LowerBound(farthest.held.diffusion)
+            proved["largest_diffusion_time"] = rock = LowerBound(farthest.sampled_loop.diffusion)
             proved["farthest_well"] = nearest_proved_well(rock, spread)
     return Limits(
         fault=fault,
@@ -391,7 +391,7 @@ def _limits_at_rest(
         diffusivity=spread,
         slip_error=peak.slip_error if peak else None,
         **_limits(
-            _impossible(task, withdrawal, step, spread, peak.slip_rate_error if peak else None),
+            _limits_by_name(task, withdrawal, step, spread, peak.slip_rate_error if peak else None),
             proved,
             sensing.controllers(),
         ),
@@ -400,7 +400,7 @@ def _limits_at_rest(
     )
 
 
-def _impossible(
+def _limits_by_name(
     push: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
 ) -> dict[str, Bound | None]:
     """Performance limits of every controller by name; None where no limit is known."""
@@ -434,7 +434,7 @@ def _limits(
 def _require_plain(fault: Fault, sensing: Sensing) -> None:
     if sensing.setup.noise or sensing.measured != MEASURED[0]:
         raise ParameterError(
-            f"no limit of slow sliding is known for noise. Received {fault.friction.name}, measured "
+            f"no performance limit of slow sliding with noise is known. Received {fault.friction.name}, measured "
             f"{sensing.summary()}. Omit the noise: what is infeasible without noise is infeasible with it."
         )
     if more := sensing.setup.given().keys() - {"lag", "diffusion"}:
@@ -470,7 +470,7 @@ def _sliding_limits(
     path = setup if setup is not None and setup.path else None
     through = ExactSetup(diffusion=near_path(model))
     result = None if setup is None else guarantee_sliding(fault, stress=requested, spread=off, setup=through)
-    proof = result.proof if result is not None and result.proof.found else None
+    proof = result.proof if result is not None and result.proof.available else None
     amplitude = requested if requested is not None or proof is None else proof.task.stress
     if amplitude is None or amplitude <= 0:
         why = f": {result.reason}" if result is not None and not result.proved else ""
@@ -482,14 +482,14 @@ def _sliding_limits(
     farthest, rock = longest_diffusion(push, withdrawal, step), (path or IDEAL).diffusion
     if path is not None and (farthest is None or rock <= farthest):
         behind = guarantee_sliding(fault, stress=requested, spread=off, setup=ExactSetup.of(path)).proof
-        proof = behind if behind.found else None
+        proof = behind if behind.available else None
         push = replace(push, amplitude=proof.task.stress) if proof else push
-    impossible = _impossible(push, withdrawal, step, spread, push.smallest_rate_error(step))
+    impossible = _limits_by_name(push, withdrawal, step, spread, push.smallest_rate_error(step))
     proved: dict[str, Bound | None] = {}
     if proof is not None:
         proved["peak_slip_rate_error"] = above_the_reference(proof)
         proved["largest_step"] = LowerBound(step)
-        proved["largest_diffusion_time"] = LowerBound(proof.held.diffusion)
+        proved["largest_diffusion_time"] = LowerBound(proof.sampled_loop.diffusion)
         proved["smallest_pressure"] = proof.claims.push
     limits_by_name = _limits(impossible, proved, KNOWING, ", of the linearised plant")
     return SlidingLimits(
@@ -513,20 +513,20 @@ def _proved_steps(
     task: FaultPlant, step: Fraction, sensing: Sensing
 ) -> tuple[tuple[TrackingProof, ...], TrackingProof | None]:
     """Guarantees at increasing T_s up to nearly the longest, and that at the fault's own T_s, if there is one."""
-    own: TrackingProof | NoProof | None = design_held(task, step, objective="peak", **sensing.wanted)
+    own: TrackingProof | NoProof | None = design_sampled_law(task, step, objective="peak", **sensing.wanted)
     longest = longest_step(task, **sensing.wanted)
-    if own is not None and own.found:
+    if own is not None and own.available:
         own = _best_at(own, sensing)
     else:
         own = continued(task, step, longest, **sensing.wanted)
     proofs = [] if own is None else [own]
-    if longest is not None and (own is None or longest.guarantee.held.step > step):
+    if longest is not None and (own is None or longest.guarantee.sampled_loop.step > step):
         proofs.append(design_at(task, longest))
     return tuple(proofs), own
 
 
 def _best_at(least_peak: TrackingProof, sensing: Sensing) -> TrackingProof:
     """The better of the designs for peak and for tracking: the one with the smaller proved slip-rate error."""
-    tracking = design_held(least_peak.task, least_peak.held.step, objective="tracking", **sensing.wanted)
-    proofs = [least_peak, *([tracking] if tracking.found else [])]
+    tracking = design_sampled_law(least_peak.task, least_peak.sampled_loop.step, objective="tracking", **sensing.wanted)
+    proofs = [least_peak, *([tracking] if tracking.available else [])]
     return min(proofs, key=lambda g: g.claims.slip_rate_error)

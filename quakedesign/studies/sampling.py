@@ -68,7 +68,7 @@ class SamplingReport:
     studies: dict[str, Study]
 
     def to_dict(self) -> Json:
-        """JSON-able facts, SI; exact quantities are texts, null means diverged or not applicable."""
+        """JSON-able facts, SI; exact quantities are strings, null means diverged or not applicable."""
         entries = {name: study.to_dict() for name, study in self.studies.items()}
         if "orders" in entries:
             entries["orders"]["exponents"] = self.studies["orders"].orders()

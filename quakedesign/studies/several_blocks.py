@@ -30,7 +30,7 @@ from quakedesign.simulation.coupled_sliders import (
     BlockEvent,
     SlidersRun,
     natural_cycles,
-    simulate_held_blocks,
+    simulate_sampled_blocks,
 )
 from quakedesign.simulation.earthquake import STILL, event_nudge
 from quakedesign.simulation.state_plant import TIDE
@@ -206,7 +206,7 @@ class ChainRun:
     def lines(self) -> list[str]:
         """Lines of at most 80 characters: blocks and wells, with proved and simulated values."""
         chain, run, N = self.chain, self.run, len(self.chain.blocks)
-        if not self.proof.found:
+        if not self.proof.available:
             return [_NO_RUN]
         rates, slips = self.proved_slip_rates, [UpperBound(v) for v in self.proof.claims.outputs[:N]]
         powers = [power_of(float(max(values))) for values in (rates, slips)]
@@ -252,7 +252,7 @@ class ChainRun:
 
 
 def table_row(law: str, rate: Fraction, slip: Fraction, worst: Sequence[float], pressure: np.ndarray) -> list[str]:
-    """Proved slip rate [m/s] and slip [m], largest values of a run, and range of its pressures [Pa], as texts."""
+    """Proved slip rate [m/s] and slip [m], largest values of a run, and range of its pressures [Pa], as strings."""
     proved = [UpperBound(v).quantity(unit) for v, unit in ((rate, "m/s"), (slip, "m"))]
     run = [*zip(worst, ("m/s", "m"), strict=True), (pressure.min(), "Pa"), (pressure.max(), "Pa")]
     return [law, *proved, *(quantity(float(v), unit) for v, unit in run)]
@@ -328,7 +328,7 @@ def run_of_chain(
     """
     whole_periods(chain, rational(chain.fault.sampling_time), duration)  # reject before the long search
     proof = chain_law(chain, controller, certificate)
-    run = simulate_blocks(chain, proof.law, duration=duration) if proof.found else None
+    run = simulate_blocks(chain, proof.law, duration=duration) if proof.available else None
     return ChainRun(chain=chain, controller=controller, proof=proof, run=run)
 
 
@@ -358,7 +358,7 @@ class SlidingChainRun:
 
     def row(self) -> list[str]:
         """As in `ChainRun`; slip rates themselves, and pressures relative to the plan."""
-        if self.run is None or self.proof is None or not self.proof.found:
+        if self.run is None or self.proof is None or not self.proof.available:
             return [self.controller, "none", *[""] * 5]
         rate = SlidingReference(task=self.chain.fault.reference).first_rate * exponential(self.log_rate)
         slip = max(self.proof.claims.outputs[: len(self.chain.blocks)])
@@ -390,7 +390,7 @@ class SlidingChainRun:
     def within(self) -> bool:
         """Whether all errors of a controlled run are within the proved bounds of their blocks and wells."""
         assert self.proof is not None
-        assert self.proof.found
+        assert self.proof.available
         N, claims, errors = len(self.chain.blocks), self.proof.claims, self.errors
         values = [errors[name] for name in ("slip_error", "log_state", "pressure_beside_plan", "log_rate")]
         proved = [*claims.outputs[: 2 * N], *(v * MPA for v in claims.controls), *[self.log_rate] * N]
@@ -493,7 +493,7 @@ def run_sliding_chain(
     stress_period : float
         Period of this stress [s].
     loading_rate, duration, inertia
-        As in `natural_cycles`, or `simulate_held_blocks` with a law.
+        As in `natural_cycles`, or `simulate_sampled_blocks` with a law.
 
     Raises
     ------
@@ -507,11 +507,11 @@ def run_sliding_chain(
     if loading_rate is not None:
         raise ParameterError("the far end rests in slow sliding. Received a loading rate. Omit it.")
     proof = chain_law(chain, controller, certificate, **(sliding or {}))
-    if not proof.found:
+    if not proof.available:
         return SlidingChainRun(chain=chain, run=None, inertia=inertia, proof=proof, controller=controller)
     lag, covered, rate, _ = covered_stress(chain, proof)
     size = float(covered) if stress is None else stress
-    trajectory = simulate_held_blocks(
+    trajectory = simulate_sampled_blocks(
         chain,
         proof.law,
         lag=float(lag),

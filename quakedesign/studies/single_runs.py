@@ -95,7 +95,7 @@ def run_state(
     plant: str = "smooth",
     method: str = "radau",
 ) -> tuple[StateTrajectory, dict[str, Any]]:
-    """Run a fault whose friction has a state under far-field loading and a prescribed pressure; with its JSON.
+    """Run a fault whose friction has a state under far-field loading and a prescribed pressure; also returns its JSON.
 
     Parameters
     ----------
@@ -192,15 +192,15 @@ def designed_run(
     The period of the sine is that of the tide, or a quarter of a run that is shorter than four tides.
     """
     result = design.sliding
-    if result is None or result.held is None:
+    if result is None or result.sampled_loop is None:
         raise ParameterError(f"a designed run needs a law for slow sliding. Received {design!r:.60}. Use simulate.")
     duration = shown_time(design.fault, whole=whole)
     run = simulate_sliding(
         design.fault,
-        result.held.law,
-        result.held.step,
-        lag=result.held.lag,
-        diffusion=result.held.diffusion,
+        result.sampled_loop.law,
+        result.sampled_loop.step,
+        lag=result.sampled_loop.lag,
+        diffusion=result.sampled_loop.diffusion,
         tide=Tide(amplitude=float(result.task.stress), period=min(TIDE, duration / _PERIODS)),
         duration=duration,
         inertia=True,
@@ -224,7 +224,7 @@ def run_sliding(
     method: str = "cvodes",
     claim: SlidingProof | None = None,
 ) -> tuple[SlidingRun, dict[str, Any]]:
-    """Run the e-LQR of `sliding_law`, or of a guarantee, on a fault that starts in steady sliding; with its JSON.
+    """Run the e-LQR of `sliding_law`, or of a guarantee, on a fault in steady sliding at first; also returns its JSON.
 
     Parameters
     ----------
@@ -252,8 +252,13 @@ def run_sliding(
     if claim is None:
         law = sliding_law(model, sampling_step, diffusion=path)
     else:
-        law, sampling_step, path, through = claim.held.law, claim.held.step, claim.held.diffusion, claim.held.lag
-        stages = (*Actuator.meant_for(Sampling(step=sampling_step, delay=claim.held.delay)).sampled, *stages)
+        law, sampling_step, path, through = (
+            claim.sampled_loop.law,
+            claim.sampled_loop.step,
+            claim.sampled_loop.diffusion,
+            claim.sampled_loop.lag,
+        )
+        stages = (*Actuator.meant_for(Sampling(step=sampling_step, delay=claim.sampled_loop.delay)).sampled, *stages)
         if slow_sliding_plant(fault, claim.task.stress).ramp != claim.task.ramp:  # another fault of the same box
             plan = float(claim.task.ramp / claim.task.rate)
     run = simulate_sliding(
@@ -284,7 +289,7 @@ def run_sliding(
         "metrics": {
             "max_log_rate": float(np.max(np.abs(np.log(run.slip_rate / run.reference_rate)))),
             "max_slip_error": float(np.max(np.abs(run.slip - run.reference))),
-            "max_asked": float(np.max(np.abs(run.asked))),
+            "max_asked": float(np.max(np.abs(run.feedback_pressure))),
         },
         "pressure": [float(run.pressure.min()), float(run.pressure.max())],
         "stress": float(np.max(np.abs(run.stress))),
@@ -320,7 +325,7 @@ def _start(
     if kind == "late":
         return late_in_cycle(fault, rate, 0.9 if share is None else share, **settings)
     if hold is None:
-        raise ParameterError("a locked start needs the time that the fault was held. Received none. Give --hold.")
+        raise ParameterError("a locked start needs the duration of the hold. Received none. Give --hold.")
     return locked(fault, rate, hold, **settings)
 
 
@@ -396,7 +401,7 @@ def sensor(
 
 
 def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, *, scheme: str = "explicit") -> Premise:
-    """Premise: λ_d exceeds the bound of slip and law, jointly with the sampling period (ERRATA 21).
+    """Premise: λ_d satisfies the joint condition of slip, law and sampling period (ERRATA 21).
 
     The largest |x1''| comes from a run with exact states over 4000 sampling periods. The condition is sufficient for
     the differentiator to converge, not necessary for the loop to work. If this run diverges, nothing is certified.
@@ -463,8 +468,8 @@ class Choice:
 
     def noise(self, seed: int) -> Measurement:
         """Measurement errors within the bounds of the controller's guarantee; no noise without a guarantee."""
-        held = self.claim.held if self.claim else None
-        off = {name: float(bound) for name, bound in held.noise.items()} if held else {}
+        sampled_loop = self.claim.sampled_loop if self.claim else None
+        off = {name: float(bound) for name, bound in sampled_loop.noise.items()} if sampled_loop else {}
         return Measurement(**off, seed=seed, bounded=True) if off else EXACT
 
 
@@ -494,7 +499,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
             f"{'; '.join(differences)}. Give the fault that it is about, or prove a new one with guarantee."
         )
-    if claim.root is not None:
+    if claim.implicit_step is not None:
         controller: Controller = recovered(claim).limited
     else:
         controller = claim.controller
@@ -616,7 +621,7 @@ def _designed_for_path(fault: Fault, name: str, path: Mapping[str, float]) -> Co
     result: Any = guarantee(fault, name, setup)
     if not result.proved:
         text = ", ".join(f"{part} {time:g} s" for part, time in path.items())
-        sooner = f"--step '{float(result.shorter.held.step):g} s', where it has, " if result.shorter else ""
+        sooner = f"--step '{float(result.shorter.sampled_loop.step):g} s', where it has, " if result.shorter else ""
         raise ParameterError(
             f"designed gains must have a proof with this delay, lag or diffusion path. Received {name} with {text}, "
             f"T_s = {fault.sampling_time:g} s: {result.proof.reason}. Give {sooner}gains as numbers, or see limits."

@@ -22,7 +22,7 @@ class Term:
 
 
 def plain(terms: Iterable[Term]) -> list[Any]:
-    """Terms in JSON types, with numbers as texts."""
+    """Terms in JSON types, with numbers as strings."""
     return [
         [exact_text(t.coefficient), list(t.parameters), [[s, exact_text(e), k] for s, e, k in t.factors]] for t in terms
     ]

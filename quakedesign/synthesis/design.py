@@ -28,7 +28,7 @@ from quakedesign.guarantees.search.default_designs import REACH
 from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.laws import Controller, control_law, control_laws
 from quakedesign.laws.feed_forward import NONE, feed_forward
-from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.linear.sampled_stability import SampledStability
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.lyapunov import Certificate, Verdict
@@ -62,7 +62,7 @@ class Design:
     domain : Domain or None
         Certified set of initial errors for which the premise on |h'| holds along every trajectory.
     details : mapping
-        Results of the synthesis; exact numbers as texts.
+        Results of the synthesis; exact numbers as strings.
     setup : LoopSetup
         Loop setup for which a sampled law is designed.
     runs : FaultProof or NoProof, optional
@@ -181,10 +181,10 @@ class Design:
             return None
         return method_of(type(law)).compensation(law, proof)
 
-    def held_loop(self) -> HeldLoop | None:
+    def sampled_stability(self) -> SampledStability | None:
         """Stability of an e-LQR with zero-order hold over the fault's T_s; None for another law."""
         law = self.controller
-        return method_of(type(law)).held_loop(self.fault, law) if law else None
+        return method_of(type(law)).sampled_stability(self.fault, law) if law else None
 
     def __repr__(self) -> str:
         gains = ", ".join(f"{name} = {value}" for name, value in self.gains.items()) or "none"

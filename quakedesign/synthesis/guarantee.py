@@ -107,7 +107,7 @@ def guarantee(
     accept_poor_fit: bool = False,
     **entered: Quantity | None,
 ) -> Guarantee:
-    """Prove bounds of slip, slip rate and pressure of a sampled loop.
+    """Prove bounds on slip, slip rate and pressure of a sampled loop.
 
     The controller is designed for the loop setup unless gains are given.
 
@@ -277,7 +277,7 @@ def guarantee(
     if plant is None and usual and may_stick(family, setup, disturbance_class):
         mode = method_of(family).base_law(task, family, wanted.gains)
         sticking = guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
-        if sticking.proof.found:
+        if sticking.proof.available:
             return sticking
         not_at_rest = sticking.proof.reason
     result = _sampled(fault, task, family, wanted)

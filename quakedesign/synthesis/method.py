@@ -34,7 +34,7 @@ from quakedesign.laws import Controller, LinearLaw, SampledController, Signals, 
 from quakedesign.laws.feed_forward import NONE, FeedForward
 from quakedesign.laws.sampled_law import steady_states
 from quakedesign.linear.robust_stability import sector_loop
-from quakedesign.linear.sampled_stability import HeldLoop
+from quakedesign.linear.sampled_stability import SampledStability
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup
 from quakedesign.lyapunov import Certificate, Verdict, decided_once
 from quakedesign.lyapunov.exact.domain import Domain
@@ -260,7 +260,7 @@ class DesignMethod(Generic[L]):
         """Sliding mode with base gains, by default the first stored ones; None for other laws."""
         return None
 
-    def held_loop(self, fault: Fault, controller: L) -> HeldLoop | None:
+    def sampled_stability(self, fault: Fault, controller: L) -> SampledStability | None:
         """Stability with zero-order hold over the fault's T_s; None if undefined."""
         return None
 
@@ -360,11 +360,11 @@ class Samples(DesignMethod[SampledController]):
             steady_states(still, law.output, (Fraction(0),) * len(law.states), Fraction(1))
         except ParameterError:
             return NoProof(reason=_STANDING)
-        held = replace(exact, **path).held(law, step)
-        proof = best_guarantee(task, held)
-        if proof.found or proof.small_gain is not None or held.longest_step:
+        sampled_loop = replace(exact, **path).with_law(law, step)
+        proof = best_guarantee(task, sampled_loop)
+        if proof.available or proof.small_gain is not None or sampled_loop.longest_step:
             return proof
-        largest, opposite = (spectral_radius(replace(held, law=_times(f, law)).loop(task)) for f in (1, -1))
+        largest, opposite = (spectral_radius(replace(sampled_loop, law=_times(f, law)).loop(task)) for f in (1, -1))
         if largest < _STABLE:
             return proof
         text = "the nominal closed loop is not asymptotically stable: its largest eigenvalue over a period has modulus "
@@ -382,15 +382,15 @@ class Samples(DesignMethod[SampledController]):
         """Guarantee; for a law of the errors alone also the worst case found."""
         proof = self.guarantee(fault, task, controller, setup)
         result = given_law_with_worst_case(fault, proof, controller.notes)
-        if proof.found or proof.pressed or proof.reason == _STANDING or setup.longest_step:
+        if proof.available or proof.pressed or proof.reason == _STANDING or setup.longest_step:
             return result
         for factor in _FACTORS:
             other = self.guarantee(fault, task, replace(controller, law=_times(factor, controller.law)), setup)
-            if other.found:
+            if other.available:
                 return replace(result, nearest=(FACTOR, other), factor=factor)
         for share in _DELAYS if setup.delay else ():
             other = self.guarantee(fault, task, controller, setup.with_given(delay=share * setup.delay))
-            if other.found:
+            if other.available:
                 return replace(result, nearest=("delay", other))
         return result
 

@@ -54,7 +54,7 @@ def guarantee_plant(
             f"steepest the states ({shape}) grow by {radius:.4g} a sample",
         )
     proof = plant_guarantee(around, exact)
-    return replace(proof, notes=notes) if proof.found else proof
+    return replace(proof, notes=notes) if proof.available else proof
 
 
 def _shown(plant: UncertainPlant) -> int:
@@ -93,7 +93,7 @@ def _law_of(
         )
     if linear is not None:
         others = {
-            "an implicit root": linear.root,
+            "an implicit step": linear.implicit_step,
             "r or r' as an input": linear.of_reference,
             "other first states": linear.first,
         }

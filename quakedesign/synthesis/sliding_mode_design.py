@@ -131,7 +131,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
         made = sliding_mode(task, law, step, **options, setup=setup)
         if isinstance(made, NoProof):
             return TrackingGuarantee(fault=fault, proof=made)
-        if not made.proof.found:
+        if not made.proof.available:
             laws, none = deadbeat(task, law, wanted.gains), made.proof
             longest = longest_step(task, kind=laws, setup=setup)
             again = laws.continued(task, step, longest, setup=setup)
@@ -172,7 +172,7 @@ def _compensated(
                 "objective": problem.objective,
                 "step": str(step),
                 "reason": None,
-                **{name: str(value) for name, value in sticking.proof.held.noise.items()},
+                **{name: str(value) for name, value in sticking.proof.sampled_loop.noise.items()},
                 "rho": str(smallest_root(sticking.controller.scale)),
                 **_origin(base),
             }
@@ -184,9 +184,9 @@ def _compensated(
         return _scaled(problem, base, certificate, runs=none)
     details = {
         "objective": problem.objective,
-        "step": str(designed.runs.held.step),
+        "step": str(designed.runs.sampled_loop.step),
         "reason": designed.reason or None,
-        **{name: str(value) for name, value in designed.runs.held.noise.items()},
+        **{name: str(value) for name, value in designed.runs.sampled_loop.noise.items()},
         "rho": str(smallest_root(made.controller.scale)),
         **_origin(base),
         **without,

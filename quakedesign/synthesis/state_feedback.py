@@ -17,7 +17,7 @@ from quakedesign.guarantees import (
     TrackingProof,
     best_guarantee,
     certified_peaks,
-    design_held,
+    design_sampled_law,
     sampled_design,
     with_worst_case,
 )
@@ -35,7 +35,7 @@ from quakedesign.laws.feed_forward import NONE
 from quakedesign.linear.linear_problem import FeedbackLoop, LinearProblem, Matrix
 from quakedesign.linear.riccati import RiccatiDesign, riccati_design
 from quakedesign.linear.robust_stability import finished_exactly, robust_stability, sector_loop, why_undecided
-from quakedesign.linear.sampled_stability import HeldLoop, sampled_loop
+from quakedesign.linear.sampled_stability import SampledStability, sampled_stability
 from quakedesign.loop.loop_setup import MEASURED, LoopSetup
 from quakedesign.loop.sensing.differentiator import by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
@@ -87,9 +87,9 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         """Certified peaks in continuous time."""
         return certified_peaks(fault, controller, disturbance_class=disturbance_class)
 
-    def held_loop(self, fault: Fault, controller: ExtendedLQR) -> HeldLoop | None:
+    def sampled_stability(self, fault: Fault, controller: ExtendedLQR) -> SampledStability | None:
         """Stability of the unchanged law with zero-order hold over the fault's T_s."""
-        return sampled_loop(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
+        return sampled_stability(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
 
     def sampled(
         self, fault: Fault, task: FaultPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
@@ -106,16 +106,16 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
             if differs and (reason := why_no_law(step, setup.measured, exact)):
                 return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
             summed = by_differences(summed, step) if differs else summed
-            proof = best_guarantee(task, exact.held(summed, step))
-            if proof.found:
+            proof = best_guarantee(task, exact.with_law(summed, step))
+            if proof.available:
                 return with_worst_case(fault, proof)
             other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
-            if other.proof.found:
+            if other.proof.available:
                 return TrackingGuarantee(fault=fault, proof=proof, nearest=(GAINS, other.proof))
             return replace(other, proof=proof)
         entries: Any = {"measured": setup.measured, "setup": exact}
-        designed = design_held(task, step, objective=wanted.objective, **entries)
-        if designed.found:
+        designed = design_sampled_law(task, step, objective=wanted.objective, **entries)
+        if designed.available:
             return with_worst_case(fault, designed)
         if setup.longest_step or designed.pressed:
             nearest = nearest_setup(task, step, pressed=designed.pressed, **entries)
@@ -155,9 +155,9 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     without: dict[str, Any] = {}
     if problem.plant != TrackingProof.plant and may_stick(law, setup, problem.disturbance_class):
         sticking = design_stick_slip(task, step, **sticking_options(problem))
-        if sticking.found:
+        if sticking.available:
             details = {"objective": problem.objective, "step": str(step), "reason": None, "measured": setup.measured}
-            details |= {name: str(value) for name, value in sticking.held.noise.items()}
+            details |= {name: str(value) for name, value in sticking.sampled_loop.noise.items()}
             return problem.judged(sticking.controller, name=law.name, details=details, runs=sticking)
         without = {"not_at_rest": sticking.reason}
     exact = ExactSetup.of(setup)
@@ -167,13 +167,13 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     designed = sampled_design(task, step, problem.objective, measured=setup.measured, setup=exact)
     if designed.runs is None:
         return problem.undecided(law.name, designed.reason)
-    runs, held = designed.runs, designed.runs.held
+    runs, sampled_loop = designed.runs, designed.runs.sampled_loop
     details = {
         "objective": problem.objective,
-        "step": str(held.step),
+        "step": str(sampled_loop.step),
         "reason": designed.reason or None,
         "measured": setup.measured,
-        **{name: str(value) for name, value in (*held.noise.items(), *held.path.items()) if value},
+        **{name: str(value) for name, value in (*sampled_loop.noise.items(), *sampled_loop.path.items()) if value},
         **without,
     }
     return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=designed.premises())
@@ -193,16 +193,18 @@ def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: typ
     result = guarantee_sliding(
         fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
     )
-    reason = result.proof.reason if not result.proof.found else None
-    if result.held is None:
+    reason = result.proof.reason if not result.proof.available else None
+    if result.sampled_loop is None:
         return problem.undecided(law.name, str(reason), sliding=result)
     near = quantity(float(path) ** 0.5, "m")
     assumed = (
         None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):.3g} s ({near} at D = 1 m^2/s)"
     )
-    details = {"step": str(result.held.step), "diffusion": str(path), "measured": MEASURED[1]}
+    details = {"step": str(result.sampled_loop.step), "diffusion": str(path), "measured": MEASURED[1]}
     details |= {name: text for name, text in {"assumed": assumed, "reason": reason}.items() if text}
-    return problem.judged(result.held.controller, name=law.name, details=details, runs=result.proof, sliding=result)
+    return problem.judged(
+        result.sampled_loop.controller, name=law.name, details=details, runs=result.proof, sliding=result
+    )
 
 
 def _continuous(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:

@@ -265,8 +265,8 @@ def test_limits_are_written_where_a_folder_is_given(call, monkeypatch, tmp_path)
 )
 def test_what_a_proof_does_not_know_of_a_run_is_named(changed, outside):
     """Delay 20 ms and lag 2 s, and from initial errors of at most 1 mm and 1 cm/s."""
-    held = SimpleNamespace(path={"delay": F(1, 50), "lag": F(2)}, start=(F(1, 1000), F(1, 100)))
-    claim = SimpleNamespace(held=held, plant="printed")
+    held = SimpleNamespace(path={"delay": F(1, 50), "lag": F(2)}, initial_errors=(F(1, 1000), F(1, 100)))
+    claim = SimpleNamespace(sampled_loop=held, plant="printed")
     assert simulate_commands._outside(changed, claim, "printed") == outside
     asked = {**changed, "plant": "printed"}  # what ran counts, not what was asked for
     named = simulate_commands._outside(asked, claim, "stick-slip")

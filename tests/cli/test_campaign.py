@@ -182,9 +182,9 @@ def test_a_sample_is_run_again_by_its_number_or_its_name(tmp_path):
         return SimpleNamespace(outcome=outcome, metrics=metrics, events={"opening": 1.0}, save=lambda path: path)
 
     done = SimpleNamespace(trajectory=trajectory)
-    assert simulate_commands._again(done, None, tmp_path) == {}
+    assert simulate_commands._rerun(done, None, tmp_path) == {}
     for told, index in (("12", 12), ("search-3", "search-3")):
-        (again,) = simulate_commands._again(done, told, tmp_path).values()
+        (again,) = simulate_commands._rerun(done, told, tmp_path).values()
         assert (again["index"], again["metrics"], again["outcome"]) == (told, {"of": index}, {"of": index})
         assert (again["file"], again["events"]) == (str(tmp_path / f"sample-{told}.nc"), {"opening": 1.0})
 

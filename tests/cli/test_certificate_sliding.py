@@ -45,11 +45,11 @@ def told(capsys, *arguments):
 @pytest.mark.slow
 def test_it_runs_with_its_step_and_rock_under_all_the_stress_that_it_is_proved_for(capsys):
     code, out, err = told(capsys, "simulate", "crustal-patch", "--certificate", FILE, *SHORT, "--json")
-    answer, held, stress = json.loads(out), CLAIM.held, float(CLAIM.task.stress)
+    answer, held, stress = json.loads(out), CLAIM.sampled_loop, float(CLAIM.task.stress)
     assert (code, err, answer["guarantee"]["sentence"]) == (0, "", CLAIM.sentence())
     assert (answer["step"], answer["diffusion"]) == (float(held.step), float(held.diffusion))
     same = qd.simulate(CRUSTAL, CLAIM.controller, duration=3 * 3600.0, tide=Tide(amplitude=stress, period=TIDE))
-    assert answer["metrics"]["max_asked"] == pytest.approx(float(np.max(np.abs(same.asked))), rel=1e-9)
+    assert answer["metrics"]["max_asked"] == pytest.approx(float(np.max(np.abs(same.feedback_pressure))), rel=1e-9)
     assert answer["stress"] == pytest.approx(float(np.max(np.abs(same.stress))), rel=1e-9)
     code, out, _ = told(
         capsys, "simulate", "crustal-patch", "--certificate", FILE, *SHORT, "--stress", "1 kPa", "--controller", "elqr"
@@ -91,7 +91,9 @@ def test_it_is_for_its_fault_and_as_it_is(capsys, fault, more, said):
 
 
 def test_a_delay_and_noise_of_the_proof_are_in_the_run(capsys, monkeypatch, tmp_path):
-    late = replace(CLAIM, held=replace(CLAIM.held, delay=CLAIM.held.step, slip_noise=F(1, 10**6)))
+    late = replace(
+        CLAIM, sampled_loop=replace(CLAIM.sampled_loop, delay=CLAIM.sampled_loop.step, slip_noise=F(1, 10**6))
+    )
     assert run_sliding(CRUSTAL, claim=late, duration=1000.0)[1]["stages"] == ["delay"]
     save_guarantee(late, tmp_path / "late.json")
     monkeypatch.setattr(type(CLAIM), "check", lambda claim: Verdict.PROVED)
@@ -163,10 +165,10 @@ def test_a_fault_within_the_box_of_a_proof_runs_with_the_plan_of_the_proof(capsy
     found = run_sliding(true, claim=claim, stress=1000.0, duration=3000.0)[0]
     expected = simulate_sliding(
         CRUSTAL,
-        CLAIM.held.law,
-        CLAIM.held.step,
-        lag=CLAIM.held.lag,
-        diffusion=CLAIM.held.diffusion,
+        CLAIM.sampled_loop.law,
+        CLAIM.sampled_loop.step,
+        lag=CLAIM.sampled_loop.lag,
+        diffusion=CLAIM.sampled_loop.diffusion,
         tide=Tide(amplitude=1000.0, period=TIDE),
         variation=SlidingVariation(direct_effect=1.005),
         duration=3000.0,
@@ -185,7 +187,9 @@ def test_a_fault_within_the_box_of_a_proof_runs_with_the_plan_of_the_proof(capsy
 
 def test_a_sentence_names_the_noise_or_exact_measurements_and_the_slip_rounded_down():
     noisy = replace(
-        CLAIM, held=replace(CLAIM.held, slip_noise=F(1, 10**6)), task=replace(CLAIM.task, distance=F("0.12345"))
+        CLAIM,
+        sampled_loop=replace(CLAIM.sampled_loop, slip_noise=F(1, 10**6)),
+        task=replace(CLAIM.task, distance=F("0.12345")),
     )
     for claim, said, slip in (
         (CLAIM, "with exact measurements of slip", "1 m"),

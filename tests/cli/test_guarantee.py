@@ -170,7 +170,7 @@ def test_gains_that_do_not_hold_the_nominal_fault_either(call, tmp_path):
 
 def test_where_no_controller_can_hold_the_fault_the_nearest_rock_that_is_proved_is_named(call, monkeypatch):
     stored = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
-    near = replace(stored, held=replace(stored.held, diffusion=F(7)))
+    near = replace(stored, sampled_loop=replace(stored.sampled_loop, diffusion=F(7)))
     monkeypatch.setattr(GUARANTEE, "nearest_setup", lambda *_, **__: ("diffusion", near))
     code, out, _ = call("real-fault", "--diffusion", "180 s")
     assert code == 1
@@ -342,7 +342,7 @@ def test_noise_that_is_none_is_refused_in_a_line(call, options, said):
 def test_gains_that_know_nothing_of_the_rock_say_what_fails(call, monkeypatch):
     none = NoProof(reason="a design through rock is another test's")
     family = import_module("quakedesign.synthesis.state_feedback")
-    for name, found in (("design_held", none), ("longest_step", None), ("nearest_setup", None)):
+    for name, found in (("design_sampled_law", none), ("longest_step", None), ("nearest_setup", None)):
         monkeypatch.setattr(family, name, lambda *_, a=found, **__: a)
     code, out, _ = call("real-fault", "--gains", *GAINS, "--diffusion", "1 s")
     assert code == 1

@@ -14,7 +14,7 @@ from quakedesign.fault.fault_toml import fault_toml
 from quakedesign.guarantees import NoProof, SampledLoop, SlidingClaims, SlidingProof, sliding_result
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
-from quakedesign.guarantees.search.sliding_design import WellReach, proved_sliding
+from quakedesign.guarantees.search.sliding_design import FarthestWell, proved_sliding
 from quakedesign.laws import LinearLaw
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
@@ -61,7 +61,7 @@ def test_an_estimate_of_the_largest_stress_that_is_too_large_is_lowered_until_it
 
     def proved(task, design, *, log_rate):
         tried.append(task.stress)
-        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
+        return SlidingProof(task=task, sampled_loop=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
 
     monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
@@ -76,7 +76,7 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
 
     def proved(task, design, *, log_rate):
         tried.append((log_rate, task.stress))
-        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS)
+        return SlidingProof(task=task, sampled_loop=design, cuts=WHOLE, claims=CLAIMS)
 
     monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(stands[log_rate]))
@@ -99,8 +99,8 @@ def test_where_a_law_is_estimated_to_stand_no_stress_those_for_narrower_bounds_a
 def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monkeypatch):
     """Beyond 1.3e6 s for 25 kPa on this fault, whatever law is looked for."""
     monkeypatch.setattr(sliding_result, "designed_sliding", lambda *_, **__: NONE)
-    monkeypatch.setattr(sliding_result, "farthest", lambda *_, **__: WellReach(share=Fraction(1, 2)))
-    monkeypatch.setattr(sliding_result, "what_would_do", lambda *_, **__: "another")
+    monkeypatch.setattr(sliding_result, "farthest", lambda *_, **__: FarthestWell(share=Fraction(1, 2)))
+    monkeypatch.setattr(sliding_result, "possible_remedy", lambda *_, **__: "another")
     fault = load_fault("crustal-patch")
 
     def reason(diffusion, stress):
@@ -117,7 +117,7 @@ def test_a_well_that_is_impossible_is_said_to_be_that_before_what_would_do(monke
 
 def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
     def proved(task, design, *, log_rate):
-        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
+        return SlidingProof(task=task, sampled_loop=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 35_000 else NONE
 
     monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(20_000))
@@ -131,7 +131,7 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     with monkeypatch.context() as patched:
         found_below = lambda task, step, **around: HELD if task.stress < 35_000 else none  # noqa: E731
         patched.setattr(sliding_result, "designed_sliding", found_below)
-        patched.setattr(sliding_result, "farthest", lambda *_, **__: WellReach(share=Fraction(1)))
+        patched.setattr(sliding_result, "farthest", lambda *_, **__: FarthestWell(share=Fraction(1)))
         found = sliding_result.guarantee_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
     assert found.reason.startswith("no law was found that holds the fault under 40 kPa; a proof was found for a stress")
     monkeypatch.setattr(sliding_result, "proved_sliding", lambda task, design, *, log_rate: NONE)
@@ -141,7 +141,7 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
 def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch):
     def proved(task, design, *, log_rate):
         quiet = design.slip_noise <= Fraction(1, 10**7)
-        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if quiet else NONE
+        return SlidingProof(task=task, sampled_loop=design, cuts=WHOLE, claims=CLAIMS) if quiet else NONE
 
     design = lambda task, step, **more: replace(HELD, slip_noise=more["setup"].slip_noise)  # noqa: E731
     monkeypatch.setattr(sliding_result, "designed_sliding", design)
@@ -157,7 +157,7 @@ def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeyp
 
 def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.held)
+    found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.sampled_loop)
     assert found.reason.startswith("a stress of 5e+05 Pa is not shown to leave |ln(v/V)| below 0.5")
 
 
@@ -211,7 +211,7 @@ def test_the_slip_law_is_proved_with_a_smaller_bound_of_the_slip_rate_than_is_tr
 def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypatch):
     """The known law asks for -153 kPa to 3.713 MPa under 25 kPa; less stress asks for less."""
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: known.held)
+    monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: known.sampled_loop)
     monkeypatch.setattr(sliding_result, "proved_sliding", lambda task, held, log_rate: replace(known, task=task))
     monkeypatch.setattr(sliding_result, "largest_stress", lambda task, held, log_rate: Fraction(25000))
     least, largest = known.valve_pressures
@@ -231,7 +231,7 @@ def test_a_pump_that_cannot_hold_what_may_be_asked_for_has_no_guarantee(monkeypa
 
 def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch):
     def proved(task, design, *, log_rate):
-        return SlidingProof(task=task, held=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 38_000 else NONE
+        return SlidingProof(task=task, sampled_loop=design, cuts=WHOLE, claims=CLAIMS) if task.stress < 38_000 else NONE
 
     monkeypatch.setattr(sliding_result, "designed_sliding", lambda task, step, **around: HELD)
     monkeypatch.setattr(sliding_result, "largest_stress", lambda task, design, *, log_rate: Fraction(41_000))
@@ -246,7 +246,7 @@ def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch
     tried = [what for what in told if "stress" in what]
     assert [what.partition(" Pa")[0] for what in tried] == ["a stress of 4.1e+04"] * 2 + ["a stress of 3.6e+04"] * 2
     assert [what.rpartition(": ")[2] for what in tried] == ["proof", "not proved", "proof", "proved"]
-    missing = replace(known, proof=NONE, held=None)
+    missing = replace(known, proof=NONE, sampled_loop=None)
     monkeypatch.setattr(state_feedback, "guarantee_sliding", lambda *_, tell, **__: tell("a law", 0.5) or missing)
     synthesise(load_fault("crustal-patch"), "elqr", progress=lambda what, done: told.append(what))
     assert told[-1] == "a law"

@@ -24,7 +24,7 @@ KEYS = ("peak_slip_rate_error", "largest_step", "largest_delay", "largest_diffus
 def _quick(monkeypatch):
     monkeypatch.setattr("quakedesign.studies.performance_limits.natural_peak", lambda _fault: 0.05)
     monkeypatch.setattr(
-        "quakedesign.studies.performance_limits.design_held",
+        "quakedesign.studies.performance_limits.design_sampled_law",
         lambda *_, **__: NoProof(reason="none"),
     )
     for name in ("longest_step", "longest_delay", "farthest_rock"):
@@ -85,7 +85,7 @@ def test_a_disturbance_may_be_a_shear_stress(capsys):
 
 def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(capsys, monkeypatch, tmp_path):
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    answer = SlidingGuarantee(proof=known, task=known.task, held=known.held)
+    answer = SlidingGuarantee(proof=known, task=known.task, sampled_loop=known.sampled_loop)
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch", "--out", str(tmp_path / "limits")) == 0
     said = capsys.readouterr().out
@@ -117,7 +117,7 @@ def test_a_covered_spread_is_rounded_inward(half_width, said, capsys, monkeypatc
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     ranges = {name: ((1 - half_width) * low, (1 + half_width) * low) for name, (low, _) in known.task.ranges.items()}
     wide = replace(known, task=replace(known.task, ranges=ranges))
-    answer = SlidingGuarantee(proof=wide, task=wide.task, held=wide.held)
+    answer = SlidingGuarantee(proof=wide, task=wide.task, sampled_loop=wide.sampled_loop)
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **_: answer)
     assert run("crustal-patch") == 0
     assert f"for a, b and D_c with relative spreads of {said}, on" in " ".join(capsys.readouterr().out.split())
@@ -136,7 +136,7 @@ def test_noise_forbids_more(capsys):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (("crustal-patch", "--slip-noise", "1 um"), "no limit of slow sliding is known for noise"),
+        (("crustal-patch", "--slip-noise", "1 um"), "no performance limit of slow sliding with noise is known"),
         (("crustal-patch", "--stress", "0 Pa"), "stress must be positive"),
         (("real-fault", "--stress", "1 kPa"), "stress needs friction with a state"),
     ],
@@ -149,7 +149,7 @@ def test_a_stress_or_noise_that_does_not_apply_is_refused(given, said, capsys):
 def test_where_no_design_stands_a_stress_the_reason_is_told(capsys, monkeypatch):
     """A sampling time that suits no law would else look like a missing option."""
     none = NoProof(reason="T_s near 0.51 s suits")
-    answer = SlidingGuarantee(proof=none, task=None, held=None)
+    answer = SlidingGuarantee(proof=none, task=None, sampled_loop=None)
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **asked: answer)
     assert run("crustal-patch") == 2
     assert "no design was found that withstands any: T_s near 0.51 s suits. Give --stress" in capsys.readouterr().err
@@ -161,7 +161,7 @@ def test_without_a_real_growing_pole_it_is_not_said_that_nothing_grows(capsys, m
     patch = load_fault("double-direct-shear")
     file.write_text(fault_toml(patch))
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
-    answer = SlidingGuarantee(proof=known, task=known.task, held=known.held)
+    answer = SlidingGuarantee(proof=known, task=known.task, sampled_loop=known.sampled_loop)
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", lambda fault, **asked: answer)
     assert run(str(file)) == 0
     assert "errors of this fault oscillate while they grow, or do not grow" in " ".join(capsys.readouterr().out.split())
@@ -174,7 +174,7 @@ def test_both_sides_are_of_the_stress_that_the_design_behind_the_well_stands(mon
 
     def answered(fault, *, setup, **asked):
         found = known.get(setup.diffusion, NoProof(reason="too far"))
-        return SlidingGuarantee(proof=found, task=near.task, held=None)
+        return SlidingGuarantee(proof=found, task=near.task, sampled_loop=None)
 
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", answered)
     sides = {}
@@ -198,14 +198,15 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     def answered(fault, *, stress, spread, setup):
         asked.append(setup)
         spreads.append(spread)
-        return SlidingGuarantee(proof=known, task=known.task, held=known.held)
+        return SlidingGuarantee(proof=known, task=known.task, sampled_loop=known.sampled_loop)
 
     monkeypatch.setattr(impossible_and_proved, "guarantee_sliding", answered)
     patch = ("crustal-patch", "--stress", "25 kPa")
     assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert (
-        f"behind a diffusion path of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
+        f"behind a diffusion path of L^2/D = {float(known.sampled_loop.diffusion):.4g} s, for a, b and D_c as they are"
+        in told
     )
     assert "D = 2 m^2/s" in told
     assert run(*patch, "--diffusion", "9 s") == run(*patch, "--diffusivity", "2") == 0
@@ -220,7 +221,8 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     told = " ".join(capsys.readouterr().out.split())
     assert "L^2/D = 1e+10 s: INFEASIBLE for every controller" in told
     assert (
-        f"behind a diffusion path of L^2/D = {float(known.held.diffusion):.4g} s, for a, b and D_c as they are" in told
+        f"behind a diffusion path of L^2/D = {float(known.sampled_loop.diffusion):.4g} s, for a, b and D_c as they are"
+        in told
     )
     assert set(spreads) == {0}
     assert run(*patch, "--diffusion", "9 s", "--spread", "0.01") == 0
@@ -241,8 +243,8 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
 def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):
     """A well of 2 m at 0.5 m²/s is L²/D = 8 s; a mean over 0.02 s comes 0.01 s later."""
     told = {}
-    for name in ("design_held", "longest_step"):
-        none = NoProof(reason="none") if name == "design_held" else None
+    for name in ("design_sampled_law", "longest_step"):
+        none = NoProof(reason="none") if name == "design_sampled_law" else None
         monkeypatch.setattr(
             f"quakedesign.studies.performance_limits.{name}",
             lambda *_, n=name, a=none, **around: told.__setitem__(n, around) or a,
@@ -253,6 +255,6 @@ def test_designs_are_proved_with_the_whole_setup(monkeypatch, capsys):
     path = {name: Fraction(value) for name, value in (("delay", "0.03"), ("lag", "0.3"), ("diffusion", "8"))}
     times = {"jitter": Fraction(1, 1000), "averaging": Fraction(1, 50), "pump": Pump(rate=Fraction(2 * 10**6))}
     wanted = {"measured": "slip", "setup": ExactSetup(**path, **times, slip_noise=Fraction(5, 10**6))}
-    assert told == {"design_held": wanted | {"objective": "peak"}, "longest_step": wanted}
+    assert told == {"design_sampled_law": wanted | {"objective": "peak"}, "longest_step": wanted}
     assert run("lab-fault", "--jitter", "-1 s") == run("lab-fault", "--well", "0 m") == 2
     assert capsys.readouterr().err.count("\n") == 2

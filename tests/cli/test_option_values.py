@@ -466,7 +466,7 @@ def test_a_campaign_with_a_state_runs_what_is_designed(monkeypatch, controller, 
 def test_a_campaign_runs_a_certificate_without_delay_and_noise(delay, noise, refused):
     held = SimpleNamespace(delay=delay, slip_noise=noise)
     task = SimpleNamespace(ranges={"direct_effect": (F(3), F(5))}, stress=F(7))
-    claim = SimpleNamespace(held=held, task=task)
+    claim = SimpleNamespace(sampled_loop=held, task=task)
     if refused:
         with pytest.raises(ParameterError, match=f"a delay of {delay} s and slip noise of {noise} m"):
             options._of_proof(claim, "0", None)
@@ -481,7 +481,7 @@ def test_a_campaign_runs_a_certificate_without_delay_and_noise(delay, noise, ref
 )
 def test_a_reading_is_off_by_the_noise_of_the_proof_unless_a_transducer_is_given(monkeypatch, given, noise, quantum):
     held = SimpleNamespace(step=F(1, 2), slip_noise=noise)
-    claim = SimpleNamespace(held=held, task=SimpleNamespace(stress=F(3)))
+    claim = SimpleNamespace(sampled_loop=held, task=SimpleNamespace(stress=F(3)))
     asked = {}
     monkeypatch.setattr(options, "_instruments", lambda _, told, __: asked.update(told) or {"transducer": given})
     command = {"law": SimpleNamespace(choose=lambda _: SimpleNamespace(claim=claim)), "state": StateOptions()}

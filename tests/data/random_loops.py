@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import SampledLoop, SlowGain
+from quakedesign.guarantees import SampledLoop, VaryingGain
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import summed_integrals
@@ -37,7 +37,7 @@ def random_task(number: int) -> tuple[FaultPlant, F]:
     ), F(f"{random.uniform(0.05, 0.3):.3f}")
 
 
-def random_loop(number: int) -> tuple[FaultPlant, SampledLoop, SlowGain | None] | None:
+def random_loop(number: int) -> tuple[FaultPlant, SampledLoop, VaryingGain | None] | None:
     """A loop of any kind, with or without delay, lag, diffusion, noise and initial errors; None without a law."""
     random = np.random.default_rng(10**6 + number)
     task, step = random_task(number)
@@ -75,5 +75,5 @@ def random_loop(number: int) -> tuple[FaultPlant, SampledLoop, SlowGain | None] 
     except LinAlgError:  # of a Riccati equation
         return None
     if random.random() < 0.3:
-        slow = SlowGain(parts=int(random.integers(1, 4)), growth=short(random.uniform(0.01, 0.1) / period))
+        slow = VaryingGain(parts=int(random.integers(1, 4)), growth=short(random.uniform(0.01, 0.1) / period))
     return task, SampledLoop(law=law, step=step, **around), slow

@@ -144,7 +144,7 @@ def without(text, start):
         (TEXT.replace('"45 MPa"', '"-45 MPa"'), "block 2: effective_normal_stress must be positive"),
         (TEXT.replace('law = "linear-slip-weakening"', 'law = "linear"'), "block 3: friction law"),
         (TEXT.replace('length = "2 km"', 'length = "nan m"'), "block 1: length must be positive and finite"),
-        (TEXT.replace('"45 MPa"', '"1e300 Pa"'), "block 2: effective_normal_stress must be of a size"),
+        (TEXT.replace('"45 MPa"', '"1e300 Pa"'), "block 2: effective_normal_stress must have a magnitude"),
         (TEXT.replace('position = "1 km"', 'position = "inf m"'), "well 1: position must be zero or positive, and fin"),
         (TEXT.replace('position = "1 km"', 'position = "-1 m"'), "well 1: position must be zero or positive"),
         (TEXT.replace('position = "1 km"', 'position = "2.5 km"'), "Received 2500, 2500, 4250 m. Sort the wells"),

@@ -56,7 +56,7 @@ def test_ordinary_sizes():
     require_ordinary(zero=0, small=1e-40, large=-1e40)
     require_ordinary(0, tiny=1e-300)
     for value in (1e41, -1e41, 1e-41):
-        with pytest.raises(ParameterError, match="it must be of a size between"):
+        with pytest.raises(ParameterError, match="it must have a magnitude between"):
             require_ordinary(it=value)
 
 

@@ -177,7 +177,7 @@ WRONG = {
     "number as name": ('name = "real-fault"', "name = 3", ScenarioError, "name must be a text. Received 3"),
     "no operation": ("184.17 hour", "0 hour", ParameterError, "operation_time must be positive"),
     "coarse sampling": ("184 ms", "1 hour", ParameterError, "sampling_time must be at most a thousandth"),
-    "overflow": (LENGTH, 'length = "1e300 m"', ParameterError, "of a size between"),
+    "overflow": (LENGTH, 'length = "1e300 m"', ParameterError, "a magnitude between"),
     "hertz": ("0.69 rad/s", "0.11 Hz", UnitError, "frequency must be an angular frequency"),
     "broken TOML": (LENGTH, 'length = "5 km', ScenarioError, "own.toml is not valid TOML"),
     "unit without quotes": (LENGTH, "length = 5 km", ScenarioError, "Values with a unit are in quotes"),
@@ -406,9 +406,9 @@ def test_a_push_is_not_negative_and_friction_with_a_state_has_a_stress_of_its_ow
 )
 def test_a_stress_that_no_fault_feels_is_refused_by_its_size(stress, density, said):
     text = edited(AMPLITUDE, f'amplitude = "{stress}"').replace("2500 kg", f"{density} kg")
-    with pytest.raises(ParameterError, match=f"{said} must be of a size between 1e-40 and 1e.40 in SI units"):
+    with pytest.raises(ParameterError, match=f"{said} must have a magnitude between 1e-40 and 1e.40 in SI units"):
         parse_fault(text, "own.toml")
-    with pytest.raises(ParameterError, match=r"(amplitude|density) must be of a size"):
+    with pytest.raises(ParameterError, match=r"(amplitude|density) must have a magnitude"):
         parse_fault(edited(AMPLITUDE, 'amplitude = "1e200 Pa"').replace("2500 kg", "1e-250 kg"), "own.toml")
 
 

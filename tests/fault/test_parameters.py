@@ -126,13 +126,13 @@ def test_damping_may_vanish_but_not_be_negative():
     "extreme", [{"length": 1e300}, {"length": 1e-150}, {"density": 1e300, "length": 1e6}, {"shear_modulus": 1e307}]
 )
 def test_numbers_that_overflow_are_refused(extreme):
-    with pytest.raises(ParameterError, match="must be of a size between 1e-40 and 1e\\+40 in SI units"):
+    with pytest.raises(ParameterError, match="must have a magnitude between 1e-40 and 1e\\+40 in SI units"):
         replace(REAL, **extreme)
 
 
 @pytest.mark.parametrize("name", ["constant", "amplitude", "frequency", "slip_growth", "rate_growth"])
 def test_a_disturbance_of_no_size_is_refused(name):
-    with pytest.raises(ParameterError, match=f"{name} must be of a size between"):
+    with pytest.raises(ParameterError, match=f"{name} must have a magnitude between"):
         Disturbance(**{name: 3.2e160})
 
 

@@ -26,7 +26,7 @@ def stored(kind):
     """Claim of the first stored certificate of a kind, on the stick-slip plant of a linear law."""
     named = (path for path in sorted(PROOFS.glob("*.json")) if f'"kind": "{kind}"' in path.read_text())
     claims = map(qd.load_guarantee, named)
-    return next(claim for claim in claims if kind != "stick_slip" or not claim.held.law.pull)
+    return next(claim for claim in claims if kind != "stick_slip" or not claim.sampled_loop.law.pull)
 
 
 def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si(monkeypatch):
@@ -35,7 +35,7 @@ def test_each_kind_of_result_has_the_bounds_of_its_claims_in_si(monkeypatch):
     seen = WorstCase(slip_error=3e-6, slip_behind=1e-6, slip_ahead=3e-6, peak_slip_rate=2e-6)
     monkeypatch.setattr(tracking_result, "worst_tracking", lambda *_, **__: replace(seen, slip_rate_error=1e-6))
     stick_slip = StickSlipGuarantee(fault=FAULT, proof=sticking, worst=seen)
-    sliding = SlidingGuarantee(proof=slow, task=slow.task, held=slow.held)
+    sliding = SlidingGuarantee(proof=slow, task=slow.task, sampled_loop=slow.sampled_loop)
     common = {"slip_error", "peak_slip_rate", "least_pressure", "largest_pressure"}
     for result in (printed, stick_slip, sliding):
         assert common <= result.bounds.keys()
@@ -77,7 +77,7 @@ def test_check_of_a_result_is_that_of_its_certificate(monkeypatch):
 
 def test_a_result_is_saved_as_a_certificate_and_read_again(tmp_path):
     slow = stored("slow_sliding")
-    SlidingGuarantee(proof=slow, task=slow.task, held=slow.held).save(tmp_path / "proof.json")
+    SlidingGuarantee(proof=slow, task=slow.task, sampled_loop=slow.sampled_loop).save(tmp_path / "proof.json")
     assert qd.load_guarantee(tmp_path / "proof.json") == slow
 
 
@@ -112,7 +112,7 @@ def test_worst_slow_sliding_is_given_by_name(monkeypatch):
     slow = stored("slow_sliding")
     seen = WorstCase(log_rate=0.1, slip_error=2e-6)
     monkeypatch.setattr("quakedesign.guarantees.sliding_result.worst_sliding", lambda _: seen)
-    assert SlidingGuarantee(proof=slow, task=slow.task, held=slow.held).worst_case == {
+    assert SlidingGuarantee(proof=slow, task=slow.task, sampled_loop=slow.sampled_loop).worst_case == {
         "log_rate": 0.1,
         "slip_error": 2e-6,
     }

@@ -17,7 +17,7 @@ MODULE = import_module("quakedesign.guarantees.tracking_result")
 FILE = Path(__file__).parents[2] / "proofs" / "certificates" / "guarantee_real-fault.json"
 REAL = load_fault("real-fault")
 SLOW = parse_guarantee(FILE.read_text())
-WIDE = guarantee(SLOW.task, SLOW.held)
+WIDE = guarantee(SLOW.task, SLOW.sampled_loop)
 ANYHOW = WIDE.claims
 
 
@@ -49,7 +49,7 @@ def test_claims_that_no_course_leaves_stay(monkeypatch):
 def test_a_claim_that_a_course_with_stick_leaves_is_that_of_any_gain(monkeypatch, slip, rate, left):
     found = stuck(monkeypatch, slip, rate)
     assert not found.leaves_with_stick
-    assert (found.proof.check(), found.proof.slow_gain) == (Verdict.PROVED, SLOW.slow_gain)
+    assert (found.proof.check(), found.proof.varying_gain) == (Verdict.PROVED, SLOW.varying_gain)
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure"):
         assert getattr(found.proof.claims, name) == getattr(ANYHOW if name in left else SLOW.claims, name)
 

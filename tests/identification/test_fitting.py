@@ -84,7 +84,7 @@ def test_three_samples_a_coordinate_are_enough():
     measured = np.array([0.1, 0.0, 0.3, 0.2, 0.5, 0.4])
     found = fit(line(6), measured, seed=0)
     assert found.fitted == pytest.approx(np.polyfit(range(6), measured, 1)[::-1], abs=1e-6)
-    with pytest.raises(RecordError, match="at least 6 samples for what is fitted"):
+    with pytest.raises(RecordError, match="at least 6 samples for the fitted parameters"):
         fit(line(5), measured[:5], seed=0)
 
 

@@ -9,13 +9,13 @@ from quakedesign import simulate
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.guarantees.search.compensated_search import implicit_pull
-from quakedesign.laws import ImplicitRoot, Power, compensated, control_law
-from quakedesign.laws.implicit_root import pulled, root_of
+from quakedesign.laws import ImplicitStep, Power, compensated, control_law
+from quakedesign.laws.implicit_root import pulled, step_solution
 from quakedesign.loop import simulation_scheme
 
 STEP, AUTHORITY, WEIGHT = F("0.184"), F("2.25e-8"), F("0.3")
 GAIN = STEP * AUTHORITY
-ROOT = ImplicitRoot(pull=(Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),))
+ROOT = ImplicitStep(pull=(Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),))
 
 
 def matrices(law):
@@ -93,7 +93,7 @@ def test_roots_in_arrays_solve_their_equation():
     pull, step = implicit_pull(law, STEP, AUTHORITY), float(STEP)
     random = np.random.default_rng(2)
     e1, e2 = random.standard_normal((2, 400)) * 10.0 ** random.uniform(-8, 0, (2, 400))
-    w = root_of(pull, step, e1, e2)
+    w = step_solution(pull, step, e1, e2)
     held = np.abs(e1 + step * w) <= 4e-16 * np.abs(e1)
     assert 40 < held.sum() < 360
     residual = np.abs(w - e2 + pulled(pull, e1 + step * w, w))[~held & (w != 0)]

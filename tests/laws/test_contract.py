@@ -101,7 +101,7 @@ def test_gains_are_exact_and_in_order(law):
 
 def test_gains_without_names_are_refused(law):
     for given in (None, 3, ["1"], "1"):
-        with pytest.raises(ParameterError, match=rf"gains of {law.name} must be a mapping.*Take from_values"):
+        with pytest.raises(ParameterError, match=rf"gains of {law.name} must be a mapping.*Use from_values"):
             law(gains=given)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.laws import ImplicitRoot, Power
-from quakedesign.laws.implicit_root import pulled, root_of
+from quakedesign.laws import ImplicitStep, Power
+from quakedesign.laws.implicit_root import pulled, step_solution
 
 STEP = 0.25
 ERRORS = np.array([[e1, e2] for e1 in (-2.0, -0.3, 0.0, 1e-9, 0.7, 5.0) for e2 in (-3.0, -0.2, 0.0, 0.4, 8.0)]).T
@@ -62,14 +62,14 @@ STEPS = {
 
 @pytest.mark.parametrize(("pull", "root"), STEPS.values(), ids=STEPS)
 def test_ends_of_steps_known_in_closed_form(pull, root):
-    assert np.allclose(root_of(pull, STEP, *ERRORS), root(*ERRORS), rtol=1e-12, atol=2e-14)
+    assert np.allclose(step_solution(pull, STEP, *ERRORS), root(*ERRORS), rtol=1e-12, atol=2e-14)
 
 
 def test_a_sign_of_the_slip_holds_it_exactly_as_far_as_it_reaches():
     """With a root beside it, which vanishes there; at both ends of its reach, too."""
     e1, e2 = np.array([0.3, -0.1, 0.0, 0.25, -0.25]), np.array([0.1, 1.0, 0.5, 1.0, -1.0])
     pull = power("slip", 0, 2), power("slip", F(1, 3))
-    assert np.array_equal(root_of(pull, STEP, e1, e2), -e1 / STEP)
+    assert np.array_equal(step_solution(pull, STEP, e1, e2), -e1 / STEP)
 
 
 def test_a_pull_is_the_middle_of_its_factors():
@@ -79,9 +79,9 @@ def test_a_pull_is_the_middle_of_its_factors():
 
 
 def test_slopes_have_a_middle_and_half_a_range():
-    root = ImplicitRoot(pull=(power("slip"),), slopes=(F(1, 4), F(3, 4)), remainder=F(2))
+    root = ImplicitStep(pull=(power("slip"),), slopes=(F(1, 4), F(3, 4)), remainder=F(2))
     assert (root.middle, root.half_range) == (F(1, 2), F(1, 4))
-    plain = ImplicitRoot(pull=(power("slip"),))
+    plain = ImplicitStep(pull=(power("slip"),))
     assert (plain.middle, plain.half_range, plain.remainder) == (1, 0, 0)
 
 
@@ -111,15 +111,15 @@ def test_terms_that_are_not_sound_are_refused(wrong):
 
 def test_terms_are_counted_within_each_other():
     inner = (power("slip"),) * 7
-    assert len(ImplicitRoot(pull=(power(inner), power(inner))).pull) == 2
+    assert len(ImplicitStep(pull=(power(inner), power(inner))).pull) == 2
     for pull in ((), (power(inner), power((*inner, power("rate")))), (power("slip"),) * 17):
         with pytest.raises(ParameterError, match="1 to 16 terms"):
-            ImplicitRoot(pull=pull)
+            ImplicitStep(pull=pull)
 
 
 @pytest.mark.parametrize("slopes", [(F(0), F(1)), (F(1, 2), F(1, 2)), (F(0), F(0))])
 def test_slopes_that_are_ordered_within_the_unit_interval_are_taken(slopes):
-    assert ImplicitRoot(pull=(power("slip"),), slopes=slopes).slopes == slopes
+    assert ImplicitStep(pull=(power("slip"),), slopes=slopes).slopes == slopes
 
 
 @pytest.mark.parametrize(
@@ -133,4 +133,4 @@ def test_slopes_that_are_ordered_within_the_unit_interval_are_taken(slopes):
 )
 def test_lines_that_hold_no_root_are_refused(wrong):
     with pytest.raises(ParameterError, match="slopes of an implicit step"):
-        ImplicitRoot(pull=(power("slip"),), **wrong)
+        ImplicitStep(pull=(power("slip"),), **wrong)

@@ -6,10 +6,10 @@ from random import Random
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.laws import ErrorModel, ImplicitRoot, LinearLaw, Power, disturbance_estimate, summed_integrals
+from quakedesign.laws import ErrorModel, ImplicitStep, LinearLaw, Power, disturbance_estimate, summed_integrals
 from quakedesign.loop import PeriodicLoop, Segment
 
-ROOT = ImplicitRoot(pull=(Power(factor=(F(1), F(1)), exponent=F(1), argument="slip"),))
+ROOT = ImplicitStep(pull=(Power(factor=(F(1), F(1)), exponent=F(1), argument="slip"),))
 
 
 def some(random):
@@ -109,14 +109,14 @@ def sizes(n, seen=2):
 
 
 def test_as_many_states_as_are_said_fit():
-    assert LinearLaw(**sizes(12)).root is None
-    assert len(LinearLaw(**sizes(2, 3), root=ROOT).feedback) == 3
+    assert LinearLaw(**sizes(12)).implicit_step is None
+    assert len(LinearLaw(**sizes(2, 3), implicit_step=ROOT).feedback) == 3
 
 
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        (sizes(13), "needs at most 12 states .*Received 13"),
+        (sizes(13), "must have at most 12 states, .*Received 13"),
         (sizes(2, 3), "matrix G of a linear law with 2 states must be 2 × 2. Received 2 rows of 3, 3 entries"),
         (sizes(2) | {"states": ("z", "z")}, "different names. Received 2: z, z"),
         (sizes(2) | {"update": ((F(0), F(0)), (F(0),))}, "matrix F .* 2 × 2. Received 2 rows of 2, 1 entries"),
@@ -125,7 +125,7 @@ def test_as_many_states_as_are_said_fit():
         (sizes(2) | {"measured": ((F(0), F(0)),)}, "matrix G .* Received 1 rows of 2 entries"),
         (sizes(2) | {"output": (F(1),)}, "matrix C .* 1 × 2. Received 1 rows of 1 entries"),
         (sizes(2) | {"feedback": (F(1),)}, "matrix D .* 1 × 2. Received 1 rows of 1 entries"),
-        (sizes(2) | {"root": ROOT}, "matrix G of a linear law with 2 states must be 2 × 3"),
+        (sizes(2) | {"implicit_step": ROOT}, "matrix G of a linear law with 2 states must be 2 × 3"),
     ],
 )
 def test_sizes_that_do_not_fit_are_refused(wrong, said):
@@ -138,7 +138,7 @@ def test_a_law_of_the_slip_alone_reads_no_slip_rate():
     assert LinearLaw(**blind).of_slip_alone is True
     assert LinearLaw(**sizes(1)).of_slip_alone is False
     assert LinearLaw(**blind | {"measured": ((F(0), F(2)),)}).of_slip_alone is False
-    assert LinearLaw(**sizes(1, 3) | {"feedback": (F(1), F(0), F(1))}, root=ROOT).of_slip_alone is False
+    assert LinearLaw(**sizes(1, 3) | {"feedback": (F(1), F(0), F(1))}, implicit_step=ROOT).of_slip_alone is False
 
 
 def test_a_period_is_the_sum_of_its_parts():

@@ -131,7 +131,7 @@ def test_on_a_fault_that_sticks_the_pressure_stays_where_it_is_proved_to_stay(pr
     """Ahead of a reference that comes to rest the fault rests for ever: the pressure without limits goes on to fall."""
     claims = proved.claims
     free, limited = (
-        simulate(REAL, one.controller, plant="stick-slip", samples=20_000) for one in (proved.held, proved)
+        simulate(REAL, one.controller, plant="stick-slip", samples=20_000) for one in (proved.sampled_loop, proved)
     )
     assert free.pressure.min() < 1.2 * float(claims.least_pressure)
     assert limited.pressure.min() > claims.least_pressure
@@ -174,13 +174,13 @@ def test_a_guarantee_has_limits_of_what_it_proves(proved):
         rest = 50e6 - (0.3353 * 50e6 - k / n * 30e9 / 5000 * slip) / friction
         steepest = max(steepest, float(np.abs(np.diff(rest) / np.diff(slip)).max()))
     assert steepest <= limit.per_slip <= 3 * steepest
-    late = replace(claim, held=replace(claim.held, delay=F(100)))  # so that it counts in four digits
+    late = replace(claim, sampled_loop=replace(claim.sampled_loop, delay=F(100)))  # so that it counts in four digits
     more = float(limit.per_slip * claim.task.reference_rates[0] * 100)
     assert float(late.rest_limit.width - limit.width) == pytest.approx(more, rel=0.01)
-    assert claim.controller == replace(claim.held.controller, rest_limit=limit)
+    assert claim.controller == replace(claim.sampled_loop.controller, rest_limit=limit)
     way = float(claim.task.reference_rates[0]) * 0.184
     assert float(limit.resolution) == pytest.approx(way / 100, rel=1e-3)
-    noisy = replace(claim, held=replace(claim.held, slip_noise=F(1, 10**6)))
+    noisy = replace(claim, sampled_loop=replace(claim.sampled_loop, slip_noise=F(1, 10**6)))
     assert float(noisy.rest_limit.resolution) == pytest.approx(2e-6 + way / 100, rel=1e-3)
 
 
@@ -206,11 +206,11 @@ def test_a_guarantee_cuts_off_what_it_proves_never_to_be_passed(proved):
     claims, limit, way = proved.claims, proved.rest_limit, proved.claims.peak_slip_rate * STEP
     assert (limit.least, limit.largest) == (claims.least_pressure, claims.largest_pressure)
     assert way <= limit.fastest <= way * F(1001, 1000)
-    off = replace(proved, held=replace(proved.held, slip_noise=F(1), jitter=F(1, 100)))
+    off = replace(proved, sampled_loop=replace(proved.sampled_loop, slip_noise=F(1), jitter=F(1, 100)))
     moved = 2 + proved.claims.peak_slip_rate * (STEP + F(2, 100))
     assert moved <= off.rest_limit.fastest <= moved * F(1001, 1000)
     late = replace(claims, least_asked=LowerBound(-(10**8)), largest_asked=UpperBound(10**8))
-    behind = replace(proved, claims=late, held=replace(proved.held, lag=F(1))).rest_limit
+    behind = replace(proved, claims=late, sampled_loop=replace(proved.sampled_loop, lag=F(1))).rest_limit
     assert (behind.least, behind.largest) == (-(10**8), 10**8)  # of the valve, where the law acts
 
 
@@ -225,7 +225,7 @@ def test_where_the_fault_sticks_no_course_takes_the_pressure_beyond_what_is_cert
 
 def test_an_independent_adversary_does_not_leave_the_certified_pressure(proved):
     """Pushes at random ends from the end of the task on, where p* is lowest, on the stick-slip plant in plain Euler."""
-    law, limit, authority = proved.held.law, proved.rest_limit, float(proved.task.authority)
+    law, limit, authority = proved.sampled_loop.law, proved.rest_limit, float(proved.task.authority)
     rows, seen, output, fed = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
     told = np.array(law.applied, dtype=float)
     random, low, high = np.random.default_rng(11), *(float(p) for p in proved.task.rest_pressure)
@@ -258,14 +258,14 @@ def test_an_independent_adversary_does_not_leave_the_certified_pressure(proved):
 
 def test_the_adversary_s_limit_is_that_of_the_run(proved):
     """Of random errors while the reference goes at its largest rate: pressures and states of both, sample by sample."""
-    task, law, random = proved.task, proved.held.law, np.random.default_rng(2)
+    task, law, random = proved.task, proved.sampled_loop.law, np.random.default_rng(2)
     authority, pace = float(task.authority), float(task.reference_rates[0])
     exact = RestLimit(
         width=F(4000), per_slip=task.drift / task.authority / task.reference_rates[0], resolution=F(1, 10**6)
     )
     controller = replace(proved.controller, rest_limit=exact)
     limit = replace(
-        _Limit.of(proved, proved.held, 6, np.array([pace])),
+        _Limit.of(proved, proved.sampled_loop, 6, np.array([pace])),
         width=4000 * authority,
         moved=0.0,
         rests=np.array([1e-6 - pace * 0.184]),
@@ -300,20 +300,20 @@ def test_what_the_adversary_cuts_off_moves_all_that_stands_at_the_valve(proved):
         ({"diffusion": F(1)}, {"valve": 1.0, "stepped": 1.0, "e2": -gain * float(layer.area), **modes}),
         ({"diffusion": F(1), "delay": F("0.1")}, {"waiting0": 1.0}),
     )
-    own = dict(zip(("predicted_rate", "disturbance"), proved.held.law.applied, strict=True))
+    own = dict(zip(("predicted_rate", "disturbance"), proved.sampled_loop.law.applied, strict=True))
     asked = {"least_asked": LowerBound(-(10**8)), "largest_asked": UpperBound(10**8)}
     for around, expected in cases:
         behind = any(name != "delay" for name in around)
         claims = replace(proved.claims, **(asked if behind else {}))
-        claim = replace(proved, claims=claims, held=replace(proved.held, **around))
+        claim = replace(proved, claims=claims, sampled_loop=replace(proved.sampled_loop, **around))
         states = claim.loop.states
-        told = _Limit.of(claim, claim.held, len(states) + 1, np.zeros(1)).correction
+        told = _Limit.of(claim, claim.sampled_loop, len(states) + 1, np.zeros(1)).correction
         expected |= {name: float(v / proved.task.authority) for name, v in own.items()}
         assert told == pytest.approx([expected.get(name, 0.0) for name in (*states, "disturbance of the class")])
 
 
 def test_where_p_star_drifts_all_pressures_that_count_from_it_move(proved):
-    limit = replace(_Limit.of(proved, proved.held, 6, np.array([0.0])).anew(), within=(-9.0, 9.0))
+    limit = replace(_Limit.of(proved, proved.sampled_loop, 6, np.array([0.0])).anew(), within=(-9.0, 9.0))
     limit.cut(np.array([[0.0, 0.0, 0.0, 0.0, 3.0, 0.0]]), np.array([True]))
     limit.follow(np.zeros((1, 6)), np.array([[0.0, 0.0, 0.0, 0.0, -2.0, 0.0]]))
     assert limit.highest == pytest.approx([1.0])
@@ -343,10 +343,15 @@ def test_behind_a_lag_it_is_that_of_what_is_claimed_at_the_valve(proved):
     low, high = proved.task.rest_pressure
     asked = {"least_asked": LowerBound(low - 10**6), "largest_asked": UpperBound(high + 3 * 10**6)}
     for around in ({"lag": F(1)}, {"diffusion": F(1)}):
-        behind = replace(proved, held=replace(proved.held, **around))
+        behind = replace(proved, sampled_loop=replace(proved.sampled_loop, **around))
         assert behind.rest_limit is None
         assert replace(behind, claims=replace(proved.claims, **asked)).rest_limit.width == 6 * 10**6
-    assert replace(proved, held=replace(proved.held, law=replace(proved.held.law, applied=()))).rest_limit is None
+    assert (
+        replace(
+            proved, sampled_loop=replace(proved.sampled_loop, law=replace(proved.sampled_loop.law, applied=()))
+        ).rest_limit
+        is None
+    )
 
 
 LAG, ROCK = Lag(time_constant=0.2), Diffusion(length=1.0, diffusivity=1.0)

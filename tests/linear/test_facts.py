@@ -7,14 +7,14 @@ import pytest
 
 import quakedesign as qd
 from quakedesign.linear.linear_problem import LinearProblem
-from quakedesign.linear.sampled_stability import sampled_loop
+from quakedesign.linear.sampled_stability import sampled_stability
 from quakedesign.linear.verdict import linear_entries
 
 LAB = qd.load_fault("lab-fault")
 
 
 def facts_of(controller, step="1e-3"):
-    held = sampled_loop(LinearProblem.of(LAB), tuple(controller.gains.values()), step)
+    held = sampled_stability(LinearProblem.of(LAB), tuple(controller.gains.values()), step)
     return json.loads(json.dumps(linear_entries(LAB, controller, held)))
 
 

@@ -20,7 +20,7 @@ from quakedesign.linear.sampled_stability import (
     clock_proof,
     delay_proof,
     largest_varying_step,
-    sampled_loop,
+    sampled_stability,
     varying_verdict,
 )
 from quakedesign.lyapunov import Verdict
@@ -84,7 +84,7 @@ def test_a_programme_is_solved_once_and_what_it_proposed_is_decided_each_time(tm
 
 @pytest.fixture(scope="module")
 def near_limit():
-    return sampled_loop(PROBLEM, NEAR_LIMIT, "0.158")
+    return sampled_stability(PROBLEM, NEAR_LIMIT, "0.158")
 
 
 def test_every_shorter_period_is_proved_exactly_by_one_of_the_proofs(near_limit):

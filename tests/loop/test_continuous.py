@@ -9,7 +9,7 @@ import sympy as sp
 from quakedesign.errors import ParameterError
 from quakedesign.laws import NominalModel, Signals, summed_integrals
 from quakedesign.laws.elqr import ExtendedLQR
-from quakedesign.loop import ContinuousLaw, continuous_loop, exact_integrals, held_loop
+from quakedesign.loop import ContinuousLaw, continuous_loop, exact_integrals, sampled_error_loop
 
 GAINS = tuple(map(F, ("2e9", "5e8", "3e9", "1e9")))
 MODEL = NominalModel(slip=F("0.45"), rate=F("1.6"), gain=F("2.3e-8"))
@@ -63,7 +63,7 @@ def test_a_law_that_uses_the_reference_follows_it_with_its_states():
 def test_the_held_loop_tends_to_it():
     """Poles of the map of a short period, (λ − 1)/T_s, against those of the flow."""
     step = F(1, 10**5)
-    held = held_loop(summed_integrals(GAINS, step), MODEL, AUTHORITY, step)
+    held = sampled_error_loop(summed_integrals(GAINS, step), MODEL, AUTHORITY, step)
     (segment,) = held.segments
     flow, jump = np.array(held.flow, dtype=float) * float(step), np.array(segment.jump, dtype=float)
     period = (np.eye(5) + flow + flow @ flow / 2) @ jump

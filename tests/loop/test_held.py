@@ -12,7 +12,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.laws import (
     NOISES,
     ErrorModel,
-    ImplicitRoot,
+    ImplicitStep,
     LinearLaw,
     NominalModel,
     Power,
@@ -22,7 +22,7 @@ from quakedesign.laws import (
     summed_integrals,
 )
 from quakedesign.laws.sampled_law import steady_states
-from quakedesign.loop import held_loop
+from quakedesign.loop import sampled_error_loop
 
 STEP = F(1, 5)
 MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
@@ -83,7 +83,7 @@ def run_by_hand(law, periods, push, delay, lag, step=float(STEP), fine=4000, noi
 @few(("delay", "lag"), [("0", "0"), ("1/5", "0"), ("3/20", "0"), ("27/100", "1/10"), ("0", "1/4")], every=2)
 def test_matrices_do_what_the_schedule_says(law, delay, lag):
     with_integral = law if law.states else INTEGRALS
-    loop = held_loop(with_integral, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag))
+    loop = sampled_error_loop(with_integral, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag))
     seen = run_by_hand(with_integral, 6, 0.3, float(F(delay)), float(F(lag)))
     # the loop's gain is that of b(p − p*), the plant's that of p
     assert np.allclose(run_matrices(loop, 6, 0.3), seen, rtol=1e-5, atol=1e-8)
@@ -93,7 +93,7 @@ def test_matrices_do_what_the_schedule_says(law, delay, lag):
 @pytest.mark.parametrize("delay", ["0", "1/5", "3/20"])
 def test_a_step_of_p_star_is_a_jump_of_the_states_by_their_steady_values(law, delay):
     """A loop that rests at p* = 0 when p* steps to 1: by hand that is a push of −gain for ever."""
-    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay))
+    loop = sampled_error_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay))
     state, found = AUTHORITY * np.array(loop.inputs["drift"], float), []
     for _ in range(8):
         for segment in loop.segments:
@@ -127,7 +127,7 @@ def test_what_is_measured_may_be_off(law, delay, lag):
     """The law is told e + n: by hand, and by two sampled inputs."""
     random = np.random.default_rng(5)
     noise = random.standard_normal((6, 2))
-    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag), noisy=NOISES)
+    loop = sampled_error_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag), noisy=NOISES)
     assert tuple(loop.sampled) == NOISES
     flow, heard = np.array(loop.flow, float), np.array([loop.sampled[name] for name in NOISES], float)
     state, found = np.zeros(len(flow)), []
@@ -141,12 +141,12 @@ def test_what_is_measured_may_be_off(law, delay, lag):
 
 
 def test_only_the_noise_that_is_asked_for_is_an_input():
-    loop = held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, noisy=("rate_noise",))
+    loop = sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, STEP, noisy=("rate_noise",))
     assert tuple(loop.sampled) == ("rate_noise",)
-    assert held_loop(ESTIMATE, MODEL, AUTHORITY, STEP).sampled == {}
+    assert sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, STEP).sampled == {}
 
 
-ROOT = ImplicitRoot(
+ROOT = ImplicitStep(
     pull=(Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),), slopes=(F("0.8"), F(1)), remainder=F(1, 10)
 )
 
@@ -157,7 +157,7 @@ def test_the_end_of_an_implicit_step_is_a_line_and_a_sampled_input(delay, noisy)
     """w = −0.9(e1 + n1)/T_s + v_k with any v_k, e2 + n2 measured: by matrices and by hand."""
     law, random = compensated(ROOT, F(2, 5), F(1, 4)), np.random.default_rng(4)
     kicks, slope, noise = random.standard_normal(6), 0.9 / float(STEP), random.standard_normal((6, 2)) * len(noisy)
-    loop = held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay), noisy=noisy)
+    loop = sampled_error_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay), noisy=noisy)
     heard = np.array([loop.sampled[name] for name in noisy], float).reshape(len(noisy), len(loop.flow))
     flow, entry = np.array(loop.flow, float), np.array(loop.sampled["root"], float)
     whole = np.zeros((len(flow) + 1, len(flow) + 1))
@@ -175,7 +175,7 @@ def test_the_end_of_an_implicit_step_is_a_line_and_a_sampled_input(delay, noisy)
 
 def test_a_law_without_integral_action_is_refused():
     with pytest.raises(ParameterError, match="constant pressure"):
-        held_loop(PROPORTIONAL, MODEL, AUTHORITY, STEP)
+        sampled_error_loop(PROPORTIONAL, MODEL, AUTHORITY, STEP)
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_a_law_without_integral_action_is_refused():
 def test_times_that_make_no_loop_are_refused(wrong, said):
     given = {"step": STEP} | wrong
     with pytest.raises(ParameterError, match=said):
-        held_loop(ESTIMATE, MODEL, AUTHORITY, **given)
+        sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, **given)
 
 
 def test_sizes_that_do_not_fit_are_refused():
@@ -220,7 +220,9 @@ def test_a_law_that_knows_the_delay_expects_what_comes(delay, ages):
         F(2, 5),
         ErrorModel.delayed(rows(expm(flow * period)[:2, :2]), rows(pushes), MODEL.gain),
     )
-    assert np.allclose(run_matrices(held_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay)), 120, 0.3)[-1], 0, atol=1e-9)
+    assert np.allclose(
+        run_matrices(sampled_error_loop(law, MODEL, AUTHORITY, STEP, delay=F(delay)), 120, 0.3)[-1], 0, atol=1e-9
+    )
     # a constant disturbance is known after the first samples: the innovation decays with 1 − a alone
     z, e, asked, found = np.zeros(len(law.output)), np.zeros(2), [0.0] * (ages + 1), []
     f, g, c, d = (np.array(m, float) for m in (law.update, law.measured, law.output, law.feedback))
@@ -241,16 +243,16 @@ def test_the_estimate_rests_on_the_disturbance_that_its_model_has():
     of_errors, of_command = (tuple(tuple(map(F, row)) for row in m) for m in (near[:2, :2], near[:2, 2:].T))
     model = ErrorModel.delayed(of_errors, of_command, MODEL.gain)
     law = disturbance_estimate((F(4), F(2)), F(2, 5), model)
-    loop = held_loop(law, MODEL, AUTHORITY, STEP)
+    loop = sampled_error_loop(law, MODEL, AUTHORITY, STEP)
     assert np.allclose(run_matrices(loop, 80, 0.3)[-1], 0, atol=1e-9)
 
 
 def test_the_longest_delay_is_eight_periods():
-    loop = held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP)
+    loop = sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP)
     assert loop.states == ("e1", "e2", *ESTIMATE.states, *(f"waiting{i}" for i in range(8)), "valve")
     with pytest.raises(ParameterError, match="delay must be 0 to 8 steps"):
-        held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP + F(1, 10**9))
-    assert held_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=F(1, 10**9)).segments[0].duration == F(1, 10**9)
+        sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=8 * STEP + F(1, 10**9))
+    assert sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, STEP, delay=F(1, 10**9)).segments[0].duration == F(1, 10**9)
 
 
 def named(loop, row):
@@ -279,7 +281,7 @@ CASES = {
 @pytest.mark.parametrize(("delay", "lag", "jumps"), CASES.values(), ids=CASES)
 def test_matrices_say_what_moves_where(delay, lag, jumps):
     """Row by row: what flows, what a sample and an arrival move, what enters and what is seen."""
-    loop = held_loop(INTEGRALS, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag))
+    loop = sampled_error_loop(INTEGRALS, MODEL, AUTHORITY, STEP, delay=F(delay), lag=F(lag))
     waiting, pressures = [f"waiting{i}" for i in range(2 if len(jumps) == 2 else int(F(delay) / STEP))], ["valve"]
     pressures += ["behind"] if F(lag) else []
     assert loop.states == ("e1", "e2", "xi1", "xi2", *waiting, *pressures)
@@ -319,9 +321,9 @@ def test_the_end_of_an_implicit_step_is_its_line_and_what_is_beside_it():
         measured=((F(0), F(0), F(3)),),
         output=(F(-1),),
         feedback=(F(-2), F(-5), F(7)),
-        root=ROOT,
+        implicit_step=ROOT,
     )
-    loop = held_loop(law, MODEL, AUTHORITY, STEP, noisy=("rate_noise", "slip_noise"))
+    loop = sampled_error_loop(law, MODEL, AUTHORITY, STEP, noisy=("rate_noise", "slip_noise"))
     (segment,) = loop.segments
     moved = {name: named(loop, row) for name, row in zip(loop.states, segment.jump, strict=True)}
     assert moved["z"] == {"z": 1, "e1": F(-27, 2)}
@@ -331,8 +333,8 @@ def test_the_end_of_an_implicit_step_is_its_line_and_what_is_beside_it():
         "slip_noise": {"z": F(-27, 2), "valve": -67},
         "rate_noise": {"valve": -10},
     }
-    assert held_loop(law, MODEL, AUTHORITY, STEP).sampled.keys() == {"root"}
-    assert held_loop(INTEGRALS, MODEL, AUTHORITY, STEP, noisy=["slip_noise"]).sampled.keys() == {"slip_noise"}
+    assert sampled_error_loop(law, MODEL, AUTHORITY, STEP).sampled.keys() == {"root"}
+    assert sampled_error_loop(INTEGRALS, MODEL, AUTHORITY, STEP, noisy=["slip_noise"]).sampled.keys() == {"slip_noise"}
 
 
 def images(rows, vector):

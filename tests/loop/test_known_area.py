@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.special import erfc
 
 from quakedesign.laws import LinearLaw, NominalModel
-from quakedesign.loop import Layer, held_loop, with_response_area
+from quakedesign.loop import Layer, sampled_error_loop, with_response_area
 from quakedesign.loop.diffusion_layer import MODES
 
 TIME, STEP, AUTHORITY, GAIN = F(3, 2), F(1, 5), F(2), F(6, 5)
@@ -39,7 +39,7 @@ def test_the_area_is_that_of_what_a_step_leaves_out():
 
 
 def loop_of(lag, delay):
-    plain = held_loop(LAW, MODEL, AUTHORITY, STEP, diffusion=TIME, lag=lag, delay=delay)
+    plain = sampled_error_loop(LAW, MODEL, AUTHORITY, STEP, diffusion=TIME, lag=lag, delay=delay)
     return plain, with_response_area(plain, GAIN, LAYER)
 
 

@@ -10,7 +10,7 @@ from scipy.special import erfc
 
 from quakedesign.errors import ParameterError
 from quakedesign.laws import LinearLaw, NominalModel, summed_integrals
-from quakedesign.loop import Diffusion, Fading, Layer, held_loop
+from quakedesign.loop import Diffusion, Fading, Layer, sampled_error_loop
 from quakedesign.loop.diffusion_layer import MODES
 
 TIME = F(3, 2)
@@ -69,7 +69,7 @@ def test_rationals_stand_for_pi_as_closely_as_their_bound_says():
 
 
 def loop_of(law, **more):
-    return held_loop(law, MODEL, F(2), F(1, 5), diffusion=TIME, **more)
+    return sampled_error_loop(law, MODEL, F(2), F(1, 5), diffusion=TIME, **more)
 
 
 @pytest.mark.parametrize("frequency", [1e-2, 0.3, 2.0])
@@ -142,11 +142,11 @@ def test_the_valve_s_step_is_kept_and_everything_behind_it_stays_while_it_jumps(
 
 def test_a_layer_that_is_faster_than_bounds_can_follow_is_refused():
     law = summed_integrals((F(1), F(1), F(1), F(1)), F(1, 5))
-    fastest = held_loop(law, MODEL, F(2), F(1, 5), diffusion=F(1, 160))
+    fastest = sampled_error_loop(law, MODEL, F(2), F(1, 5), diffusion=F(1, 160))
     assert fastest.states == ("e1", "e2", "xi1", "xi2", "valve", *LAYERS, "stepped")
     for time in (F(1, 161), F(-1)):
         with pytest.raises(ParameterError, match="at least T_s/32"):
-            held_loop(law, MODEL, F(2), F(1, 5), diffusion=time)
+            sampled_error_loop(law, MODEL, F(2), F(1, 5), diffusion=time)
 
 
 def test_a_reference_that_moves_moves_no_mode_against_the_valve():

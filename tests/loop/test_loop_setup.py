@@ -48,7 +48,7 @@ def test_another_name_is_refused_with_the_nearest():
 def test_what_is_given_reaches_the_loop_and_the_delay_counts_from_the_middle_of_a_mean():
     law = summed_integrals(tuple(map(F, (1, 2, 3, 4))), F(1, 10))
     setup = LoopSetup(delay="1 ms", averaging_time="4 ms", jitter="1 ms", rate_noise=1e-7, saturation=5, withdrawal=0)
-    held = ExactSetup.of(setup).held(law, F(1, 10))
+    held = ExactSetup.of(setup).with_law(law, F(1, 10))
     assert (held.delay, held.averaging, held.jitter, held.rate_noise) == (
         F(3, 1000),
         F(1, 250),
@@ -56,7 +56,7 @@ def test_what_is_given_reaches_the_loop_and_the_delay_counts_from_the_middle_of_
         F(1, 10**7),
     )
     assert held.pump == Pump(least=F(0), largest=F(5))
-    assert ExactSetup.of(IDEAL).held(law, F(1, 10)) == SampledLoop(law=law, step=F(1, 10))
+    assert ExactSetup.of(IDEAL).with_law(law, F(1, 10)) == SampledLoop(law=law, step=F(1, 10))
 
 
 def test_every_quantity_is_an_option_with_its_unit_and_help():

@@ -12,7 +12,7 @@ from thinned import few
 
 from quakedesign.checking import check_files
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_compensated, design_held, tightened
+from quakedesign.guarantees import design_compensated, design_sampled_law, tightened
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, read_guarantee
 from quakedesign.laws import family, law
 from quakedesign.lyapunov import Verdict, certificate_text, load_certificate, loop_of
@@ -123,15 +123,15 @@ def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
     stored, fault = parse_guarantee(path.read_text()), load_fault(path.stem.split("_")[-1])
     assert check_files([path], fault.name)[str(path)][0] == "proved"
     assert stored.task == uncertain_plant(fault)
-    assert stored.held.step == F(str(fault.sampling_time))
-    if stored.held.longest_step:
+    assert stored.sampled_loop.step == F(str(fault.sampling_time))
+    if stored.sampled_loop.longest_step:
         return  # its search is tested in tests/guarantees/search/test_unclocked.py
     if "cta" in path.stem:
         base = replace(family("cta")[0].law, gains=dict(family("cta")[0].law.gains), divisor=stored.task.authority)
-        again = tightened(design_compensated(stored.task, base, stored.held.step).proof)
-        assert again.held.law.root.pull == stored.held.law.root.pull
+        again = tightened(design_compensated(stored.task, base, stored.sampled_loop.step).proof)
+        assert again.sampled_loop.law.implicit_step.pull == stored.sampled_loop.law.implicit_step.pull
     else:
-        again = design_held(stored.task, stored.held.step, setup=stored.held.setup)
+        again = design_sampled_law(stored.task, stored.sampled_loop.step, setup=stored.sampled_loop.setup)
     assert float(again.claims.slip_rate_error) == pytest.approx(float(stored.claims.slip_rate_error), rel=0.02)
     assert float(again.claims.slip_error) == pytest.approx(float(stored.claims.slip_error), rel=0.02)
 

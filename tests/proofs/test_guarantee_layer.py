@@ -10,7 +10,7 @@ from standalone_guarantee import checker
 from thinned import few
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import SampledLoop, SlowGain, TrackingProof, guarantee
+from quakedesign.guarantees import SampledLoop, TrackingProof, VaryingGain, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.norms import norms
 from quakedesign.guarantees.exact.small_gain import grown
@@ -33,11 +33,11 @@ ORDER = ("acceleration", "drift", "left_out", "awaited", "awaited_told")
 
 @cache
 def claim():
-    return guarantee(TASK, HELD, SlowGain(parts=2, growth=F(1, 4)))
+    return guarantee(TASK, HELD, VaryingGain(parts=2, growth=F(1, 4)))
 
 
 def document(held=None):
-    one = claim() if held is None else TrackingProof(task=TASK, held=held, claims=claim().claims)
+    one = claim() if held is None else TrackingProof(task=TASK, sampled_loop=held, claims=claim().claims)
     return json.loads(guarantee_text(one))
 
 
@@ -65,7 +65,7 @@ def test_both_have_the_same_loop_in_every_part_of_a_slow_gain(monkeypatch):
     task = checker.read_task(raw)
     checker.slow_gains(task, checker.read_loop(raw["loop"], task), checker.Slow(2, F(1, 4)))
     ours = []
-    for model in claim().slow_gain.models(TASK):
+    for model in claim().varying_gain.models(TASK):
         loop = HELD.loop(TASK, model)
         ours += [*[loop] * 5, grown(loop, F(1, 4))]
     expected = [

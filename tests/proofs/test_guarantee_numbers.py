@@ -17,7 +17,7 @@ from quakedesign.guarantees.exact import norms as package
 from quakedesign.guarantees.exact import norms as slowest_mode
 from quakedesign.guarantees.exact import small_gain as sector
 from quakedesign.guarantees.exact.norms import flow_norms, norms
-from quakedesign.laws import ImplicitRoot, Power
+from quakedesign.laws import ImplicitStep, Power
 from quakedesign.loop import PeriodicLoop, Segment
 
 
@@ -405,7 +405,7 @@ def test_lines_are_shown_after_ten_halvings_or_not_at_all(room, shown):
     """q = 2(e1 + T·w), one slope 1/2, T = 1/2: on a part of width δ 2ε − R − δ/2 is left, which 2^−10 just allows."""
     pull = (Power(factor=(F(2), F(2)), exponent=F(1), argument="slip"),)
     for slopes in ((F(1, 2), F(1)), (F(0), F(1, 2))):
-        root = ImplicitRoot(pull=pull, slopes=slopes, remainder=F(1))
+        root = ImplicitStep(pull=pull, slopes=slopes, remainder=F(1))
         other = checker.Root(plain(pull), list(slopes), F(1))
         assert sector.holds(root, F(1, 2), F(1, 2), 2 - room) == shown
         assert checker.root_within(other, F(1, 2), F(1, 2), 2 - room) == shown
@@ -425,7 +425,7 @@ def test_lines_that_the_root_leaves_at_one_end_are_not_shown(slopes, factor, roo
     """q = c(e1 + T·w), T = 1/2, u ≤ 1: the lines are (1 + c/2)ε − R − u/4 and, with the slope 1/4, − u/2 above."""
     pull = (Power(factor=(F(factor), F(factor)), exponent=F(1), argument="slip"),)
     rate, half = 1 + F(factor, 2) - room, F(1, 2)
-    assert sector.holds(ImplicitRoot(pull=pull, slopes=slopes, remainder=F(1)), half, half, rate) == shown
+    assert sector.holds(ImplicitStep(pull=pull, slopes=slopes, remainder=F(1)), half, half, rate) == shown
     assert checker.root_within(checker.Root(plain(pull), list(slopes), F(1)), half, half, rate) == shown
 
 

@@ -18,7 +18,7 @@ from quakedesign.guarantees.exact import small_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import channels_of
 from quakedesign.guarantees.exact.small_gain import bounds_from, certified_bounds
-from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, Power
+from quakedesign.laws import NOISES, ImplicitStep, LinearLaw, Power
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, Segment, exact_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.plant import FaultPlant
@@ -80,7 +80,7 @@ def some_root(random):
     low, high = sorted(some(random, 0, 4, 4) for _ in range(2))
     inner = Power(factor=(F(1), F(2)), exponent=F(3, 2), argument="rate")
     pull = (Power(factor=(F(1, 2), F(1)), exponent=F(1, 3), argument=(inner,)),)
-    return ImplicitRoot(pull=pull, slopes=(low, high), remainder=some(random, 0, 3))
+    return ImplicitStep(pull=pull, slopes=(low, high), remainder=some(random, 0, 3))
 
 
 def some_claims(random):
@@ -105,7 +105,7 @@ def some_held(random):
         measured=some_rows(random, n, seen),
         output=some_rows(random, 1, n)[0],
         feedback=some_rows(random, 1, seen)[0],
-        root=root,
+        implicit_step=root,
     )
     delay = step * random.choice([F(0), F(0), F(1, 3), F(1), F(5, 2), F(8)])
     noise = {f"{name}_noise": random.choice([F(0), some(random, 0, 9, 4)]) for name in ("slip", "rate")}
@@ -158,7 +158,7 @@ def some_tasks():
     found[3] = replace(found[3], change=None)
     found[2] = replace(found[2], friction=replace(found[2].friction, rate_slope=F(0)))
     held = some_held(random)
-    raws = [document_of(TrackingProof(task=task, held=held, claims=some_claims(random))) for task in found]
+    raws = [document_of(TrackingProof(task=task, sampled_loop=held, claims=some_claims(random))) for task in found]
     return [(task, checker.read_task(raw)) for task, raw in zip(found, raws, strict=True)]
 
 
@@ -176,7 +176,7 @@ def test_both_derive_the_same_ranges_and_inputs_from_a_fault():
         task = some_task(random)
         friction = replace(task.friction, rate_slope=F(i % 2, 10))
         task = replace(task, friction=friction, amplitude=F(i + 1), change=F(1, 3) if i & 2 else None)
-        found = checker.read_task(document_of(TrackingProof(task=task, held=held, claims=some_claims(random))))
+        found = checker.read_task(document_of(TrackingProof(task=task, sampled_loop=held, claims=some_claims(random))))
         assert (found.name, found.b, found.s, found.w) == ("fault", task.authority, task.slip_chord, task.rate_chord)
         assert (found.beta, found.rest) == (task.beta, task.rest_pressure)
         assert (found.reference_rate, found.reference_force) == (task.reference_rates[0], task.reference_force)
@@ -230,9 +230,9 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             held = replace(held, diffusion=F(i, 7) * held.step)
         elif i % 3 == 0:
             held = off_schedule(held, i // 3)
-        if i % 2 and held.law.root is None and not held.diffusion:
+        if i % 2 and held.law.implicit_step is None and not held.diffusion:
             held = with_reference(held, random)
-        raw = document_of(TrackingProof(task=task, held=held, claims=some_claims(random)))
+        raw = document_of(TrackingProof(task=task, sampled_loop=held, claims=some_claims(random)))
         ours = unless(ParameterError, held.loop, task)
         theirs = unless(checker.Refused, checker.read_loop, raw["loop"], read)
         assert (ours is None) == (theirs is None)
@@ -256,15 +256,19 @@ def test_both_build_the_same_loop_of_a_law_that_is_held():
             entries += ours.sampled.values()
             entries += [f.entry for f in ours.fading.values()]
             assert theirs.inputs == list(map(list, entries))
-            assert (theirs.step, theirs.root is None) == (ours.period, held.law.root is None)
+            assert (theirs.step, theirs.root is None) == (ours.period, held.law.implicit_step is None)
             assert theirs.noise == (held.slip_noise, held.rate_noise)
             assert len(ours.states) == len(set(ours.states)) == len(ours.flow)
             if theirs.root:
-                given = plain(held.law.root.pull), list(held.law.root.slopes), held.law.root.remainder
+                given = (
+                    plain(held.law.implicit_step.pull),
+                    list(held.law.implicit_step.slopes),
+                    held.law.implicit_step.remainder,
+                )
                 assert (theirs.root.pull, theirs.root.slopes, theirs.root.remainder) == given
             more = {"largest_step": UpperBound(1)} if held.pump else {}
             more |= {"least_asked": LowerBound(-1), "largest_asked": UpperBound(1)} if held.pump and held.lag else {}
-            claim = TrackingProof(task=task, held=held, claims=replace(some_claims(random), **more))
+            claim = TrackingProof(task=task, sampled_loop=held, claims=replace(some_claims(random), **more))
             assert parse_guarantee(guarantee_text(claim)) == claim
     assert built > 25
     assert referred > 3
@@ -398,7 +402,7 @@ def test_the_stress_at_rest_turns_where_friction_reaches_a_bound(growth, change,
         spreads=(zero, zero, zero), friction=friction, shape=tuple(map(F, SHAPES[0])), target_slip=F(2),
         operation_time=F(1), amplitude=zero, change=None, growths=(growth, zero),
     )  # fmt: skip
-    raw = document_of(TrackingProof(task=task, held=some_held(Random(6)), claims=some_claims(Random(1))))
+    raw = document_of(TrackingProof(task=task, sampled_loop=some_held(Random(6)), claims=some_claims(Random(1))))
     assert checker.read_task(raw).rest == task.rest_pressure == rest
 
 

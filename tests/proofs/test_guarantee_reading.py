@@ -597,9 +597,9 @@ def test_a_slow_gain_is_read_to_its_limits_and_needs_friction_of_slip_and_sample
 def test_a_slow_gain_is_refused_from_a_file_that_breaks_its_rules():
     slow = {"parts": 2, "growth": "1/9"}
     steady, at_once = (changed(raw, (("fault", "friction", "rate_slope"), "0")) for raw in (HELD, CONTINUOUS))
-    found = read_guarantee(steady | {"slow_gain": slow}).slow_gain
+    found = read_guarantee(steady | {"slow_gain": slow}).varying_gain
     assert (found.parts, found.growth) == (2, F(1, 9))
-    assert read_guarantee(steady).slow_gain is None
+    assert read_guarantee(steady).varying_gain is None
     assert json.loads(guarantee_text(read_guarantee(at_once))) == at_once
     for wrong in ({"parts": "2"}, {"parts": True}, {"parts": 2.0}):
         with pytest.raises(CertificateError, match=r"slow_gain.parts: expected `int`"):

@@ -15,15 +15,15 @@ from standalone_guarantee import checker
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, SampledLoop, SlowGain, TrackingProof, guarantee
+from quakedesign.guarantees import NoProof, SampledLoop, TrackingProof, VaryingGain, guarantee
 from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
-from quakedesign.guarantees.exact.small_gain import Bounds, grown, slow_gains
+from quakedesign.guarantees.exact.small_gain import Bounds, grown, varying_gain_norms
 from quakedesign.laws import ErrorModel, NominalModel, disturbance_estimate
 from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
 
-STEP, SLOW = F("0.184"), SlowGain(parts=2, growth=F(1, 4))
+STEP, SLOW = F("0.184"), VaryingGain(parts=2, growth=F(1, 4))
 TASK = uncertain_plant(load_fault("real-fault"))
 GAIN = F("2.282e-8")
 LAW = disturbance_estimate(
@@ -118,7 +118,7 @@ def test_a_gain_that_may_jump_or_acts_at_once_is_not_slow_whatever_is_claimed(fr
 def test_one_to_sixteen_parts_are_read_by_both(parts):
     raw = document()
     raw["slow_gain"]["parts"] = parts
-    assert parse_guarantee(json.dumps(raw)).slow_gain.parts == parts
+    assert parse_guarantee(json.dumps(raw)).varying_gain.parts == parts
     task = checker.read_task(raw)
     assert checker.read_slow(raw["slow_gain"], task, checker.read_loop(raw["loop"], task)).parts == parts
 
@@ -160,7 +160,7 @@ def test_gains_of_the_past_are_those_of_responses_that_count_more():
     model = SLOW.models(TASK)[1]
     loop = HELD.loop(TASK, model)
     for growth in (F(1, 10**6), F(1, 5)):
-        found = slow_gains([loop], growth)["slip_rate_error", "aged"]
+        found = varying_gain_norms([loop], growth)["slip_rate_error", "aged"]
         expected = response(model, float(growth))
         assert expected * 0.999 <= float(found[-1]) <= expected * 1.02
     assert grown(loop, F(1)).flow[1][2:] == loop.flow[1][2:]
@@ -171,7 +171,7 @@ def test_both_find_the_same_gains_of_every_part():
     task = checker.read_task(raw)
     loop = checker.read_loop(raw["loop"], task)
     theirs = checker.slow_gains(task, loop, checker.Slow(2, F(1, 4)))
-    ours = slow_gains([HELD.loop(TASK, model) for model in SLOW.models(TASK)], F(1, 4))
+    ours = varying_gain_norms([HELD.loop(TASK, model) for model in SLOW.models(TASK)], F(1, 4))
     for column, name in enumerate(("acceleration", "drift", "aged")):
         for line, output in enumerate(("slip_error", "slip_rate_error", "push")):
             assert [float(v) for v in theirs[column][line]] == pytest.approx(
@@ -185,7 +185,7 @@ def test_a_claim_that_no_bound_stays_below_is_not_proved(monkeypatch):
         bounds = Bounds(slip_error=share * F(1, 10), slip_rate_error=F(0), push=F(0), small_gain=F(1, 2))
         monkeypatch.setattr(statement, "best_bounds", lambda *_, bounds=bounds: bounds)
         claims = replace(statement.Claims.of(TASK, bounds), slip_error=UpperBound(F(1, 10)))
-        assert TrackingProof(task=TASK, held=HELD, claims=claims, slow_gain=SLOW).check() is verdict
+        assert TrackingProof(task=TASK, sampled_loop=HELD, claims=claims, varying_gain=SLOW).check() is verdict
     raw = document()
     for share, fails in ((1, True), (F(999, 1000), False)):
         slip = share * F(raw["claims"]["slip_error"])
@@ -204,7 +204,7 @@ def test_a_slip_error_that_moves_the_gain_without_end_is_said(monkeypatch):
         tried.append(slip_error)
         return Bounds(slip_error=2 * slip_error + 1, slip_rate_error=F(0), push=F(0), small_gain=F(1, 2))
 
-    monkeypatch.setattr(statement, "_slow_bounds", grows)
+    monkeypatch.setattr(statement, "_bounds_with_varying_gain", grows)
     found = guarantee(TASK, HELD, SLOW)
     assert isinstance(found, NoProof)
     none, bounds = "none of the slip errors tried, up to ", " m, bounds the change of the input gain"
@@ -258,7 +258,7 @@ def test_no_plant_whose_friction_falls_with_slip_leaves_the_bounds(steepness):
 
 def _bounds_with(task, slow, slope):
     """Fixed point of the bounds for a slope κ of the input gain alone."""
-    gains = slow_gains([HELD.loop(task, model) for model in slow.models(task)], slow.growth)
+    gains = varying_gain_norms([HELD.loop(task, model) for model in slow.models(task)], slow.growth)
     slip = F(0)
     for _ in range(40):
         half = (task.beta[1] - task.beta[0]) / (2 * slow.parts) + 2 * slope * slip

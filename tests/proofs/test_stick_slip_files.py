@@ -104,7 +104,7 @@ def test_both_ask_for_every_facet_at_each_interval_that_decides(which, monkeypat
     monkeypatch.setattr(package, "sliding_rows", rows)
     monkeypatch.setattr(package, "resting_rows", lambda *_: iter(()))
     with pytest.raises(ParameterError, match="facet 3 in a period that slides"):
-        package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+        package.stick_slip_bounds(claim.task, claim.sampled_loop, claim.invariant_set)
 
 
 def test_a_sliding_mode_has_no_range_of_intervals():
@@ -141,7 +141,7 @@ def test_both_derive_the_same_ranges(path, monkeypatch):
     known, ranges = [], package.ranges
     monkeypatch.setattr(package, "ranges", lambda *given: known.append(given) or ranges(*given))
     monkeypatch.setattr(package, "facet_rows", lambda *_: iter(()))
-    proved = package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+    proved = package.stick_slip_bounds(claim.task, claim.sampled_loop, claim.invariant_set)
     (given,) = known
     found, push = ranges(*given), given[2]
     assert [float(v) for v in ours.push] == pytest.approx([float(v) for v in push], rel=1e-12)
@@ -152,12 +152,15 @@ def test_both_derive_the_same_ranges(path, monkeypatch):
         (ours.rest, found.rest_pressure),
     ):
         assert [float(v) for v in mine] == pytest.approx([float(v) for v in theirs], rel=1e-12)
-    theirs = package.stop_bounds(claim.task, claim.held, replace_ranges(found, ours))
+    theirs = package.stop_bounds(claim.task, claim.sampled_loop, replace_ranges(found, ours))
     assert theirs == tuple(ours.stops())
     for name, value in ours.bounds().items():
         assert float(getattr(proved, name)) == pytest.approx(float(value), rel=1e-12)
     longest = F(document["loop"].get("longest", document["loop"]["step"]))
-    fastest, (ahead, rate, _, behind, _) = F("15/8") * F("0.785") / 663012, claim.reach.box  # of 10 t³ - 15 t⁴ + 6 t⁵
+    fastest, (ahead, rate, _, behind, _) = (
+        F("15/8") * F("0.785") / 663012,
+        claim.invariant_set.box,
+    )  # of 10 t³ - 15 t⁴ + 6 t⁵
     assert given[1] == ahead + fastest * longest
     assert given[3] == rate * longest
     assert (proved.slip_ahead, proved.slip_behind) == (ahead + fastest * longest, behind + fastest * longest)
@@ -296,13 +299,13 @@ CONDITIONS = [
     ("fault must not open", "the fault may open", (("loop", "target_gain"), "12")),
     ("damping must not be negative", "damping", (("fault", "friction", "rate_slope"), "1/4")),
     ("shear stress must not reverse", "shear stress may reverse", (("disturbance", "amplitude"), "2")),
-    ("short against the weakening", "too long against the weakening", (("loop", "step"), "1")),
-    ("short against the weakening", "too long against the weakening", (("loop",), lambda old: old | {"longest": "1"})),
-    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "150")),
-    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "400")),
-    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "3000")),
-    ("short against damping and slope", "too long against the damping", (("fault", "damping"), "80")),
-    ("short against damping and slope", "too long against the damping",
+    ("short against the weakening", "too long for this weakening", (("loop", "step"), "1")),
+    ("short against the weakening", "too long for this weakening", (("loop",), lambda old: old | {"longest": "1"})),
+    ("short against damping and slope", "too long, for this damping", (("fault", "damping"), "150")),
+    ("short against damping and slope", "too long, for this damping", (("fault", "damping"), "400")),
+    ("short against damping and slope", "too long, for this damping", (("fault", "damping"), "3000")),
+    ("short against damping and slope", "too long, for this damping", (("fault", "damping"), "80")),
+    ("short against damping and slope", "too long, for this damping",
      (("fault",), lambda old: old | {"damping": "100", "spreads": old["spreads"] | {"damping": "1/100"}})),
     ("large enough for the condition of rest", "too small for the condition of rest",
      (("disturbance", "amplitude"), "1/90")),
@@ -336,23 +339,23 @@ def test_the_disturbance_must_outweigh_the_range_of_the_input_gain(path, share, 
     push = period.push[0], F(largest) * F(share)
     period.push = push
     found = package.ranges(*_range_inputs(claim))
-    monkeypatch.setattr(package, "pushes", lambda *_: push)
+    monkeypatch.setattr(package, "feedback_range", lambda *_: push)
     monkeypatch.setattr(package, "ranges", lambda *_: found)
     monkeypatch.setattr(package.Period, "deciding", lambda *_: [])
     if holds:
         period.verify()
-        package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+        package.stick_slip_bounds(claim.task, claim.sampled_loop, claim.invariant_set)
         return
     with pytest.raises(CHECK.Refused, match="be at least the effect of the range of beta"):
         period.verify()
     with pytest.raises(ParameterError, match="too small for this range of the input gain"):
-        package.stick_slip_bounds(claim.task, claim.held, claim.reach)
+        package.stick_slip_bounds(claim.task, claim.sampled_loop, claim.invariant_set)
 
 
 def _range_inputs(claim):
-    held, (ahead, rate, *_) = claim.held, claim.reach.box
+    held, (ahead, rate, *_) = claim.sampled_loop, claim.invariant_set.box
     moved = claim.task.reference_rates[0] * held.longest
-    return claim.task, ahead + moved, package.pushes(claim.task, held, claim.reach), rate * held.longest
+    return claim.task, ahead + moved, package.feedback_range(claim.task, held, claim.invariant_set), rate * held.longest
 
 
 @pytest.mark.parametrize(("sign", "noise", "holds"), [(1, 49, True), (1, 51, False), (-1, 99, True), (-1, 101, False)])

@@ -191,7 +191,7 @@ def test_bounds_at_the_intervals_that_decide_hold_for_all_between(apart):
 def packages(noisy=False):
     """What every facet becomes by the package's functions, by slice or combination and whether the cut-off counts."""
     claim = read_guarantee(box(noisy))
-    task, held, reach, own = claim.task, claim.held, claim.reach, period(noisy)
+    task, held, reach, own = claim.task, claim.sampled_loop, claim.invariant_set, period(noisy)
     moved = task.reference_rates[0] * held.longest
     found = package.ranges(task, reach.box[0] + moved, own.push, reach.box[1] * held.longest)
     given = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
@@ -334,7 +334,7 @@ def test_noise_of_the_slip_may_put_a_fault_at_rest_in_both_checkers():
         claim = read_guarantee(box(with_noise))
         nothing = (Fraction(0), Fraction(0))
         known = package.ranges(claim.task, Fraction(1), nothing, Fraction(1))
-        lines = package.polytopes(claim.task, claim.held, claim.reach.facets, known)[package.SLICES :]
+        lines = package.polytopes(claim.task, claim.sampled_loop, claim.invariant_set.facets, known)[package.SLICES :]
         found.append([line[-7][1] for line in lines])
     assert [after - before for before, after in zip(*found, strict=True)] == [more] * 7
 

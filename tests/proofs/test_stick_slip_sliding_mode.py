@@ -54,8 +54,8 @@ def test_the_root_is_deadbeat_for_all_claimed_errors_and_for_no_much_larger_ones
 
 def test_the_file_binds_the_root_and_its_statement_names_it():
     claim = read_guarantee(stored())
-    assert claim.held.law.pull
-    assert claim.held.law.return_rate * claim.held.step == 1
+    assert claim.sampled_loop.law.pull
+    assert claim.sampled_loop.law.return_rate * claim.sampled_loop.step == 1
     with pytest.raises(UnsupportedError, match="sliding mode"):
         _ = claim.controller
 
@@ -82,14 +82,14 @@ def test_a_weaker_sign_is_refused_by_both():
 
 def test_without_its_root_the_same_file_is_about_a_linear_law():
     document = changed(stored(), (("loop",), lambda old: {name: v for name, v in old.items() if name != "pull"}))
-    assert read_guarantee(document).held.law.pull == ()
+    assert read_guarantee(document).sampled_loop.law.pull == ()
 
 
 @pytest.mark.parametrize("name", DEADBEAT)
 def test_a_root_needs_the_gains_of_a_deadbeat_step(name):
     document = changed(box(), (("loop",), lambda old: old | DEADBEAT | {"pull": [TERM]}))
     assert STICK.read_law(document["loop"]).pull
-    assert read_guarantee(document).held.law.pull
+    assert read_guarantee(document).sampled_loop.law.pull
     other = changed(document, (("loop", name), times("9/8")))
     assert refused(other, "a sliding mode must have target_gain = rate_gain")
     with pytest.raises(CertificateError, match="a sliding mode must have target_gain = rate_gain and return_rate = 1/"):
@@ -115,7 +115,7 @@ def test_a_root_of_another_form_is_refused_by_both(pull, reason):
 def test_noise_of_the_slip_counts_in_what_the_root_must_cover():
     """|e1| up to the larger slip error and the noise, |e2| up to the larger of the peak and max r'."""
     claim = read_guarantee(stored())
-    held = claim.held
+    held = claim.sampled_loop
     noisy = replace(held, law=replace(held.law, rest_slip=F(1)), slip_noise=F(1, 2))
     fastest = claim.task.reference_rates[0]
     assert held.errors(claim.task, F(3), F(2)) == (3, 2)
@@ -156,13 +156,13 @@ def test_gains_are_read_off_a_step_of_the_law_alone():
     claim = read_guarantee(stored())
     found = recovered(claim).controller
     assert found.name == "cta"
-    assert dict(found.sampling.settings)["slip_weight"] == claim.held.law.slip_gain * claim.held.step / (
-        claim.held.law.target_gain
-    )
-    first = claim.held.law.pull[0]
+    assert dict(found.sampling.settings)[
+        "slip_weight"
+    ] == claim.sampled_loop.law.slip_gain * claim.sampled_loop.step / (claim.sampled_loop.law.target_gain)
+    first = claim.sampled_loop.law.pull[0]
     wide = replace(first, factor=(first.factor[0], 2 * first.factor[0]))
-    others = claim.held.law.pull[1:]
+    others = claim.sampled_loop.law.pull[1:]
     for pull in (others, (replace(first, argument=(first,)), *others), (wide, *others), ()):
-        law = replace(claim.held.law, pull=pull)
+        law = replace(claim.sampled_loop.law, pull=pull)
         with pytest.raises(UnsupportedError, match="scheme compensated or stick-slip"):
-            recovered(replace(claim, held=replace(claim.held, law=law)))
+            recovered(replace(claim, sampled_loop=replace(claim.sampled_loop, law=law)))

@@ -9,7 +9,7 @@ import pytest
 from quakedesign.exact import LowerBound, UpperBound
 from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, Claims, ContinuousProof, NoProof
-from quakedesign.linear.sampled_stability import HeldLoop, LargestVaryingStep, VaryingVerdict
+from quakedesign.linear.sampled_stability import LargestVaryingStep, SampledStability, VaryingVerdict
 from quakedesign.loop import exact_integrals
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
@@ -20,7 +20,7 @@ LONGEST = LargestVaryingStep(proved=LowerBound("0.15769"), refuted=UpperBound("0
 
 def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
     runs = VaryingVerdict(verdict=verdict, step=F(step), witness=witness)
-    return HeldLoop(runs=runs, longest=longest, radius=0.9)
+    return SampledStability(runs=runs, longest=longest, radius=0.9)
 
 
 @pytest.mark.parametrize(

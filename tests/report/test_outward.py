@@ -44,7 +44,7 @@ def numbers(pattern, text):
 
 def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
     said = "\n".join(verdict_lines(linear))
-    found, held, peaks = linear.analysis, linear.held, linear.peaks
+    found, held, peaks = linear.analysis, linear.sampled, linear.peaks
     expected = {
         "decay rate # 1/s certified": (found.decay.certified,),
         "margin # certified; unstable from # on": (found.slope.certified, found.slope.limit),
@@ -60,7 +60,7 @@ def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
 
 
 def test_every_certified_float_in_the_facts_of_a_linear_law(linear):
-    facts, held = json.loads(json.dumps(linear.to_dict())), linear.held
+    facts, held = json.loads(json.dumps(linear.to_dict())), linear.sampled
     longest = facts["held"]["largest_step"]
     assert F(longest) <= held.largest_step < F(longest) * (1 + F(1, 10**15))
     assert F(facts["held"]["refuted_step"]) >= held.refuted_step

@@ -207,8 +207,8 @@ def test_a_linear_law_is_shown_as_difference_equation_and_for_python_control():
     entry = SimpleNamespace(proof=found)
     names = {}
     exec("\n".join(page._python(entry)), names)
-    law, own = names["law"], found.held.law
-    assert law.dt == float(found.held.step) == 0.184
+    law, own = names["law"], found.sampled_loop.law
+    assert law.dt == float(found.sampled_loop.step) == 0.184
     for matrix, rows in ((law.A, own.update), (law.B, own.measured), (law.C, [own.output]), (law.D, [own.feedback])):
         assert matrix.tolist() == [[float(v) for v in row] for row in rows]
     assert isinstance(law, control.StateSpace)
@@ -220,7 +220,7 @@ def test_a_linear_law_is_shown_as_difference_equation_and_for_python_control():
     assert page._python(implicit) == page._difference(implicit) == []
     large = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     many = SimpleNamespace(proof=large)
-    assert len(large.held.law.states) > 4
+    assert len(large.sampled_loop.law.states) > 4
     assert page._python(many)
     assert page._difference(many) == []
     assert page._python(SimpleNamespace(proof=None)) == []

@@ -48,7 +48,7 @@ SHORT = replace(PATCH, reference=replace(PATCH.reference, target_slip=0.3, opera
 def comparison():
     """A law whose proof is known, over a third of its task, beside a fault that nothing has disturbed yet."""
     guarantee = parse_guarantee(PROOF.read_text())
-    answer = SlidingGuarantee(proof=guarantee, task=guarantee.task, held=guarantee.held)
+    answer = SlidingGuarantee(proof=guarantee, task=guarantee.task, sampled_loop=guarantee.sampled_loop)
     still = simulate_state(SHORT, 1e-9, duration=1e7, inertia=False, method="dop853")
     of_runs = {"scheme": "continuous", "step": None, "plant": "quasi-dynamic", "controller": "none"}
     natural = replace(still, provenance={**still.provenance, **of_runs})
@@ -136,7 +136,7 @@ def test_why_nothing_is_proved_is_said_once_and_at_the_head_of_the_report(compar
         "no law with a hold over 300 s was found whose loop is stable; a proof was found for a stress of at most 7 kPa"
     )
     guarantee = comparison.entries[0].proof
-    none = SlidingGuarantee(proof=NoProof(reason=why), task=guarantee.task, held=None)
+    none = SlidingGuarantee(proof=NoProof(reason=why), task=guarantee.task, sampled_loop=None)
     monkeypatch.setattr(state_feedback, "guarantee_sliding", lambda fault, **asked: none)
     monkeypatch.setattr(compared_in, "natural_run", lambda fault: comparison.uncontrolled)
     without, told = compare(SHORT, [design(SHORT, "elqr")]), io.StringIO()

@@ -23,7 +23,7 @@ STRESS = np.array([50e6, 45e6, 50e6])
 @cache
 def proved():
     found = qd.guarantee(CHAIN).proof
-    assert found.found
+    assert found.available
     return found
 
 

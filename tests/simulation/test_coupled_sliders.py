@@ -16,7 +16,7 @@ from quakedesign.simulation.coupled_sliders import (
     CoupledSliders,
     SlidersRun,
     natural_cycles,
-    simulate_held_blocks,
+    simulate_sampled_blocks,
 )
 
 ALIKE = qd.load_chain(Path(__file__).parents[1] / "data" / "three_sliding_blocks.toml")
@@ -183,7 +183,7 @@ def test_a_run_under_a_law_is_that_of_radau_on_equations_typed_anew(averaged):
         shares = np.array([[1, 0], [1 - part, part], [0, 1]])
         weights = (shares / shares.sum(axis=0)).T
     V, lag, size, turn, periods = 1e-6, 800.0, 2e4, 2 * np.pi / 3e4, 60
-    run = simulate_held_blocks(chain, law, lag=lag, stress=size, period=3e4, duration=400.0 * periods)
+    run = simulate_sampled_blocks(chain, law, lag=lag, stress=size, period=3e4, duration=400.0 * periods)
     S, phases = stiffness(LENGTHS), 2 * np.pi * np.arange(3) / 3
     per_slip = G / LENGTH / MU  # μ* = μ_0 at V = V_0
     ln_theta, x, h, ends = np.log(SLIPS / V), np.zeros(3), np.zeros(len(weights)), []
@@ -235,4 +235,4 @@ def test_runs_that_never_end_are_refused(duration, far):
     with pytest.raises(ParameterError, match="Shorten the duration"):
         natural_cycles(CHAIN, duration, loading_rate=far)
     with pytest.raises(ParameterError, match="at most 100000 samples"):
-        simulate_held_blocks(CHAIN, LAW, lag=800.0, duration=duration)
+        simulate_sampled_blocks(CHAIN, LAW, lag=800.0, duration=duration)

@@ -19,7 +19,7 @@ from quakedesign.guarantees.exact.guarantee_files import load_guarantee, save_gu
 from quakedesign.guarantees.search.compensated_search import implicit_pull, recovered
 from quakedesign.laws import (
     ErrorModel,
-    ImplicitRoot,
+    ImplicitStep,
     RestLimit,
     SampledController,
     SampledLaw,
@@ -433,7 +433,7 @@ def test_a_sliding_mode_of_a_certificate_is_exported_and_asks_for_what_is_proved
     """Near the reference its step is deadbeat, w = -e1/T_s, so that the matrices of the file tell every pressure."""
     real = load_fault("real-fault")
     claim, chosen = load_guarantee(STORED), certified_choice(real, STORED)
-    found, law, step = controller_step(real, chosen.controller), claim.held.law, float(claim.held.step)
+    found, law, step = controller_step(real, chosen.controller), claim.sampled_loop.law, float(claim.sampled_loop.step)
     matrices = (law.update, law.measured, law.output, law.feedback)
     update, fed, output, feedback = (np.array(rows, dtype=float) for rows in matrices)
     random = np.random.default_rng(3)
@@ -451,16 +451,18 @@ def test_a_sliding_mode_of_a_certificate_is_exported_and_asks_for_what_is_proved
 
 def test_gains_of_another_step_are_not_read_off():
     claim = load_guarantee(STORED)
-    first, *rest = claim.held.law.root.pull
+    first, *rest = claim.sampled_loop.law.implicit_step.pull
     nested = replace(first, argument=(first,))
     for law in (
-        replace(claim.held.law, root=replace(claim.held.law.root, pull=(nested, *rest))),
-        replace(claim.held.law, root=replace(claim.held.law.root, pull=tuple(rest))),
-        replace(claim.held.law, update=((F(0), F(0), F(1, 9)), *claim.held.law.update[1:])),
-        replace(claim.held.law, feedback=(*claim.held.law.feedback[:2], F(0))),
+        replace(
+            claim.sampled_loop.law, implicit_step=replace(claim.sampled_loop.law.implicit_step, pull=(nested, *rest))
+        ),
+        replace(claim.sampled_loop.law, implicit_step=replace(claim.sampled_loop.law.implicit_step, pull=tuple(rest))),
+        replace(claim.sampled_loop.law, update=((F(0), F(0), F(1, 9)), *claim.sampled_loop.law.update[1:])),
+        replace(claim.sampled_loop.law, feedback=(*claim.sampled_loop.law.feedback[:2], F(0))),
     ):
         with pytest.raises(UnsupportedError, match="follow from a certificate of a 2-CTA or a 2-DIA"):
-            recovered(replace(claim, held=replace(claim.held, law=law)))
+            recovered(replace(claim, sampled_loop=replace(claim.sampled_loop, law=law)))
     assert recovered(claim).weight == F(7, 20)
 
 
@@ -474,8 +476,10 @@ def test_the_gains_of_a_2_dia_stand_in_powers_and_are_read_off_too(gains, scale,
     claim = compensated(uncertain_plant(real), own, weight, authority, step)
     if isinstance(claim, NoProof):  # the step is that of the law, proved or not
         claim = load_guarantee(STORED)
-        root = ImplicitRoot(pull=implicit_pull(own, step, authority))
-        claim = replace(claim, held=replace(claim.held, law=compensated_law(root, weight, step * authority)))
+        root = ImplicitStep(pull=implicit_pull(own, step, authority))
+        claim = replace(
+            claim, sampled_loop=replace(claim.sampled_loop, law=compensated_law(root, weight, step * authority))
+        )
     found = recovered(claim).controller
     assert found.name == "dia"
     assert implicit_pull(found, step, authority) == implicit_pull(own, step, authority)
@@ -488,10 +492,18 @@ def test_the_gains_of_a_2_dia_stand_in_powers_and_are_read_off_too(gains, scale,
         first, pressures[0] = one.function(seen, pressures[0], first)
         second, pressures[1] = two.function(seen, pressures[1], second)
         assert float(pressures[0]) == pytest.approx(float(pressures[1]), rel=1e-9, abs=1e-6)
-    scaled = replace(claim.held.law.root.pull[0], factor=tuple(2 * v for v in claim.held.law.root.pull[0].factor))
-    other = replace(claim.held.law.root, pull=(*claim.held.law.root.pull, scaled))
+    scaled = replace(
+        claim.sampled_loop.law.implicit_step.pull[0],
+        factor=tuple(2 * v for v in claim.sampled_loop.law.implicit_step.pull[0].factor),
+    )
+    other = replace(claim.sampled_loop.law.implicit_step, pull=(*claim.sampled_loop.law.implicit_step.pull, scaled))
     with pytest.raises(UnsupportedError):
-        recovered(replace(claim, held=replace(claim.held, law=replace(claim.held.law, root=other))))
+        recovered(
+            replace(
+                claim,
+                sampled_loop=replace(claim.sampled_loop, law=replace(claim.sampled_loop.law, implicit_step=other)),
+            )
+        )
 
 
 def test_a_certificate_of_a_2_dia_is_exported(tmp_path):

@@ -159,7 +159,7 @@ def test_a_held_run_agrees_with_an_independent_integrator(name):
     assert np.max(np.abs(log_rate)) > 0.02
     assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
     assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
-    assert run.pressure == pytest.approx(STIFFNESS * V / MU * run.time + run.asked, abs=1e-6)
+    assert run.pressure == pytest.approx(STIFFNESS * V / MU * run.time + run.feedback_pressure, abs=1e-6)
     assert np.diff(run.time) == pytest.approx(10.0, rel=1e-12)  # four instants a period
     assert run.slip_rate[0] == pytest.approx(V, rel=1e-10)
     stress = tide.amplitude * np.sin(2 * np.pi * run.time / tide.period)
@@ -254,7 +254,7 @@ def test_a_pump_that_is_late_and_cut_off_and_readings_in_steps_are_those_of_an_i
     assert run.slip_error[4::4] == pytest.approx(error, abs=1e-6 * np.max(np.abs(error)))
     assert np.log(run.slip_rate[4::4] / V) == pytest.approx(log_rate, abs=1e-6)
     assert -30e3 <= run.pressure.min() < -29e3
-    assert run.asked.min() < -60e3
+    assert run.feedback_pressure.min() < -60e3
     given = {"actuator": Actuator(stages=stages), "measurement": Transducer(quantum=step), "plant": "quasi-dynamic"}
     controller = SampledLoop(law=law, step=STEP).controller
     same = simulate(fault(), controller, tide=tide, duration=2000.0, samples=200, **given)

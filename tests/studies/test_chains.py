@@ -61,7 +61,7 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     class Proved:
         """Stands for a proof, whose search takes seconds."""
 
-        found, notes = True, ("a note",)
+        available, notes = True, ("a note",)
         part = SimpleNamespace(disturbances=[((), F(1))] * 2 + [((), F(1, 10**7))] * 2)  # forces, balances
         law = MatrixLaw(
             step=F(23, 125),
@@ -157,7 +157,7 @@ def test_pressures_themselves_are_those_of_equilibrium_and_what_is_proved_beside
     """Friction falls to its least after one critical slip, or stays at its largest over the whole task."""
     chain = replace(CHAIN, blocks=(replace(CHAIN.blocks[0], length=2500.0),) * 2, wells=(1250.0, 3750.0))
     claims = PlantClaims(outputs=(UpperBound(1),) * 4, controls=(UpperBound(1000), UpperBound(2000)))
-    found = SimpleNamespace(claims=claims, found=True)
+    found = SimpleNamespace(claims=claims, available=True)
     pressures = np.array([[0.0, -14.1e6], [1e6, -14.2e6], [2e6, 14.1e6]])
     seen = {"slip_rate": np.zeros((3, 2)), "slip_error": np.zeros(2), "rest": np.ones(2), "times": [7.0]}
     run = SimpleNamespace(pressure=pressures, reversed=False, opened=True, **seen)

@@ -54,7 +54,7 @@ def test_a_task_beyond_the_rates_of_its_friction_is_said_to_be_extrapolated(slow
 def test_the_difference_equations_of_the_report_are_the_recursion_that_runs():
     """The numbers of the LaTeX in the recursion of FORMAT.md against the controller of the scheme."""
     claim = load_guarantee(CERTIFICATES / "stick_slip_real-fault.json")
-    law, step = claim.held.law, float(claim.held.step)
+    law, step = claim.sampled_loop.law, float(claim.sampled_loop.step)
     latex = stick_slip_latex(law, step)
 
     def numbers(text):

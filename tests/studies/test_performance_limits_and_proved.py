@@ -46,21 +46,21 @@ def designs(monkeypatch):
         if objective == "tracking":
             assert (step, delay) == (rational(REAL.sampling_time), 0)
             claims = dataclasses.replace(CLAIMS, slip_rate_error=UpperBound(longest["tracking"]))
-            return TrackingProof(task=task, held=SampledLoop(law=LAW, step=step, delay=delay), claims=claims)
+            return TrackingProof(task=task, sampled_loop=SampledLoop(law=LAW, step=step, delay=delay), claims=claims)
         asked.append((step, delay))
         if step > longest["step"] or delay > longest["delay"]:
             return NoProof(reason="too long")
-        return TrackingProof(task=task, held=SampledLoop(law=LAW, step=step, delay=delay), claims=CLAIMS)
+        return TrackingProof(task=task, sampled_loop=SampledLoop(law=LAW, step=step, delay=delay), claims=CLAIMS)
 
     def claimed(task, step, **around):
-        return TrackingProof(task=task, held=SampledLoop(law=LAW, step=step, **around), claims=CLAIMS)
+        return TrackingProof(task=task, sampled_loop=SampledLoop(law=LAW, step=step, **around), claims=CLAIMS)
 
     def longest_step(task, **told):
         tellings.append(told)
         return Longest(claimed(task, longest["step"]), None) if longest["step"] else None
 
     found = {
-        "design_held": designed,
+        "design_sampled_law": designed,
         "longest_step": longest_step,
         "design_at": lambda task, one: one.guarantee,
         "continued": lambda *_, **__: None,
@@ -105,7 +105,7 @@ def test_what_is_proved_of_t_s_delay_and_rock_is_what_the_searches_of_designs_fi
     assert found.largest_step.proved_up_to == F(4, 5)
     assert found.largest_delay.proved_up_to == F(95, 1000)
     assert found.largest_diffusion_time.proved_up_to == 5
-    assert [g.held.step for g in found.proved] == [rational(REAL.sampling_time), F(4, 5)]
+    assert [g.sampled_loop.step for g in found.proved] == [rational(REAL.sampling_time), F(4, 5)]
 
 
 @pytest.mark.parametrize(("diffusivity", "well"), [(1.0, 5**0.5), (0.02, 0.1**0.5)])

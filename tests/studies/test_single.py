@@ -181,7 +181,7 @@ def test_a_design_is_for_what_stands_around_it_in_the_run(monkeypatch):
 
 
 def test_a_design_without_a_proof_behind_its_path_is_refused_with_the_reason(monkeypatch):
-    sooner = SimpleNamespace(held=SimpleNamespace(step=F(1, 200)))
+    sooner = SimpleNamespace(sampled_loop=SimpleNamespace(step=F(1, 200)))
     for shorter, said in ((sooner, "Give --step '0.005 s'"), (None, "Give gains as numbers")):
         none = SimpleNamespace(proved=False, proof=NoProof(reason="nothing holds"), shorter=shorter)
         designs_in_place_of_searches(monkeypatch, none)

@@ -77,7 +77,7 @@ def test_loops_that_the_theorem_does_not_know_are_proved_without_stick(monkeypat
     monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", None)
     sampled = SimpleNamespace(runs=plain, reason="", premises=tuple)
     monkeypatch.setattr(FEEDBACK, "sampled_design", lambda *_, **__: sampled)
-    monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
+    monkeypatch.setattr(FEEDBACK, "design_sampled_law", lambda *_, **__: plain)
     monkeypatch.setattr(FEEDBACK, "with_worst_case", lambda fault, found: SimpleNamespace(proof=found, proved=True))
     assert qd.design(REAL, "elqr", **asked).guarantee is plain
     assert qd.guarantee(REAL, **asked).proof is plain
@@ -126,7 +126,7 @@ def test_the_scheme_for_friction_that_sticks_has_no_guarantee_without_stick():
 def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(monkeypatch):
     """The linear law's guarantee is stored; λ is that for which the step is deadbeat, and the design checks itself."""
     stored = load_guarantee(PROOFS / "stick_slip_cta_real-fault.json")
-    linear = replace(stored, held=replace(stored.held, law=replace(stored.held.law, pull=())))
+    linear = replace(stored, sampled_loop=replace(stored.sampled_loop, law=replace(stored.sampled_loop.law, pull=())))
     monkeypatch.setattr(COMPENSATED, "design_stick_slip", lambda *_, implicit, **__: linear)
     monkeypatch.setattr(SLIDING, "sampled_sliding_mode", None)  # not searched as well
     design = qd.design(REAL, "cta")
@@ -135,9 +135,9 @@ def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(m
     assert design.compensation.controller is design.controller
     assert "in the scheme stick-slip with slip weight 0.5, weight 0.3 and B0 = " in design.compensation.sentence()
     assert "its implicit step is deadbeat" in design.compensation.sentence()
-    found = design.guarantee.held
-    assert sorted_terms(found.law.pull) == sorted_terms(stored.held.law.pull)
-    assert replace(found, law=replace(found.law, pull=())) == linear.held
+    found = design.guarantee.sampled_loop
+    assert sorted_terms(found.law.pull) == sorted_terms(stored.sampled_loop.law.pull)
+    assert replace(found, law=replace(found.law, pull=())) == linear.sampled_loop
     again = recovered(design.guarantee)
     assert sticking_loop(again.controller).law.target_gain == found.law.target_gain
     assert guarantee_of(uncertain_plant(REAL), design.controller, setup=ExactSetup(rate_noise=F(1))).reason.endswith(
@@ -170,11 +170,11 @@ def test_a_sliding_mode_without_that_proof_falls_back_and_says_why(monkeypatch, 
 
 def test_where_no_scale_makes_the_step_deadbeat_there_is_no_guarantee(monkeypatch):
     stored = load_guarantee(PROOFS / "stick_slip_cta_real-fault.json")
-    linear = replace(stored, held=replace(stored.held, law=replace(stored.held.law, pull=())))
+    linear = replace(stored, sampled_loop=replace(stored.sampled_loop, law=replace(stored.sampled_loop.law, pull=())))
     monkeypatch.setattr(COMPENSATED, "design_stick_slip", lambda *_, **__: linear)
     monkeypatch.setattr(COMPENSATED, "holds", lambda root, *_: root.slopes[0] < 1)  # nearly deadbeat is not enough
     base = control_law("cta").base_gains()[0].law.with_divisor(stored.task.authority)
-    found = COMPENSATED.design_sticking(stored.task, base, stored.held.step)
+    found = COMPENSATED.design_sticking(stored.task, base, stored.sampled_loop.step)
     assert found.reason == "the implicit step is deadbeat for no scale that is tried"
 
 
@@ -197,7 +197,7 @@ def test_a_guarantee_takes_the_first_that_is_proved(monkeypatch, sticking, plain
         "no controller with zero-order hold over T_s = 0.184 s keeps the slip rate below 1"
     )
     monkeypatch.setattr(GUARANTEE, "guarantee_stick_slip", lambda *_, **__: replace(answer, proof=NONE))
-    monkeypatch.setattr(FEEDBACK, "design_held", lambda *_, **__: plain)
+    monkeypatch.setattr(FEEDBACK, "design_sampled_law", lambda *_, **__: plain)
     monkeypatch.setattr(FEEDBACK, "with_worst_case", lambda fault, found: TrackingGuarantee(fault=fault, proof=found))
     found = qd.guarantee(REAL)
     assert found.proof is plain

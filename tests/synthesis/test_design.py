@@ -183,8 +183,8 @@ def test_a_simulation_that_holds_the_pressure_agrees_with_both_guarantees(real, 
     assert free.guarantee.sentence().startswith(
         "none: with zero-order hold over 0.184 s even the nominal loop is not stable"
     )
-    assert free.held_loop().to_dict()["verdict"] == "refuted"
-    assert sampled.held_loop() is None
+    assert free.sampled_stability().to_dict()["verdict"] == "refuted"
+    assert sampled.sampled_stability() is None
     assert "no bound of peaks" in sampled.certified_peaks().reason
     held = qd.simulate(real, sampled.controller, duration=400.0)
     unstable = qd.simulate(real, free.controller, scheme="explicit", plant="printed", duration=400.0)

@@ -24,7 +24,7 @@ def test_texts_with_units_are_the_exact_numbers_of_a_setup():
 def test_texts_with_units_are_the_exact_numbers_of_an_answer():
     told = {"step": "100 ms", "lag": "8 ms", "slip_noise": "0.1 um", "rate_noise": 1e-7}
     found = qd.guarantee(REAL, gains=GAINS, saturation="20 MPa", withdrawal="15e6", **told).proof
-    held = found.held
+    held = found.sampled_loop
     assert (held.step, held.lag, held.slip_noise, held.rate_noise) == (F(1, 10), F(1, 125), F(1, 10**7), F(1, 10**7))
     assert (held.pump.least, held.pump.largest) == (-15 * 10**6, 20 * 10**6)
     same = {"step": held.step, "lag": held.lag, "slip_noise": held.slip_noise, "rate_noise": held.rate_noise}

@@ -22,7 +22,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.guarantees import tracking_result
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, save_guarantee
 from quakedesign.laws import NominalModel
-from quakedesign.loop import held_loop
+from quakedesign.loop import sampled_error_loop
 from quakedesign.plant import uncertain_plant
 from quakedesign.report import comparison_table
 from quakedesign.report.summary import summary
@@ -186,7 +186,7 @@ def test_a_law_of_slip_and_slip_rate_moves_its_errors_as_the_inputs_of_the_loop_
     one = Fraction
     law = qd.SampledLaw.from_gains([7e8, 4e8, 1e8], step="0.1", inputs=("slip", "slip_rate")).law
     model = NominalModel(slip=one("0.9"), rate=one("1.6"), gain=one("2.5e-8"))
-    loop = held_loop(law, model, one("2.5e-8"), one("0.1"), delay=one("0.03"))
+    loop = sampled_error_loop(law, model, one("2.5e-8"), one("0.1"), delay=one("0.03"))
     n = len(loop.states)
     rows = lambda matrix: np.array([[float(v) for v in row] for row in matrix])  # noqa: E731
     drift = -s * pace  # b·dp*/dt, as b(p* ) = −s·r
@@ -297,7 +297,9 @@ def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one()
     assert wrong.lines()[1] == f"not this law, but the same law with its output times -1: {half.proof.sentence()}"
     of_slip = {"step": "0.184", "inputs": ("slip", "slip_rate")}
     turned = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], **of_slip)).nearest[1]
-    assert turned.held.law == qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], **of_slip).law  # what acts on r' turns too
+    assert (
+        turned.sampled_loop.law == qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], **of_slip).law
+    )  # what acts on r' turns too
     standing = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2e8], step="0.184"))
     assert (standing.nearest, len(standing.lines())) == (None, 1)  # no factor adds an integral
 
@@ -370,7 +372,7 @@ def test_a_law_is_compared_and_assessed_in_its_setup():
     designed = qd.assess(REAL, LAW, qd.LoopSetup(delay="20 ms"))
     assert str(designed.verdict) == "proved"
     assert designed.controller.delay == Fraction("0.02")
-    assert designed.guarantee.held.delay == Fraction("0.02")
+    assert designed.guarantee.sampled_loop.delay == Fraction("0.02")
     seen = qd.compare(qd.load_fault("lab-fault"), [qd.SampledLaw.from_pid(1, 0.1, step=0.01)], with_published=False)
     (entry,) = seen.of("designed")
     assert entry.label == "PID (given)"
@@ -403,7 +405,7 @@ def test_assess_and_compare_take_quantities_of_the_setup_by_name():
         qd.assess(REAL, LAW, dela="5 ms")
     with pytest.raises(ParameterError, match="loop setup of a comparison needs given laws"):
         qd.compare(REAL, [], delay="5 ms")
-    assert qd.assess(REAL, LAW, delay="20 ms").guarantee.held.delay == Fraction("0.02")
+    assert qd.assess(REAL, LAW, delay="20 ms").guarantee.sampled_loop.delay == Fraction("0.02")
 
 
 def test_the_command_line_takes_the_file_of_a_law(stuck, tmp_path, capsys):
@@ -442,7 +444,7 @@ def test_the_lqg_of_the_page_is_proved_with_a_delay_and_without(stuck, delay):
     assert lqg.count('"20 ms"') == 1
     exec(lqg.replace('"20 ms"', repr(delay)), names)
     assert names["answer"].proved
-    assert names["answer"].proof.held.delay == Fraction(delay.split()[0]) / 1000
+    assert names["answer"].proof.sampled_loop.delay == Fraction(delay.split()[0]) / 1000
 
 
 @pytest.mark.slow
@@ -468,7 +470,7 @@ def test_a_law_without_a_guarantee_names_a_smaller_delay_that_has_one(monkeypatc
     late = qd.guarantee(REAL, law=law, delay="0.15 s")
     assert not late.proved
     name, near = late.nearest
-    assert (name, near.held.delay) == ("delay", Fraction(9, 80))
+    assert (name, near.sampled_loop.delay) == ("delay", Fraction(9, 80))
     assert str(near.check()) == "proved"
-    assert near.held.law == law.law
+    assert near.sampled_loop.law == law.law
     assert late.lines()[1].startswith("this law with a delay of 0.1125 s: on the plant without stick")

@@ -11,7 +11,7 @@ from msgspec import Meta
 from msgspec.structs import astuple
 
 from quakedesign.files import Json
-from quakedesign.laws.implicit_root import MOST_TERMS, ImplicitRoot, Power
+from quakedesign.laws.implicit_root import MOST_TERMS, ImplicitStep, Power
 from quakedesign.plant.fault_plant import FaultPlant, Friction
 from quakedesign.sos.exact.strict import Entries, Name, made
 
@@ -103,16 +103,16 @@ class PowerEntries(Entries):
 Powers = Annotated[tuple[PowerEntries, ...], Meta(max_length=MOST_TERMS)]
 
 
-class RootEntries(Entries):
+class ImplicitStepEntries(Entries):
     """The sum q of an implicit step, and the sector bound of its solution."""
 
     pull: Powers
     slopes: Pair
     remainder: Fraction
 
-    def value(self) -> ImplicitRoot:
+    def value(self) -> ImplicitStep:
         """The implicit step."""
-        return made(ImplicitRoot, self, pull=powers(self.pull))
+        return made(ImplicitStep, self, pull=powers(self.pull))
 
 
 def powers(terms: tuple[PowerEntries, ...]) -> tuple[Power, ...]:

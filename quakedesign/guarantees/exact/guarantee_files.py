@@ -19,10 +19,10 @@ from quakedesign.files import Json, write_whole
 from quakedesign.guarantees.exact.file_entries import (
     MOST_STATES,
     FaultName,
+    ImplicitStepEntries,
     Matrix,
     Names,
     Pair,
-    RootEntries,
     Row,
     SlipAndRate,
     TaskEntries,
@@ -34,7 +34,7 @@ from quakedesign.guarantees.exact.plant_proof import PlantProof, plant_entries, 
 from quakedesign.guarantees.exact.sampled_loop import SampledLoop
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
 from quakedesign.guarantees.exact.sliding_small_gain import SlidingClaims, loop_of, model_of
-from quakedesign.guarantees.exact.small_gain import SlowGain
+from quakedesign.guarantees.exact.small_gain import VaryingGain
 from quakedesign.guarantees.exact.tracking_proof import Claims, ContinuousProof, TrackingProof
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import ContinuousLaw, StateLaw
@@ -91,7 +91,7 @@ class SampledLoopEntries(Entries, kw_only=True):
     first: Matrix = ()
     applied: Row = ()
     of_reference: Matrix = ()
-    root: RootEntries | None = None
+    root: ImplicitStepEntries | None = None
     noise: SlipAndRate | None = None
     jitter: JitterEntries | None = None
     pump: PumpEntries | None = None
@@ -100,9 +100,9 @@ class SampledLoopEntries(Entries, kw_only=True):
     output: Row
     feedback: Row
 
-    def held(self, start: SlipAndRate | None) -> SampledLoop:
+    def sampled_loop(self, start: SlipAndRate | None) -> SampledLoop:
         """The loop with bounds of its initial errors."""
-        law = made(LinearLaw, self, root=None if self.root is None else self.root.value())
+        law = made(LinearLaw, self, implicit_step=None if self.root is None else self.root.value())
         need(not law.of_reference or any(map(any, law.of_reference)), "of_reference must not be zero if given")
         noise, initial = ((_ZERO, _ZERO) if pair is None else astuple(pair) for pair in (self.noise, start))
         need(start is None or any(initial), "start must have a bound above 0 if given")
@@ -148,7 +148,7 @@ class TrackingFile(TaskEntries, kw_only=True):
 
     loop: SampledLoopEntries
     start: SlipAndRate | None = None
-    slow_gain: SlowGain | None = None
+    slow_gain: VaryingGain | None = None
     reach: InvariantPolytope | None = None
     claims: Claims
 
@@ -164,21 +164,49 @@ def _tracking_entries(claim: TrackingProof | ContinuousProof) -> Any:
     task = task_entries(claim.task)
     if isinstance(claim, ContinuousProof):
         return written(ContinuousFile(**task, loop=made(ContinuousLoopEntries, claim.law), claims=claim.claims))
-    held, law = claim.held, claim.held.law
+    sampled_loop, law = claim.sampled_loop, claim.sampled_loop.law
     noise, jitter, pump = None, None, None
-    if any(held.noise.values()):
-        noise = SlipAndRate(slip=held.noise.get("slip_noise", _ZERO), rate=held.noise.get("rate_noise", _ZERO))
-    if held.jitter or held.delay_jitter or held.averaging:
-        jitter = JitterEntries(measured=held.jitter, delay=held.delay_jitter, mean=held.averaging)
-    if held.pump is not None and held.pump.to_dict():
-        pump = made(PumpEntries, held.pump, ramp=held.ramp if held.pump.rate is not None else _ZERO)
-    root = None if law.root is None else made(RootEntries, law.root, pull=power_entries(law.root.pull))
-    loop = made(
-        SampledLoopEntries, held, law, root=root, noise=noise, jitter=jitter, pump=pump, longest=held.longest_step
+    if any(sampled_loop.noise.values()):
+        noise = SlipAndRate(
+            slip=sampled_loop.noise.get("slip_noise", _ZERO), rate=sampled_loop.noise.get("rate_noise", _ZERO)
+        )
+    if sampled_loop.jitter or sampled_loop.delay_jitter or sampled_loop.averaging:
+        jitter = JitterEntries(
+            measured=sampled_loop.jitter, delay=sampled_loop.delay_jitter, mean=sampled_loop.averaging
+        )
+    if sampled_loop.pump is not None and sampled_loop.pump.to_dict():
+        pump = made(
+            PumpEntries, sampled_loop.pump, ramp=sampled_loop.ramp if sampled_loop.pump.rate is not None else _ZERO
+        )
+    implicit_step = (
+        None
+        if law.implicit_step is None
+        else made(ImplicitStepEntries, law.implicit_step, pull=power_entries(law.implicit_step.pull))
     )
-    start = SlipAndRate(slip=held.start[0], rate=held.start[1]) if any(held.start) else None
+    loop = made(
+        SampledLoopEntries,
+        sampled_loop,
+        law,
+        root=implicit_step,
+        noise=noise,
+        jitter=jitter,
+        pump=pump,
+        longest=sampled_loop.longest_step,
+    )
+    start = (
+        SlipAndRate(slip=sampled_loop.initial_errors[0], rate=sampled_loop.initial_errors[1])
+        if any(sampled_loop.initial_errors)
+        else None
+    )
     return written(
-        TrackingFile(**task, loop=loop, start=start, slow_gain=claim.slow_gain, reach=claim.reach, claims=claim.claims)
+        TrackingFile(
+            **task,
+            loop=loop,
+            start=start,
+            slow_gain=claim.varying_gain,
+            reach=claim.invariant_set,
+            claims=claim.claims,
+        )
     )
 
 
@@ -191,17 +219,23 @@ def _read_tracking(raw: Json) -> TrackingProof | ContinuousProof:
         paced = pumped = False
     else:
         sampled = read_as(TrackingFile, raw)
-        task, held = sampled.plant(), sampled.loop.held(sampled.start)
-        reach, slow_gain = sampled.reach, sampled.slow_gain
+        task, sampled_loop = sampled.plant(), sampled.loop.sampled_loop(sampled.start)
+        invariant_set, slow_gain = sampled.reach, sampled.slow_gain
         if slow_gain is not None:
             slow_gain.models(task)
-        free = bool(held.longest_step)
-        need(free == (reach is not None), "reach must be given for aperiodic sampling, and for that alone")
+        free = bool(sampled_loop.longest_step)
+        need(free == (invariant_set is not None), "reach must be given for aperiodic sampling, and for that alone")
         need(not free or slow_gain is None, "aperiodic sampling must have no slow_gain")
-        claim = TrackingProof(task=task, held=held, claims=sampled.claims, slow_gain=slow_gain, reach=reach)
-        if reach is not None:
-            require_fit(claim.loop, reach)
-        paced, pumped = bool(held.ramp), held.pump is not None
+        claim = TrackingProof(
+            task=task,
+            sampled_loop=sampled_loop,
+            claims=sampled.claims,
+            varying_gain=slow_gain,
+            invariant_set=invariant_set,
+        )
+        if invariant_set is not None:
+            require_fit(claim.loop, invariant_set)
+        paced, pumped = bool(sampled_loop.ramp), sampled_loop.pump is not None
     claims, loop = claim.claims, claim.loop
     both = (claims.least_asked is None) == (claims.largest_asked is None)
     need(both, "claims must have both of least_asked and largest_asked, or neither")
@@ -282,13 +316,17 @@ class SlidingFile(Entries):
 
 
 def _sliding_entries(claim: SlidingProof) -> Any:
-    task, held, law = claim.task, claim.held, claim.held.law
+    task, sampled_loop, law = claim.task, claim.sampled_loop, claim.sampled_loop.law
     file = SlidingFile(
         fault=made(SlidingFaultEntries, task, **task.ranges),
         reference=made(SlidingReferenceEntries, task),
         stress=task.stress,
         loop=made(
-            SlidingLoopEntries, held, law, measured=tuple(row[0] for row in law.measured), feedback=law.feedback[0]
+            SlidingLoopEntries,
+            sampled_loop,
+            law,
+            measured=tuple(row[0] for row in law.measured),
+            feedback=law.feedback[0],
         ),
         cells=tuple(() if cut is None else (cut[0], str(cut[1])) for cut in claim.cuts),
         claims=claim.claims,
@@ -302,10 +340,12 @@ def _read_sliding(raw: Json) -> SlidingProof:
     task = made(SlidingPlant, file.fault, file.reference, ranges=ranges, stress=file.stress)
     measured = tuple((gain, _ZERO) for gain in file.loop.measured)
     law = made(LinearLaw, file.loop, measured=measured, feedback=(file.loop.feedback, _ZERO))
-    claim = SlidingProof(task=task, held=made(SampledLoop, file.loop, law=law), cuts=_cuts(file), claims=file.claims)
+    claim = SlidingProof(
+        task=task, sampled_loop=made(SampledLoop, file.loop, law=law), cuts=_cuts(file), claims=file.claims
+    )
     cells(task, claim.cuts)
     model = model_of(task, claim.claims)
-    _require_few(loop_of(claim.held, model, task).states if model is not None else ())
+    _require_few(loop_of(claim.sampled_loop, model, task).states if model is not None else ())
     return claim
 
 

@@ -5,7 +5,7 @@ does not measure T. Let the map of a sample be J = CB, B its reduced row echelon
 columns at B's pivots. With x₋ the state just before a sample, the sample retains only ξ = Bx₋. At a time θ after it,
 x(θ) = e^{Aθ}(Cξ + Σ j·n) + ∫₀^θ e^{Aσ}Σ b_i·w_i dσ, n the sampled inputs.
 
-**Theorem.** Let X = {ξ: |h_l·ξ| ≤ 1 for all l}, 0 ∈ X, and let every input be at most W_i. Suppose |h_l·Bx(T)| ≤ 1 for
+**Theorem.** Let X = {ξ: |h_l·ξ| ≤ 1 for all l}, 0 ∈ X, and let |w_i| ≤ W_i for every input. Suppose |h_l·Bx(T)| ≤ 1 for
 all l and T_s ≤ T ≤ T_m, and |c_y·x(θ)| ≤ Y_y for 0 ≤ θ ≤ T_m, for all ξ ∈ X and all such inputs. If W_i ≥ F_i + Σ_y
 c_iy·Y_y for every input, with F_i and c_iy as in `small_gain`, then for the initial state 0, |y| ≤ Y_y for every output
 y and all t.
@@ -33,7 +33,7 @@ from flint import arb, arb_mat, ctx, fmpq, fmpq_mat
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import shortly
-from quakedesign.guarantees.exact.norms import BALLS, Arithmetic, absolute, ball, beside, column, matrix, upper
+from quakedesign.guarantees.exact.norms import BALLS, Arithmetic, absolute, ball, column, hstack, matrix, upper
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import Channel, SampledLoop, channels_of
 from quakedesign.guarantees.exact.small_gain import Bounds, unshifted
@@ -60,14 +60,14 @@ class InvariantPolytope:
     facets : tuple of rows
         h_l, of r entries each.
     at_samples : tuple of tuple of Basis
-        For every facet, the indices of r facets, from 0, at each end of equal pieces of [T_s, T_m].
+        For every facet, zero-based indices of r facets at each end of equal pieces of [T_s, T_m].
     between : tuple of tuple of Basis
         The same for every output on [0, T_m].
 
     Raises
     ------
     ParameterError
-        When the sizes do not fit.
+        When the dimensions do not match.
     """
 
     inputs: Row
@@ -134,20 +134,22 @@ def _even(table: tuple[tuple[Basis, ...], ...]) -> bool:
     return len({len(row) for row in table}) == 1 and 2 <= len(table[0]) <= MOST_PIECES + 1
 
 
-def reached_bounds(task: FaultPlant, held: SampledLoop, reach: InvariantPolytope) -> Bounds | NoProof:
+def reached_bounds(task: FaultPlant, sampled_loop: SampledLoop, invariant_set: InvariantPolytope) -> Bounds | NoProof:
     """Bounds of the theorem, or the condition that fails."""
-    loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
+    loop, channels = sampled_loop.loop(task), channels_of(task, None, sampled_loop.step, sampled_loop.noise)
     with ctx.workprec(_BITS):
         try:
-            outputs = _SampleMap.of(loop, channels, reach).outputs(held.step, held.longest_step, reach)
+            outputs = _SampleMap.of(loop, channels, invariant_set).outputs(
+                sampled_loop.step, sampled_loop.longest_step, invariant_set
+            )
         except ParameterError as error:
             return NoProof(reason=str(error))
     largest = dict(zip(loop.outputs, outputs, strict=True))
     shares = [sum((c * largest[y] for y, c in channel.shares.items()), _ZERO) for channel in channels]
-    for channel, share, bound in zip(channels, shares, reach.inputs, strict=True):
+    for channel, share, bound in zip(channels, shares, invariant_set.inputs, strict=True):
         if channel.own + share > bound:
             return NoProof(reason=f"the {channel.name} may exceed its bound in the invariant set")
-    gains = (share / bound for share, bound in zip(shares, reach.inputs, strict=True) if bound)
+    gains = (share / bound for share, bound in zip(shares, invariant_set.inputs, strict=True) if bound)
     return Bounds(
         slip_error=largest["slip_error"],
         slip_rate_error=largest["slip_rate_error"],
@@ -163,7 +165,7 @@ class BetweenSamples:
     by: Arithmetic
     flow: arb_mat
     inputs: arb_mat
-    known: dict[Fraction, tuple[arb_mat, arb_mat]] = field(default_factory=dict)
+    cached: dict[Fraction, tuple[arb_mat, arb_mat]] = field(default_factory=dict)
 
     def along(
         self, rows: arb_mat, ends: Sequence[Fraction], first: int, largest: arb_mat, bounds: list[arb]
@@ -178,7 +180,7 @@ class BetweenSamples:
             h, following, bent = by.number(piece), rows * step, by.absolute(rows * self.flow * self.flow) * within
             if i >= first:
                 slope = by.scaled(by.absolute(rows * self.flow) * within * sizes, bounds)
-                yield rows, area, by.sums(by.beside([bent * largest, slope])) * h**2 / 8
+                yield rows, area, by.sums(by.hstack([bent * largest, slope])) * h**2 / 8
             heights = by.modulus(rows * self.inputs) + by.modulus(following * self.inputs)
             area = area + by.sums(by.scaled(heights * h / 2 + bent * sizes * h**3 / 12, bounds))
             rows = following
@@ -186,17 +188,17 @@ class BetweenSamples:
 
     def _step(self, piece: Fraction) -> tuple[arb_mat, arb_mat]:
         """e^{Ah} and an upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h."""
-        if piece not in self.known:
+        if piece not in self.cached:
             h = self.by.number(piece)
-            self.known[piece] = (self.flow * h).exp(), self.by.absolute((self.by.majorant(self.flow) * h).exp())
-        return self.known[piece]
+            self.cached[piece] = (self.flow * h).exp(), self.by.absolute((self.by.majorant(self.flow) * h).exp())
+        return self.cached[piece]
 
 
 @dataclass(frozen=True)
 class _SampleMap:
     """Map from one sample to the next: B, C, H, output rows, inputs of the flow and of samples, with their bounds."""
 
-    between: BetweenSamples
+    flow: BetweenSamples
     seen: arb_mat
     lift: arb_mat
     facets: fmpq_mat
@@ -205,21 +207,21 @@ class _SampleMap:
     sampled: list[tuple[arb_mat, arb]]
 
     @classmethod
-    def of(cls, loop: PeriodicLoop, channels: Sequence[Channel], reach: InvariantPolytope) -> "_SampleMap":
+    def of(cls, loop: PeriodicLoop, channels: Sequence[Channel], invariant_set: InvariantPolytope) -> "_SampleMap":
         """Map for a loop with one jump, and a set of matching size."""
         seen, lift = reduced(loop.segments[0].jump)
-        bounds = {channel.name: ball(bound) for channel, bound in zip(channels, reach.inputs, strict=True)}
+        bounds = {channel.name: ball(bound) for channel, bound in zip(channels, invariant_set.inputs, strict=True)}
         return cls(
-            between=BetweenSamples(BALLS, matrix(loop.flow), beside([column(v) for v in loop.inputs.values()])),
+            flow=BetweenSamples(BALLS, matrix(loop.flow), hstack([column(v) for v in loop.inputs.values()])),
             seen=arb_mat(seen),
             lift=arb_mat(lift),
-            facets=_exact(reach.facets),
+            facets=_exact(invariant_set.facets),
             rows=matrix(tuple(loop.outputs.values())),
             bounds=[bounds[name] for name in loop.inputs],
             sampled=[(column(entry), bounds[name]) for name, entry in loop.sampled.items()],
         )
 
-    def outputs(self, soonest: Fraction, latest: Fraction, reach: InvariantPolytope) -> list[Fraction]:
+    def outputs(self, soonest: Fraction, latest: Fraction, invariant_set: InvariantPolytope) -> list[Fraction]:
         """Y of every output.
 
         Raises
@@ -228,17 +230,19 @@ class _SampleMap:
             When the state may leave the set, or facets are not independent.
         """
         ends = [soonest * i / SOONEST for i in range(SOONEST)]
-        ends += _cut(soonest, latest, len(reach.at_samples[0]) - 1)
-        for number, (facet, bases) in enumerate(zip(arb_mat(self.facets).tolist(), reach.at_samples, strict=True)):
+        ends += _cut(soonest, latest, len(invariant_set.at_samples[0]) - 1)
+        for number, (facet, bases) in enumerate(
+            zip(arb_mat(self.facets).tolist(), invariant_set.at_samples, strict=True)
+        ):
             if not self._largest(arb_mat([facet]) * self.seen, ends, bases) <= 1:
                 raise ParameterError(f"the state at a sample may leave the set through facet {number}")
-        ends = _cut(_ZERO, latest, len(reach.between[0]) - 1)
-        rows = zip(self.rows.tolist(), reach.between, strict=True)
+        ends = _cut(_ZERO, latest, len(invariant_set.between[0]) - 1)
+        rows = zip(self.rows.tolist(), invariant_set.between, strict=True)
         return [upper(self._largest(arb_mat([row]), ends, bases)) for row, bases in rows]
 
     def _largest(self, row: arb_mat, ends: list[Fraction], bases: tuple[Basis, ...]) -> arb:
-        """Bound of |c·x(θ)| for every θ from the piece end of the first basis on."""
-        places = self.between.along(row, ends, len(ends) - len(bases), self._largest_state, self.bounds)
+        """Bound of |c·x(θ)| for all θ ≥ the piece end of the first basis."""
+        places = self.flow.along(row, ends, len(ends) - len(bases), self._largest_state, self.bounds)
         pieces = [
             (self._height(now, basis) + area[0, 0], more[0, 0])
             for (now, area, more), basis in zip(places, bases, strict=True)
@@ -269,10 +273,10 @@ class _SampleMap:
             ) from None
 
 
-def require_fit(loop: PeriodicLoop, reach: InvariantPolytope) -> None:
+def require_fit(loop: PeriodicLoop, invariant_set: InvariantPolytope) -> None:
     """Reject a set whose sizes differ from those of a loop."""
     sizes = reduced(loop.segments[0].jump)[0].nrows(), len(loop.outputs), len(loop.inputs) + len(loop.sampled)
-    stated = len(reach.facets[0]), len(reach.between), len(reach.inputs)
+    stated = len(invariant_set.facets[0]), len(invariant_set.between), len(invariant_set.inputs)
     if sizes != stated:
         raise ParameterError(
             f"an invariant set of this loop must have facets of {sizes[0]} entries, {sizes[1]} outputs and {sizes[2]} "

@@ -195,14 +195,14 @@ class Noise(TypedDict):
 
 
 @dataclass(frozen=True, slots=True)
-class _Surprised:
+class _ReversalPlant:
     """A plant of theorem 1: s [1/s²], w [1/s], m [1/m], the least friction near r [-], E [m]."""
 
     slip: Fraction
     rate: Fraction
     weakening: Fraction
     friction: Fraction
-    reach: Fraction | None
+    excess: Fraction | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,21 +217,23 @@ class _Measurements:
         """Whether noise can hide a disturbance."""
         return bool(self.slip_noise) and self.rate_noise != 0
 
-    def hides(self, slip: Fraction, rate: Fraction, push: Fraction, step: Fraction) -> Fraction:
+    def hides(self, slip: Fraction, rate: Fraction, disturbance: Fraction, step: Fraction) -> Fraction:
         """τ [s]: time for which noise hides a reversed disturbance.
 
-        Exact up to a small part of T, for a disturbance `push` [m/s²], σ₊ = `slip` and w = `rate`.
+        Exact up to a small part of T, for a disturbance `disturbance` [m/s²], σ₊ = `slip` and w = `rate`.
 
         A larger σ₊ gives a shorter τ. Responses with σ₊ ≥ 0 only grow, so it suffices to check their ends.
         """
-        if not push or not self.noisy:
+        if not disturbance or not self.noisy:
             return _IMPOSSIBILITY_ZERO
 
         def hidden(time: Fraction) -> bool:
             responses = zip(
                 _moved(max(slip, _IMPOSSIBILITY_ZERO), rate, time), (self.slip_noise, self.rate_noise), strict=True
             )
-            return all(noise is None or bool(ball(push) * response <= ball(noise)) for response, noise in responses)
+            return all(
+                noise is None or bool(ball(disturbance) * response <= ball(noise)) for response, noise in responses
+            )
 
         low, high = _IMPOSSIBILITY_ZERO, step
         while hidden(high):
@@ -243,7 +245,7 @@ class _Measurements:
 
 
 @dataclass(frozen=True, slots=True)
-class _Pushed:
+class _DisturbedPlant:
     """A plant of theorem 2: s [1/s²], w [1/s], N̂μ* [m²/kg]."""
 
     slip: Fraction
@@ -289,7 +291,7 @@ def smallest_peak(
         peaks = [
             SmallestPeak(
                 slip_rate_error=LowerBound(_surprise(plant, step, delay, measurements, task.amplitude)),
-                slip_error=None if plant.reach is None else UpperBound(plant.reach),
+                slip_error=None if plant.excess is None else UpperBound(plant.excess),
             )
             for plant in _surprised(task)
         ]
@@ -307,7 +309,9 @@ def smallest_stick_slip_rate(task: FaultPlant, step: Fraction) -> LowerBound | N
         T, positive [s].
     """
     _require(step > 0, "a step above 0", step)
-    plants = [_Surprised(-kappa, w, _IMPOSSIBILITY_ZERO, task.friction.static, None) for kappa, w, _ in _corners(task)]
+    plants = [
+        _ReversalPlant(-kappa, w, _IMPOSSIBILITY_ZERO, task.friction.static, None) for kappa, w, _ in _corners(task)
+    ]
     with ctx.workprec(_BITS):
         measurements = _Measurements(_IMPOSSIBILITY_ZERO, _IMPOSSIBILITY_ZERO)
         peak = max(_surprise(plant, step, _IMPOSSIBILITY_ZERO, measurements, task.amplitude) for plant in plants)
@@ -318,7 +322,7 @@ def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> Up
     """T + θ [s] beyond which every controller fails, without a diffusion path; None without a limit."""
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
-    def longest(plant: _Pushed | SlidingPush) -> arb:
+    def longest(plant: _DisturbedPlant | SlidingPush) -> arb:
         ratio = ball(plant.authority * withdrawal / task.amplitude)
         return _at_least_one(ratio).log() / plant.pole
 
@@ -329,7 +333,7 @@ def longest_diffusion(task: FaultPlant | SlidingPush, withdrawal: Fraction, step
     """L²/D [s] beyond which every controller with samples T apart fails; None without a limit."""
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
-    def longest(plant: _Pushed | SlidingPush) -> arb:
+    def longest(plant: _DisturbedPlant | SlidingPush) -> arb:
         pole = plant.pole
         ratio = ball(plant.authority * withdrawal / task.amplitude) * (-pole * ball(step)).exp()
         return _at_least_one(ratio).acosh() ** 2 / pole
@@ -398,7 +402,7 @@ _ASSUMED = (
 )
 
 
-def _least(task: FaultPlant | SlidingPush, value: Callable[[_Pushed | SlidingPush], arb]) -> UpperBound | None:
+def _least(task: FaultPlant | SlidingPush, value: Callable[[_DisturbedPlant | SlidingPush], arb]) -> UpperBound | None:
     with ctx.workprec(_BITS):
         bounds = [upper(value(plant)) for plant in _pushed(task)]
     return UpperBound(min(bounds)) if bounds else None
@@ -411,33 +415,33 @@ def _corners(task: FaultPlant) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
         yield k - task.growths[0], eta - task.growths[1], area
 
 
-def _pushed(task: FaultPlant | SlidingPush) -> Sequence[_Pushed | SlidingPush]:
+def _pushed(task: FaultPlant | SlidingPush) -> Sequence[_DisturbedPlant | SlidingPush]:
     """Plants of theorem 2, of a fault or of slow sliding."""
     if isinstance(task, SlidingPush):
         return [task] if task.grows else []
     law = task.friction
     plants = [
-        _Pushed(area * law.weakening * task.normal_stress - kappa, w, area * law.static)
+        _DisturbedPlant(area * law.weakening * task.normal_stress - kappa, w, area * law.static)
         for kappa, w, area in _corners(task)
     ]
     return [plant for plant in plants if plant.slip > 0 and law.static > law.least and task.amplitude]
 
 
-def _surprised(task: FaultPlant) -> Iterator[_Surprised]:
+def _surprised(task: FaultPlant) -> Iterator[_ReversalPlant]:
     """Plants with constant friction near the target, and with friction of the largest weakening slope."""
     law, target = task.friction, task.target_slip
     for kappa, w, area in _corners(task):
-        yield _Surprised(-kappa, w, _IMPOSSIBILITY_ZERO, law.static, None)
+        yield _ReversalPlant(-kappa, w, _IMPOSSIBILITY_ZERO, law.static, None)
         if law.static > law.least and law.weakening:
             reach = _SHARE * min((law.static - law.least) / law.weakening, target)
             middle = max(law.least + law.weakening * reach, law.static - law.weakening * target)
             stress = (law.static * task.normal_stress - kappa / area * target) / middle
             slip = area * law.weakening * stress - kappa
-            yield _Surprised(slip, w, law.weakening, middle - law.weakening * reach, reach)
+            yield _ReversalPlant(slip, w, law.weakening, middle - law.weakening * reach, reach)
 
 
 def _surprise(
-    plant: _Surprised, step: Fraction, delay: Fraction, measurements: _Measurements, amplitude: Fraction
+    plant: _ReversalPlant, step: Fraction, delay: Fraction, measurements: _Measurements, amplitude: Fraction
 ) -> Fraction:
     """X, or 0 where the theorem gives no bound."""
     pace = sqrt(abs(plant.slip))
@@ -453,7 +457,7 @@ def _surprise(
     def bound(slip: Fraction, unseen: Fraction) -> arb:
         return 2 * ball(amplitude) * _moved(slip, plant.rate, interval + shortened(delay) + unseen)[1]
 
-    reach = plant.reach or _IMPOSSIBILITY_ZERO
+    reach = plant.excess or _IMPOSSIBILITY_ZERO
 
     def gained(peak: Fraction, more: Fraction = _IMPOSSIBILITY_ZERO) -> Fraction:
         """Change of σ by the slope of friction under the pressure force."""

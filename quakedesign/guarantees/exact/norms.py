@@ -43,7 +43,7 @@ def identity(size: int) -> arb_mat:
     return arb_mat(size, size, [int(i == j) for i in range(size) for j in range(size)])
 
 
-def beside(parts: list[arb_mat]) -> arb_mat:
+def hstack(parts: list[arb_mat]) -> arb_mat:
     """Matrices side by side."""
     return arb_mat([list(chain(*rows)) for rows in zip(*(part.tolist() for part in parts), strict=True)])
 
@@ -66,7 +66,7 @@ def upper(value: arb) -> Fraction:
     return end_of(value.upper())
 
 
-def above(parts: list[arb_mat]) -> arb_mat:
+def vstack(parts: list[arb_mat]) -> arb_mat:
     """Matrices stacked vertically."""
     return arb_mat([row for part in parts for row in part.tolist()])
 
@@ -92,7 +92,7 @@ def scaled(matrix: arb_mat, weights: Iterable[arb]) -> arb_mat:
 
 
 def grouped(matrix: arb_mat, weights: list[arb]) -> arb_mat:
-    """Weighted sums of groups of columns, as many as there are weights."""
+    """Weighted sums of groups of consecutive columns, each with one column per weight."""
     rows, count = matrix.tolist(), len(weights)
     groups = [[row[i : i + count] for i in range(0, len(row), count)] for row in rows]
     return arb_mat([[sum(map(mul, group, weights), arb(0)) for group in line] for line in groups])
@@ -128,8 +128,8 @@ class Arithmetic:
     column: Callable[[tuple[Fraction, ...]], arb_mat] = column
     identity: Callable[[int], arb_mat] = identity
     pieces: Callable[[Segment, bool], tuple[Fraction, ...]] = lambda segment, past: segment.pieces(past=past)
-    beside: Callable[[list[arb_mat]], arb_mat] = beside
-    above: Callable[[list[arb_mat]], arb_mat] = above
+    hstack: Callable[[list[arb_mat]], arb_mat] = hstack
+    vstack: Callable[[list[arb_mat]], arb_mat] = vstack
     part: Callable[[arb_mat, int, int], arb_mat] = lambda whole, first, end: arb_mat(whole.tolist()[first:end])  # rows
     majorant: Callable[[arb_mat], arb_mat] = majorant
     absolute: Callable[[arb_mat], arb_mat] = absolute
@@ -184,7 +184,7 @@ def flow_norms(loop: PeriodicLoop) -> Mapping[tuple[str, str], tuple[Fraction, .
     with ctx.workprec(_BITS):
         flow, rows = matrix(loop.flow), matrix(tuple(loop.outputs.values()))
         size = flow.nrows()
-        state = beside([identity(size), *(column(entry) for entry in loop.inputs.values())])
+        state = hstack([identity(size), *(column(entry) for entry in loop.inputs.values())])
         sums, state = _sums(flow, rows, state)
         late = absolute(_columns(state, size, state.ncols()))
         rest = _columns(sums, 0, size) * late / (1 - ball(_SMALL))
@@ -288,21 +288,21 @@ class _SegmentFlow:
 class _Response(ABC):
     """Response to an input that enters with b over one segment."""
 
-    of: _SegmentFlow
+    segment: _SegmentFlow
     entry: arb_mat
 
     @cached_property
     def ends(self) -> list[arb_mat]:
         """e^{Aσ}b at the ends of the pieces."""
-        return list(accumulate(self.of.steps, lambda now, step: step * now, initial=self.entry))
+        return list(accumulate(self.segment.steps, lambda now, step: step * now, initial=self.entry))
 
     def slope(self, start: arb_mat, piece: int) -> arb_mat:
         """Upper bound of |Ae^{Aσ}x| over a piece that starts with x."""
-        return self.of.within[piece] * absolute(self.of.flow * start)
+        return self.segment.within[piece] * absolute(self.segment.flow * start)
 
     def curvature(self, start: arb_mat, piece: int) -> arb_mat:
         """Upper bound of |A²e^{Aσ}x|."""
-        return self.of.within[piece] * absolute(self.of.square * start)
+        return self.segment.within[piece] * absolute(self.segment.square * start)
 
     @abstractmethod
     def columns(self, later: arb_mat) -> arb_mat:
@@ -324,21 +324,21 @@ class _Flowing(_Response):
     """Response to an input that is bounded by 1 at every time."""
 
     def columns(self, later: arb_mat) -> arb_mat:
-        return self.of.by.scaled(later * self.of.by.beside(self.ends), self.of.widths)
+        return self.segment.by.scaled(later * self.segment.by.hstack(self.ends), self.segment.widths)
 
     def rest(self, later: arb_mat) -> arb_mat:
-        bends = (self.curvature(self.ends[i], i) * (h**3 / 12) for i, h in enumerate(self.of.pieces))
+        bends = (self.curvature(self.ends[i], i) * (h**3 / 12) for i, h in enumerate(self.segment.pieces))
         return absolute(absolute(later) * reduce(add, bends))
 
     def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
-        by = self.of.by
+        by = self.segment.by
         area = more = rows * (self.entry * 0)
         heights = [by.modulus(rows * now) for now in self.ends]
-        for i, (h, (a, b)) in enumerate(zip(self.of.pieces, pairwise(heights), strict=True)):
+        for i, (h, (a, b)) in enumerate(zip(self.segment.pieces, pairwise(heights), strict=True)):
             before, area = area, area + (a + b) * (h / 2)
             if by.proves:
                 area = area + absolute(rows) * self.curvature(self.ends[i], i) * h**3 / 12
-                more = absolute(rows) * self.slope(self.ends[i], i) * self.of.chord(i)
+                more = absolute(rows) * self.slope(self.ends[i], i) * self.segment.chord(i)
             yield before, area, more
 
 
@@ -352,10 +352,10 @@ class _Sudden(_Response):
         return later * self.entry * 0
 
     def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
-        by, more = self.of.by, rows * (self.entry * 0)
+        by, more = self.segment.by, rows * (self.entry * 0)
         for i, (a, b) in enumerate(pairwise(by.modulus(rows * now) for now in self.ends)):
             if by.proves:
-                more = absolute(rows) * self.curvature(self.ends[i], i) * self.of.chord(i)
+                more = absolute(rows) * self.curvature(self.ends[i], i) * self.segment.chord(i)
             yield a, b, more
 
 
@@ -367,10 +367,10 @@ class _Faded(_Response):
 
     def _from(self, start: int) -> list[arb_mat]:
         """b at the start of a piece, then e^{Aσ}b at the ends of that piece and of all later ones."""
-        return list(accumulate(self.of.steps[start:], lambda now, step: step * now, initial=self.entry))
+        return list(accumulate(self.segment.steps[start:], lambda now, step: step * now, initial=self.entry))
 
     def columns(self, later: arb_mat) -> arb_mat:
-        return beside([later * self._from(i)[-1] * mass for i, (mass, _) in enumerate(self.weights)])
+        return hstack([later * self._from(i)[-1] * mass for i, (mass, _) in enumerate(self.weights)])
 
     def rest(self, later: arb_mat) -> arb_mat:
         """Bounds by slopes, at the end of the segment, of responses to inputs within a piece."""
@@ -380,19 +380,19 @@ class _Faded(_Response):
     def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
         size = absolute(rows)
         for i, (mass, _) in enumerate(self.weights):
-            first, last = (modulus(rows * now) for now in (self.entry, self.of.steps[i] * self.entry))
+            first, last = (modulus(rows * now) for now in (self.entry, self.segment.steps[i] * self.entry))
             more = (larger(first, last) + self._bend(size, self.entry, i)) * mass
             start = end = rows * (self.entry * 0)
             for p, (passed, moment) in enumerate(self.weights[:i]):
                 now, since = self._from(p)[i - p], self._from(p + 1)[i - p - 1]
                 start = start + modulus(rows * now) * passed
-                end = end + modulus(rows * self.of.steps[i] * now) * passed
-                slopes = self.of.within[p] * self.slope(since, i)
+                end = end + modulus(rows * self.segment.steps[i] * now) * passed
+                slopes = self.segment.within[p] * self.slope(since, i)
                 more = more + (self._bend(size, now, i) * passed + size * slopes * moment)
             yield start, end, more
 
     def _bend(self, size: arb_mat, start: arb_mat, piece: int) -> arb_mat:
-        return size * self.curvature(start, piece) * self.of.chord(piece)
+        return size * self.curvature(start, piece) * self.segment.chord(piece)
 
 
 @dataclass(frozen=True)
@@ -410,51 +410,51 @@ class _Pulsed(_Response):
     @cached_property
     def _sides(self) -> tuple[arb_mat, arb_mat]:
         """States after the jump for the parts of the pulse before and after it."""
-        number = self.of.by.number
-        return self.of.jump * self.entry * number(self.pulse.before), self.entry * number(self.pulse.after)
+        number = self.segment.by.number
+        return self.segment.jump * self.entry * number(self.pulse.before), self.entry * number(self.pulse.after)
 
     @cached_property
-    def _off(self) -> tuple[arb_mat, arb_mat]:
+    def _side_errors(self) -> tuple[arb_mat, arb_mat]:
         """Bounds of the errors of these states."""
-        pulse, flow = self.pulse, self.of.flow
+        pulse, flow = self.pulse, self.segment.flow
         moved, early, late = flow * self.entry, self._within(pulse.early), self._within(pulse.late)
-        shifted = absolute(self.of.jump) * early * absolute(moved) * ball(pulse.before * pulse.early)
+        shifted = absolute(self.segment.jump) * early * absolute(moved) * ball(pulse.before * pulse.early)
         back = absolute((flow * ball(-pulse.late)).exp() * moved)
         return shifted, late * back * ball(pulse.after * pulse.late)
 
     def _within(self, time: Fraction) -> arb_mat:
         """Upper bound of |e^{Aσ}|, 0 ≤ σ ≤ time."""
-        return absolute((majorant(self.of.flow) * ball(time)).exp())
+        return absolute((majorant(self.segment.flow) * ball(time)).exp())
 
     def columns(self, later: arb_mat) -> arb_mat:
         if not self.here:
             return later * (self.entry * 0)
         (before, after), whole = self._sides, self._whole(later)
-        return self.of.by.beside([whole * (before + after) / 2, whole * (before - after) / 2])
+        return self.segment.by.hstack([whole * (before + after) / 2, whole * (before - after) / 2])
 
     def _whole(self, later: arb_mat) -> arb_mat:
-        return later * reduce(lambda now, step: step * now, self.of.steps)
+        return later * reduce(lambda now, step: step * now, self.segment.steps)
 
     def rest(self, later: arb_mat) -> arb_mat:
-        return absolute(absolute(self._whole(later)) * larger(*self._off) if self.here else self.entry * 0)
+        return absolute(absolute(self._whole(later)) * larger(*self._side_errors) if self.here else self.entry * 0)
 
     def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
-        by, phases, none = self.of.by, self.of.phases(rows), rows * (self.entry * 0)
+        by, phases, none = self.segment.by, self.segment.phases(rows), rows * (self.entry * 0)
         soon = self._ahead(rows) if by.proves and self.ahead else none
-        for i in range(len(self.of.lengths)):
+        for i in range(len(self.segment.lengths)):
             start, end, more = none, none, none
             for side in self._sides if self.here else ():
                 start, end = (by.larger(v, by.modulus(phases[j] * side)) for v, j in ((start, i), (end, i + 1)))
-            for side, off in zip(self._sides, self._off, strict=True) if self.here and by.proves else ():
-                bent = absolute(phases[i] * self.of.square) * self.of.within[i] * absolute(side)
-                far = absolute(phases[i]) * self.of.within[i] * off  # error anywhere in the piece
-                more = larger(more, bent * self.of.chord(i) + far)
-            left = sum(self.of.lengths[i + 1 :], _ZERO)
+            for side, off in zip(self._sides, self._side_errors, strict=True) if self.here and by.proves else ():
+                bent = absolute(phases[i] * self.segment.square) * self.segment.within[i] * absolute(side)
+                far = absolute(phases[i]) * self.segment.within[i] * off  # error anywhere in the piece
+                more = larger(more, bent * self.segment.chord(i) + far)
+            left = sum(self.segment.lengths[i + 1 :], _ZERO)
             yield start, end, more + soon if left < self.pulse.early else more
 
     def _ahead(self, rows: arb_mat) -> arb_mat:
         """Outputs for the part of the pulse before the jump that ends the segment, while it lasts."""
-        moved = self._within(self.pulse.early) * absolute(self.of.flow * self.entry)
+        moved = self._within(self.pulse.early) * absolute(self.segment.flow * self.entry)
         height = modulus(rows * self.entry) + absolute(rows) * moved * ball(self.pulse.early)
         return height * ball(self.pulse.before)
 
@@ -552,9 +552,9 @@ class _Periods:
         return self.powers[number]
 
     def followed(self, columns: arb_mat, doublings: int) -> arb_mat:
-        """Columns times Ψᵏ, for 2^doublings periods."""
+        """Ψᵏ times the columns, for all k < 2^doublings."""
         for number in range(doublings):
-            columns = self.by.beside([columns, self.power(number) * columns])
+            columns = self.by.hstack([columns, self.power(number) * columns])
         return columns
 
     def seen_alone(self, sums: arb_mat) -> tuple[int, arb_mat]:
@@ -627,7 +627,7 @@ def free_peaks(loop: PeriodicLoop) -> Mapping[str, tuple[Fraction, ...]]:
 
 def _upper_rows(columns: list[arb_mat]) -> list[tuple[Fraction, ...]]:
     """Rational bounds of the rows of columns side by side."""
-    return [tuple(map(upper, row)) for row in beside(columns).tolist()]
+    return [tuple(map(upper, row)) for row in hstack(columns).tolist()]
 
 
 def _followed(periods: _Periods, start: arb_mat) -> list[Group]:
@@ -636,7 +636,7 @@ def _followed(periods: _Periods, start: arb_mat) -> list[Group]:
     if periods.mode:
         return [(periods.followed(start, periods.mode.doublings), even)]
     for number in range(MOST_DOUBLINGS):
-        columns = beside([columns, periods.power(number) * columns])
+        columns = hstack([columns, periods.power(number) * columns])
         place, seen = periods.seen_alone(_peaks(columns, even))
         peaks = _peaks(seen * columns, even)
         faint = reduce(arb.max, peaks.entries()) * ball(_FAINT)
@@ -692,8 +692,8 @@ def _but(column: arb_mat, place: int) -> arb_mat:
 # Ω·max|ce^{Aσ}b|. Since e^{−x} ≤ 1/(1 + x + x²/2 + x³/6 + x⁴/24) = E(x), the weight he^{−λθ} + f has Ω =
 # hE(λα)·min(1/λ, ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 #
-# **Pulses.** Let w be nonzero from `early` before a jump J to `late` after it. After the jump, an impulse of w at −σ or
-# σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area before the jump
+# **Pulses.** Let w vanish except from `early` before a jump J to `late` after it. After the jump, an impulse of w at −σ
+# or σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area before the jump
 # over `before` plus the area after it over `after` is at most ŵ. So both together give at most the larger of the
 # responses to `before`·Jb and `after`·b, and of these remainders. With x and y for the two that is |x + y|/2 + |x −
 # y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added
@@ -723,9 +723,9 @@ def norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
 @lru_cache(maxsize=128)
 def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
     with ctx.workprec(_FREE_BITS):
-        of, bounds = LoopResponses(BALLS, loop), dict[tuple[str, str], tuple[Fraction, ...]]()
+        responses_of, bounds = LoopResponses(BALLS, loop), dict[tuple[str, str], tuple[Fraction, ...]]()
         for name in (*loop.inputs, *loop.sampled, *loop.fading, *loop.pulses):
-            peaks = [reduce(add, rest, larger(*ends)) for part in of.sums(name) for *ends, rest in part]
+            peaks = [reduce(add, rest, larger(*ends)) for part in responses_of.sums(name) for *ends, rest in part]
             bounds |= {(y, name): line for y, line in zip(loop.outputs, _upper_rows(peaks), strict=True)}
         return bounds | {key: tuple(v + size for v in bounds[key]) for key, size in loop.at_once.items()}
 
@@ -752,7 +752,7 @@ class LoopResponses:
         by, all_rows = self.by, []
         for number, flow in enumerate(self.flows):
             phases, bends = flow.phases(self.rows), list[arb_mat]()
-            rows = by.above([*phases, by.identity(self.periods.size)] if by.proves else phases) * flow.jump
+            rows = by.vstack([*phases, by.identity(self.periods.size)] if by.proves else phases) * flow.jump
             if by.proves:
                 pieces = zip(phases, flow.within, strict=False)
                 bends = [absolute(phase * flow.square) * within for phase, within in pieces]
@@ -768,11 +768,11 @@ class LoopResponses:
         past = _Past.of(earlier, self.periods, self.places)
         for number, (part, (rows, bends)) in enumerate(zip(parts, self._seen, strict=True)):
             before, result = past.of_rows(rows, number), list[tuple[arb_mat, arb_mat, tuple[arb_mat, ...]]]()
-            pieces = len(part.of.lengths)
+            pieces = len(part.segment.lengths)
             ends = [by.part(before, i * count, (i + 1) * count) for i in range(pieces + 1)]
             units = by.part(before, before.nrows() - size, before.nrows())
             for i, (start, end, more) in enumerate(part.since_jump(self.rows)):
-                rest = (more, bends[i] * units * part.of.chord(i)) if by.proves else ()
+                rest = (more, bends[i] * units * part.segment.chord(i)) if by.proves else ()
                 result.append((ends[i] + start, ends[i + 1] + end, rest))
             yield result
 
@@ -781,7 +781,7 @@ class LoopResponses:
         by, peaks = self.by, []
         period = reduce(lambda now, flow: flow.whole * now, self.flows, by.identity(self.periods.size))
         periods = _Periods(self.flows, period) if by.proves else self.periods
-        groups = _followed(periods, by.beside([by.column(s) for s in self.loop.start]))
+        groups = _followed(periods, by.hstack([by.column(s) for s in self.loop.start]))
         for flow in self.flows:
             phases, parts = flow.phases(self.rows), []
             for columns, weights in groups:
@@ -814,7 +814,7 @@ class _Past:
         if by.proves:
             rests = [part.rest(map_) for part, map_ in zip(parts, later, strict=True)]
             ends.append(_diagonal(reduce(add, rests[::-1])))
-        columns = by.beside(ends)
+        columns = by.hstack(ends)
         if mode := periods.mode:
             return cls(
                 parts, periods.followed(columns, mode.doublings), mode.along, by.sums(mode.seen * columns) * mode.left
@@ -826,7 +826,7 @@ class _Past:
                 break
             following = periods.power(number) * columns
             sums = sums + row_sums(seen * following)
-            columns = beside([columns, following])
+            columns = hstack([columns, following])
             far, left = periods.left(number + 1, place)
             if not_above(left * _but(sums, place), sums * ball(_FREE_SMALL)):
                 return cls(parts, columns, far, _whole(left, sums))
@@ -837,12 +837,12 @@ class _Past:
 
         `rows` are these rows, mapped back to the start of this segment, then of each earlier one in turn.
         """
-        by = self.parts[0].of.by
+        by = self.parts[0].segment.by
         sums = by.sums(rows[-1] * self.columns) + by.absolute(rows[-1] * self.far) * self.bound
         for part, line in zip(self.parts[:segment], rows[-2::-1], strict=True):
             unit = by.identity(line.ncols())
             ends = [part.columns(unit), *([_diagonal(part.rest(unit))] if by.proves else [])]
-            sums = by.sums(line * by.beside(ends)) + sums
+            sums = by.sums(line * by.hstack(ends)) + sums
         return sums
 
 

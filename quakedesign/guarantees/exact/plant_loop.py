@@ -17,11 +17,10 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import apart, shortly
 from quakedesign.guarantees.exact.norms import (
     BALLS,
-    above,
     absolute,
     ball,
-    beside,
     column,
+    hstack,
     identity,
     larger,
     majorant,
@@ -30,6 +29,7 @@ from quakedesign.guarantees.exact.norms import (
     row_sums,
     scaled,
     upper,
+    vstack,
 )
 from quakedesign.plant.plant_values import ExactSector, Matrix, Row, SlowLoad, unit
 
@@ -107,7 +107,7 @@ class LinearPart:
         Raises
         ------
         ParameterError
-            For sizes that do not fit, too many states, or a load that the law cannot balance.
+            For dimensions that do not match, too many states, or a load that the law cannot balance.
         """
         n, m, q, zero = len(self.A), len(self.B[0]), len(law.update), Fraction(0)
         seen = len(self.C)
@@ -266,13 +266,13 @@ class _AllResponses:
         later = list(accumulate(wholes[:0:-1], mul, initial=identity(self.size)))[::-1]
         blocks, rests = zip(*(self._own(s, later[s]) for s in range(len(wholes))), strict=True)
         # all earlier periods: the columns of every input, and unit columns that bound the remainders
-        own = [beside([block[i] for block in blocks]) for i in range(self.kinds)]
+        own = [hstack([block[i] for block in blocks]) for i in range(self.kinds)]
         own += [later[0] * self.powers[0][-1] * column(entry) for entry in self.loop.sampled]
         left = [reduce(add, (rest[i] for rest in rests)) for i in range(self.kinds)]
         left += [arb_mat(self.size, 1)] * len(self.loop.sampled)
-        seen = [above([*(self.rows * v for v in powers), identity(self.size)]) for powers in self.powers]
+        seen = [vstack([*(self.rows * v for v in powers), identity(self.size)]) for powers in self.powers]
         rows = [part * jump * before for part, jump, before in zip(seen, self.jumps, earlier, strict=True)]
-        sums, free = self._all_periods(above([*rows, identity(self.size)]), period, own, left)
+        sums, free = self._all_periods(vstack([*rows, identity(self.size)]), period, own, left)
         peaks, places = [], seen[0].nrows()
         for s in range(len(wholes)):
             before = [BALLS.part(total, s * places, (s + 1) * places) for total in [*sums, free]]
@@ -292,7 +292,7 @@ class _AllResponses:
         h, columns, rests = self.lengths[s], [], []
         for entry in self.entries:
             ends = [power * entry for power in self.powers[s]]
-            columns.append(later * scaled(beside(ends), [h / 2, *[h] * (self.pieces - 1), h / 2]))
+            columns.append(later * scaled(hstack(ends), [h / 2, *[h] * (self.pieces - 1), h / 2]))
             bends = (self.near[s] * absolute(self.square * end) for end in ends[:-1])
             rests.append(absolute(later) * (reduce(add, bends) * (h**3 / 12)))
         return columns, rests
@@ -302,7 +302,7 @@ class _AllResponses:
     ) -> tuple[list[arb_mat], arb_mat]:
         """Sums over all periods of every row for every input, and the largest free response of every row."""
         size, start = self.size, [column(entry) for entry in self.loop.start]
-        columns = beside([*own, identity(size), *start])
+        columns = hstack([*own, identity(size), *start])
         ends = list(accumulate([*(block.ncols() for block in own), *[1] * size, len(start)], initial=0))
         now, height, width = rows, rows.nrows(), columns.ncols()
         sums, free = arb_mat(height, len(ends) - 1), arb_mat(height, 1)

@@ -137,7 +137,7 @@ class PlantProof(Proof[Row]):
         return f"{text}, for all t >= 0: {', '.join(self._peaks())}"
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts."""
+        """Exact numbers as strings."""
         return {
             "peaks": {name: bound.exact for name, bound in self.bounds.items()},
             "step": str(self.law.step),
@@ -286,7 +286,7 @@ def read_plant_guarantee(raw: Json) -> PlantProof:
     part, matrices = file.plant.part(), file.law
     need(len(matrices.A) <= _MOST_LAW_STATES, f"a law must have at most {_MOST_LAW_STATES} states")
     law = made(MatrixLaw, matrices, update=matrices.A, measured=matrices.B, output=matrices.C, feedback=matrices.D)
-    part.loop(law)  # rejects sizes that do not fit, and a load that the law cannot balance
+    part.loop(law)  # rejects dimensions that do not match, and a load that the law cannot balance
     count = {"output": len(part.outputs), "control": len(part.B[0])}
     names = {kind: [f"{kind}_{i}" for i in range(1, most + 1)] for kind, most in count.items()}
     expected = [*names["output"], *names["control"]]

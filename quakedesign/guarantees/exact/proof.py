@@ -9,14 +9,14 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar
 from quakedesign.arguments import checked_dataclass
 from quakedesign.exact import Bound, LowerBound, UpperBound
 from quakedesign.files import Json
-from quakedesign.laws.implicit_root import ImplicitRoot
+from quakedesign.laws.implicit_root import ImplicitStep
 from quakedesign.lyapunov.exact.claim import Verdict
 
 B = TypeVar("B")
 
 
 class Proof(ABC, Generic[B]):
-    """Claims about one loop that check themselves; base of one class for each theorem.
+    """Claims about one loop with their check; abstract base, with one subclass for each theorem.
 
     **Principle.** A theorem bounds the claimed quantities for all t, and the claims follow if each bound is at most its
     claim. Some theorems assume the claims up to time t: that of slow sliding for all inputs, on every cell of its box
@@ -26,12 +26,12 @@ class Proof(ABC, Generic[B]):
 
     Attributes
     ----------
-    found : bool
-        True; False for `NoProof`. A proof from a file is not yet decided: `check` does that.
+    available : bool
+        True; False for `NoProof`. True does not mean proved: `check` decides a proof that was read from a file.
     kind : str
         Kind of its certificate file (proofs/FORMAT.md).
     plant : str
-        Plant of `simulate` that the proof is about; empty where only one applies.
+        Value of `plant` in `simulate` that the proof is about; empty where only one applies.
     scope : str
         Idealisation of its plant, as text; empty for the stick–slip plant and slow sliding.
     motion : str
@@ -39,19 +39,19 @@ class Proof(ABC, Generic[B]):
     lasts : str
         Time range of the claims, as text.
     covers_healing : bool
-        Whether friction at rest may exceed friction in slip, see `StickSlipProof.beside_healing`.
+        Whether static friction may exceed sliding friction, see `StickSlipProof.beside_healing`.
     slides : bool
         Whether the proof is about slow sliding with rate-and-state friction.
     sampled : bool
         Whether its law is sampled.
-    root : ImplicitRoot or None
+    implicit_step : ImplicitStep or None
         Implicit step of its law.
     slip_rate_error : Bound or None
         [m/s]; None where it is not claimed.
     """
 
     __slots__ = ()
-    found: ClassVar[Literal[True]] = True
+    available: ClassVar[Literal[True]] = True
     kind: ClassVar[str]
     plant: ClassVar[str] = ""
     scope: ClassVar[str] = ""
@@ -83,7 +83,7 @@ class Proof(ABC, Generic[B]):
 
     @abstractmethod
     def to_dict(self) -> Json:
-        """Exact claims as texts, SI."""
+        """Exact claims as strings, SI."""
 
     @property
     @abstractmethod
@@ -111,7 +111,7 @@ class Proof(ABC, Generic[B]):
         return ()
 
     @property
-    def root(self) -> ImplicitRoot | None:
+    def implicit_step(self) -> ImplicitStep | None:
         """Implicit step of the law."""
         return None
 
@@ -129,10 +129,10 @@ class NoProof:
     needs : Fraction, optional
         Pressure change between samples that the pump would have to make [Pa].
     pressed : bool
-        Whether only the pressure fails: it exceeds a pump limit, or opens the fault.
+        Whether the pressure alone prevents a proof: it exceeds a pump limit, or opens the fault.
     """
 
-    found: ClassVar[Literal[False]] = False
+    available: ClassVar[Literal[False]] = False
     bounds: ClassVar[Mapping[str, LowerBound | UpperBound]] = MappingProxyType({})
     reason: str
     small_gain: UpperBound | None = None

@@ -15,8 +15,8 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.norms import START
-from quakedesign.laws import NOISES, ImplicitRoot, LinearLaw, NominalModel
-from quakedesign.loop import Instants, Layer, PeriodicLoop, held_loop, starts, with_response_area
+from quakedesign.laws import NOISES, ImplicitStep, LinearLaw, NominalModel
+from quakedesign.loop import Instants, Layer, PeriodicLoop, sampled_error_loop, starts, with_response_area
 from quakedesign.loop.loop_setup import LoopSetup, Pump
 from quakedesign.plant.fault_plant import FaultPlant
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# A sampled law with its loop setup, the subject of a guarantee besides the fault.
+# A sampled law with its loop setup: together with the fault, the subject of a guarantee.
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,11 +39,11 @@ class ExactSetup:
     diffusion : Fraction
         L²/D of the diffusion path between well and fault [s]; 0 for none.
     slip_noise, rate_noise : Fraction
-        Bounds of the measurement errors of slip [m] and slip rate [m/s], any functions of time.
+        Bounds of the measurement errors of slip [m] and slip rate [m/s], which may be any functions of time.
     initial_slip, initial_slip_rate : Fraction
         Bounds of the absolute initial slip [m] and slip rate [m/s]; those of the reference are 0.
     jitter, delay_jitter : Fraction
-        Largest timing errors of a measurement and its pressure [s], and additionally of the pressure alone [s].
+        Largest common timing error of a measurement and its pressure [s], and largest further one of the pressure [s].
     averaging : Fraction
         Averaging time [s]: each measurement except the first is a mean over times that differ from its nominal instant
         by at most half the averaging time.
@@ -87,7 +87,7 @@ class ExactSetup:
         """Delay, lag and L²/D [s] between law and fault."""
         return {"delay": self.delay, "lag": self.lag, "diffusion": self.diffusion}
 
-    def held(self, law: LinearLaw, step: Fraction) -> "SampledLoop":
+    def with_law(self, law: LinearLaw, step: Fraction) -> "SampledLoop":
         """A law in this setup, with zero-order hold over T_s [s]."""
         return SampledLoop(law=law, step=step, **{part.name: getattr(self, part.name) for part in fields(ExactSetup)})
 
@@ -117,7 +117,7 @@ class SampledLoop(ExactSetup):
     step: Fraction
 
     def __post_init__(self) -> None:
-        if min(self.start) < 0:
+        if min(self.initial_errors) < 0:
             raise ParameterError(
                 "bounds of the initial slip and slip rate errors must be 0 or more. Received "
                 f"{shortly(self.initial_slip)} m and {shortly(self.initial_slip_rate)} m/s. Give absolute values."
@@ -138,7 +138,7 @@ class SampledLoop(ExactSetup):
                 "rate noise needs a law that measures the slip rate. Received the rate noise "
                 f"{shortly(self.rate_noise)} m/s for a law of the slip alone. Omit the rate noise."
             )
-        if self.law.of_reference and (self.diffusion or self.longest_step or self.law.root is not None):
+        if self.law.of_reference and (self.diffusion or self.longest_step or self.law.implicit_step is not None):
             raise ParameterError(
                 "a law that uses the slip, the slip rate or the reference itself has no guarantee with a diffusion "
                 "path, aperiodic sampling or an implicit step. Received one of these. Use slip_error and "
@@ -158,8 +158,8 @@ class SampledLoop(ExactSetup):
         first = (v for row in self.law.first for v in row)
         times = (self.ramp, self.jitter, self.delay_jitter, self.averaging)
         if (
-            any((*self.path.values(), *self.start, *times, *first))
-            or self.law.root is not None
+            any((*self.path.values(), *self.initial_errors, *times, *first))
+            or self.law.implicit_step is not None
             or (self.pump and self.pump.rate)
         ):
             raise ParameterError(
@@ -169,31 +169,31 @@ class SampledLoop(ExactSetup):
             )
 
     @property
-    def start(self) -> tuple[Fraction, Fraction]:
+    def initial_errors(self) -> tuple[Fraction, Fraction]:
         """Bounds of the initial errors [m], [m/s]; 0 and 0 at rest."""
         return self.initial_slip, self.initial_slip_rate
 
     @property
     def noise(self) -> dict[str, Fraction]:
         """Bounds of the measurement noise by name of the input; with a timing error also those that are 0."""
-        measured = (NOISES[:1] if self.law.of_slip_alone else NOISES) if self.off else ()
+        measured = (NOISES[:1] if self.law.of_slip_alone else NOISES) if self.timing_error else ()
         return {name: bound for name in NOISES if (bound := getattr(self, name)) or name in measured}
 
     @property
-    def off(self) -> Fraction:
+    def timing_error(self) -> Fraction:
         """Largest timing error of a measurement [s]."""
         return self.jitter + self.averaging / 2
 
     @property
     def instants(self) -> Instants | None:
         """Timing errors of the loop; None for exact timing and pressures without a ramp."""
-        if not (self.off or self.delay_jitter or (self.pump and self.pump.rate)):
+        if not (self.timing_error or self.delay_jitter or (self.pump and self.pump.rate)):
             return None
-        return Instants(measured=self.off, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
+        return Instants(measured=self.timing_error, arrived=self.jitter + self.delay_jitter, ramp=self.ramp)
 
     @property
     def slack(self) -> Fraction:
-        """Longest less shortest sampling interval [s]; 0 for periodic sampling."""
+        """Longest minus shortest sampling interval [s]; 0 for periodic sampling."""
         return max(self.longest_step - self.step, Fraction(0))
 
     @property
@@ -205,10 +205,11 @@ class SampledLoop(ExactSetup):
     def measured_errors(self, task: FaultPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
         """Bounds of the measured errors from those of the true errors at any time [m], [m/s].
 
-        A measurement with a timing error may be compared with the reference at its nominal instant.
+        A mistimed measurement is compared with the reference at the nominal instant, so the motion of the reference
+        counts.
         """
         parts = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
-        slip, rate = (error + noise + self.off * motion for error, noise, motion in parts)
+        slip, rate = (error + noise + self.timing_error * motion for error, noise, motion in parts)
         return slip, rate
 
     @property
@@ -220,7 +221,7 @@ class SampledLoop(ExactSetup):
         UnsupportedError
             For a law with an implicit step: a sliding mode runs with its own controller and scheme.
         """
-        if self.law.root is not None:
+        if self.law.implicit_step is not None:
             raise UnsupportedError(
                 "a certificate of a sliding mode states the implicit step, not the gains. Received a law with an "
                 "implicit step. Use the controller of the design, or its gains, scale, weight and authority in the "
@@ -230,7 +231,7 @@ class SampledLoop(ExactSetup):
 
     def loop(self, task: FaultPlant, model: NominalModel | None = None) -> PeriodicLoop:
         """Nominal error loop of a fault on its reference, with the model of the fault or another one."""
-        loop = held_loop(
+        loop = sampled_error_loop(
             self.law,
             model or task.model,
             task.authority,
@@ -242,7 +243,7 @@ class SampledLoop(ExactSetup):
         if self.diffusion:
             gain = (model or task.model).gain / task.authority
             loop = with_response_area(loop, gain, Layer(time=self.diffusion))
-        box = starts(self.law, len(loop.states), self.start, (self.slip_noise, self.rate_noise))
+        box = starts(self.law, len(loop.states), self.initial_errors, (self.slip_noise, self.rate_noise))
         return replace(loop, start=box)
 
 
@@ -299,13 +300,13 @@ class GainSpread:
 
 def channels_of(
     task: FaultPlant,
-    root: ImplicitRoot | None,
+    implicit_step: ImplicitStep | None,
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> tuple[Channel, ...]:
-    """Inputs of the nominal loop of a fault on its reference, with their bounds.
+    """Inputs of the nominal loop of a fault that tracks its reference, with their bounds.
 
     `noise` bounds the noise inputs of the loop; `jitter` [s] is the timing error of the measurements.
     """
@@ -314,9 +315,9 @@ def channels_of(
     if spread is not None:
         half = {**half, "push": spread.half}
         aged.append(Channel(name="aged", own=_ZERO, shares={"push": spread.aged}))
-    if root is not None:
-        share = root.half_range / step
-        own = root.remainder + share * (noise.get("slip_noise", _ZERO) + jitter * task.reference_rates[0])
+    if implicit_step is not None:
+        share = implicit_step.half_range / step
+        own = implicit_step.remainder + share * (noise.get("slip_noise", _ZERO) + jitter * task.reference_rates[0])
         implicit.append(Channel(name="root", own=own, shares={"slip_error": share}))
     return (
         Channel(name="acceleration", own=force, shares=half),
@@ -342,8 +343,8 @@ def _measurement_errors(task: FaultPlant, noise: Mapping[str, Fraction], jitter:
             yield Channel(name=name, own=noise[name] + jitter * (rate + force), shares=motion)
 
 
-def beside(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
-    """Those of the inputs reference, initial state and late pressures that are in `names`."""
+def reference_channels(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
+    """Channels of reference, initial state and late pressures, as far as `names` contains them."""
     for name in ("reference", "reference_rate"):
         if name in names:
             yield Channel(name=name, own=task.reference_rates[0], shares={})

@@ -26,7 +26,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
     Attributes
     ----------
     task : SlidingPlant
-    held : SampledLoop
+    sampled_loop : SampledLoop
     cuts : Cuts
         Subdivision of the box of constants into cells.
     claims : SlidingClaims
@@ -35,7 +35,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
     kind: ClassVar[str] = SLOW_SLIDING
     slides: ClassVar[bool] = True
     task: SlidingPlant
-    held: SampledLoop
+    sampled_loop: SampledLoop
     cuts: Cuts
     claims: SlidingClaims
 
@@ -63,7 +63,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
     @property
     def controller(self) -> "SampledController":
         """Law for `simulate` with the T_s, delay, lag and diffusion path of the proof."""
-        return self.held.controller
+        return self.sampled_loop.controller
 
     @cached_property
     def cells(self) -> tuple[SlidingPlant, ...]:
@@ -74,7 +74,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         """Largest bounds over all cells that follow from the claims, by name, or the first reason for failure."""
         largest: dict[str, Fraction] = {}
         for cell in self.cells:
-            bounds = cell_bounds(cell, self.held, self.claims)
+            bounds = cell_bounds(cell, self.sampled_loop, self.claims)
             if isinstance(bounds, NoProof):
                 return bounds
             largest = {name: max(bound, largest.get(name, bound)) for name, bound in bounds.items()}
@@ -104,7 +104,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         return LowerBound(-size), UpperBound(self.task.pressure_per_slip * self.task.distance + size)
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts, SI."""
+        """Exact numbers as strings, SI."""
         claims, (low, high), (least, largest) = self.claims, self.pressures, self.valve_pressures
         return {
             "peak_slip_rate": self.peak_slip_rate.exact,
@@ -115,20 +115,23 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
             "asked_pressure": [least.exact, largest.exact],
             "stress": str(self.task.stress),
             "cells": len(self.cells),
-            **{name: str(getattr(self.held, name)) for name in ("step", "diffusion", "lag", "delay", "slip_noise")},
+            **{
+                name: str(getattr(self.sampled_loop, name))
+                for name in ("step", "diffusion", "lag", "delay", "slip_noise")
+            },
             "measured": "slip",
         }
 
     def sentence(self) -> str:
         """Statement of the guarantee; bounds are rounded outward, conditions inward."""
-        task, held, claims = self.task, self.held, self.claims
+        task, sampled_loop, claims = self.task, self.sampled_loop, self.claims
         ratio = UpperBound(exponential(claims.log_rate))
         (low, high), (least, largest) = self.pressures, self.valve_pressures
         empty = "" if task.distance else "vacuous, as the reference covers 0 m in 0 s: "
         under = f"for every shear stress disturbance of at most {LowerBound(task.stress).quantity('Pa')}"
         under = under if task.stress else "without disturbance"
         return (
-            f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(held)}, "
+            f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(sampled_loop)}, "
             f"{under}, {_along(task)}{_box(task)}: the slip rate never "
             f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.lasts}, in which the fault slides "
             f"forward throughout, the slip stays within {claims.slip_error.quantity('m')} of the reference, the "
@@ -138,13 +141,15 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         )
 
 
-def _path(held: SampledLoop) -> str:
-    text = f"with zero-order hold over {float(held.step):.6g} s"
-    text += f", with a delay of {float(held.delay):.6g} s" if held.delay else ""
-    text += f", through a lag of {float(held.lag):.6g} s" if held.lag else ""
-    text += f", through a diffusion path of L^2/D = {float(held.diffusion):.6g} s" if held.diffusion else ""
-    noise = LowerBound(held.slip_noise)
-    if held.slip_noise:
+def _path(sampled_loop: SampledLoop) -> str:
+    text = f"with zero-order hold over {float(sampled_loop.step):.6g} s"
+    text += f", with a delay of {float(sampled_loop.delay):.6g} s" if sampled_loop.delay else ""
+    text += f", through a lag of {float(sampled_loop.lag):.6g} s" if sampled_loop.lag else ""
+    text += (
+        f", through a diffusion path of L^2/D = {float(sampled_loop.diffusion):.6g} s" if sampled_loop.diffusion else ""
+    )
+    noise = LowerBound(sampled_loop.slip_noise)
+    if sampled_loop.slip_noise:
         return f"{text}, with any noise of at most {noise:.6g} m in the measured slip"
     return f"{text}, with exact measurements of slip"
 

@@ -110,7 +110,7 @@ class SlidingClaims:
             )
 
 
-def cell_bounds(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> dict[str, Any] | NoProof:
+def cell_bounds(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims) -> dict[str, Any] | NoProof:
     """Bounds that follow from the claims on one cell, by name, with ``small_gain``.
 
     Raises
@@ -121,17 +121,17 @@ def cell_bounds(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) ->
     model = model_of(task, claims)
     if model is None:
         return NoProof(reason=_left(task, claims))
-    loop = loop_of(held, model, task)
+    loop = loop_of(sampled_loop, model, task)
     try:
         gains = norms(loop)
     except ParameterError:
         return NoProof(reason="even the nominal loop is not stable, or decays too slowly")
-    return bounds_from(task, held, claims, loop, gains, after_a_step(loop))
+    return bounds_from(task, sampled_loop, claims, loop, gains, after_a_step(loop))
 
 
 def bounds_from(
     task: SlidingPlant,
-    held: SampledLoop,
+    sampled_loop: SampledLoop,
     claims: SlidingClaims,
     loop: PeriodicLoop,
     gains: Gains,
@@ -145,11 +145,11 @@ def bounds_from(
     if model is None:
         return NoProof(reason=_left(task, claims))
     late = settled(loop)
-    more = _moved(task, held, claims, model, late)
+    more = _moved(task, sampled_loop, claims, model, late)
     gains = _once_settled(_with_what_adds_at_once(loop, model, gains, phases), phases, late)
     channels = [
         replace(one, own=one.own + sum((c * more.get(y, _ZERO) for y, c in one.shares.items()), _ZERO))
-        for one in channels_of(task, held, claims, loop)
+        for one in channels_of(task, sampled_loop, claims, loop)
     ]
     small_gain, bounds = channel_bounds(channels, gains)
     if bounds is None:
@@ -170,7 +170,7 @@ def follows(bounds: Mapping[str, Any], claims: SlidingClaims) -> bool:
     return all(bounds[name] < getattr(claims, name) for name in SlidingClaims.__dataclass_fields__)
 
 
-def loop_of(held: SampledLoop, model: SlidingModel, task: SlidingPlant) -> PeriodicLoop:
+def loop_of(sampled_loop: SampledLoop, model: SlidingModel, task: SlidingPlant) -> PeriodicLoop:
     """Nominal loop; it has the inputs ``drift`` and ``reference`` only if their bounds are not 0.
 
     Raises
@@ -178,20 +178,20 @@ def loop_of(held: SampledLoop, model: SlidingModel, task: SlidingPlant) -> Perio
     ParameterError
         For a law that uses the slip rate, steps of the pressure in the fault, jitter or the rate limit of a pump.
     """
-    if held.instants is not None:
+    if sampled_loop.instants is not None:
         raise ParameterError(
             "slow sliding has no guarantee with jitter, averaging or the rate limit of a pump. Received one of these. "
             "Omit jitter, averaging and the rate limit."
         )
-    if not held.law.of_slip_alone or not (held.lag or held.diffusion):
+    if not sampled_loop.law.of_slip_alone or not (sampled_loop.lag or sampled_loop.diffusion):
         raise ParameterError(
             "slow sliding has a guarantee for a law of the slip alone, with a diffusion path or a lag. Received "
-            f"L^2/D = {shortly(held.diffusion)} s and a lag of {shortly(held.lag)} s"
-            f"{'' if held.law.of_slip_alone else ', for a law that uses the slip rate'}. Give diffusion or lag, and a "
-            "law of the slip alone."
+            f"L^2/D = {shortly(sampled_loop.diffusion)} s and a lag of {shortly(sampled_loop.lag)} s"
+            f"{'' if sampled_loop.law.of_slip_alone else ', for a law that uses the slip rate'}. Give diffusion or "
+            "lag, and a law of the slip alone."
         )
-    times = {"delay": held.delay, "lag": held.lag, "diffusion": held.diffusion}
-    loop = sliding_loop(held.law, model, held.step, **times, noisy=held.noise)
+    times = {"delay": sampled_loop.delay, "lag": sampled_loop.lag, "diffusion": sampled_loop.diffusion}
+    loop = sliding_loop(sampled_loop.law, model, sampled_loop.step, **times, noisy=sampled_loop.noise)
     for name, size in _moving(task).items():
         if not size:
             del loop.inputs[name]
@@ -233,12 +233,12 @@ def _left(task: SlidingPlant, claims: SlidingClaims) -> str:
 
 
 def channels_of(
-    task: SlidingPlant, held: SampledLoop, claims: SlidingClaims, loop: PeriodicLoop
+    task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims, loop: PeriodicLoop
 ) -> tuple[Channel, ...]:
     """Inputs of the loop, each with its F and c."""
     low, high = task.normal_stress(claims.push)
     rates, states = chords(claims.log_rate), _state_slopes(task, claims)
-    off, bent = _off(task), _half(rates)
+    spread, bent = _ageing_spread(task), _half(rates)
     stress = {
         "strength": _half((low, high)),
         "log_rate": high * _half(task.ranges["direct_effect"]) + task.radiation * task.rate * bent,
@@ -248,27 +248,27 @@ def channels_of(
     left_out = {"left_out": stress["push"]} if "left_out" in loop.outputs else {}
     if left_out and not loop.fading:
         left_out["left_out"] += _middle(task.ranges["coefficient"])
-    state = {"ageing": off, "log_rate": off * bent, "log_state": (1 + off) * _half(states)}
+    state = {"ageing": spread, "log_rate": spread * bent, "log_state": (1 + spread) * _half(states)}
     if task.state_law == "slip":
         state = {"ageing": _half(states) / _middle(states)}
-    own = task.stress + inertia(task, held, claims) + regularisation(task, claims)
+    own = task.stress + inertia(task, sampled_loop, claims) + regularisation(task, claims)
     channels = [
         Channel(name="stress", own=own, shares={**stress, **left_out}),
         Channel(name="rate", own=_ZERO, shares={"log_rate": bent}),
         Channel(name="state", own=_ZERO, shares=state),
     ]
-    beside = {name: size for name, size in _moving(task).items() if size} | held.noise
+    beside = {name: size for name, size in _moving(task).items() if size} | sampled_loop.noise
     channels += [Channel(name=name, own=size, shares={}) for name, size in beside.items()]
     if loop.fading:
         channels.append(Channel(name="left_out", own=_ZERO, shares={"left_out": _ONE}))
     return tuple(channels)
 
 
-def inertia(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> Fraction:
+def inertia(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims) -> Fraction:
     """Stress equivalent of inertia, sup|κ|/λ₀ [Pa]."""
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
-    grown, moved = exponential(claims.log_rate), _fastest_push(task, held, claims)
+    grown, moved = exponential(claims.log_rate), _fastest_push(task, sampled_loop, claims)
     rest = (task.pressure_per_slip * task.fastest + moved) * (a * claims.log_rate + b * claims.log_state)
     rest += high * b * _fastest_state(task, claims) + _fastest_pull(task, claims) + mu * moved
     return rest * task.inertia * task.rate * grown / (low * a_low)
@@ -288,10 +288,10 @@ def _least_exponent(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     return 2 * (mu - a * claims.log_rate - b * claims.log_state) / a
 
 
-def _fastest_push(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> Fraction:
+def _fastest_push(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims) -> Fraction:
     """Bound of |q′| [Pa/s]."""
-    late = held.diffusion / 2 + held.lag
-    speed = Fraction(5, 2) / held.diffusion if held.diffusion else 1 / held.lag
+    late = sampled_loop.diffusion / 2 + sampled_loop.lag
+    speed = Fraction(5, 2) / sampled_loop.diffusion if sampled_loop.diffusion else 1 / sampled_loop.lag
     return speed * (claims.asked + task.drift * late + claims.push) + task.drift
 
 
@@ -309,12 +309,14 @@ def _fastest_state(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
 
 
 def _moved(
-    task: SlidingPlant, held: SampledLoop, claims: SlidingClaims, model: SlidingModel, time: Fraction
+    task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims, model: SlidingModel, time: Fraction
 ) -> dict[str, Fraction]:
     """Bounds of the change of y and its combinations within a time [s], without steps of e."""
     of_state = _fastest_state(task, claims)
     change = (
-        _fastest_pull(task, claims) + model.weakening * of_state + model.coefficient * _fastest_push(task, held, claims)
+        _fastest_pull(task, claims)
+        + model.weakening * of_state
+        + model.coefficient * _fastest_push(task, sampled_loop, claims)
     )
     y, z = change / model.strength * time, of_state * time
     return {
@@ -334,8 +336,8 @@ def _state_slopes(task: SlidingPlant, claims: SlidingClaims) -> Range:
     """Range with midpoint c_z: (1 − e^{−z})/z of the ageing law, (ρ/ρ₀)e^y of the slip law."""
     if task.state_law == "ageing":
         return chords(claims.log_state)
-    grown, off = exponential(claims.log_rate), _off(task)
-    return (1 - off) / grown, (1 + off) * grown
+    grown, spread = exponential(claims.log_rate), _ageing_spread(task)
+    return (1 - spread) / grown, (1 + spread) * grown
 
 
 @lru_cache(maxsize=64, typed=True)
@@ -363,7 +365,7 @@ def _ageing(task: SlidingPlant) -> Range:
     return task.rate / high, task.rate / low
 
 
-def _off(task: SlidingPlant) -> Fraction:
+def _ageing_spread(task: SlidingPlant) -> Fraction:
     """χ = sup|ρ/ρ₀ − 1|, ρ₀ the midpoint of the range of ρ."""
     slow, fast = _ageing(task)
     return (fast - slow) / (fast + slow)

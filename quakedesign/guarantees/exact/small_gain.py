@@ -24,11 +24,11 @@ from quakedesign.guarantees.exact.sampled_loop import (
     Channel,
     Gains,
     GainSpread,
-    beside,
     channels_of,
+    reference_channels,
     through_layer,
 )
-from quakedesign.laws import ImplicitRoot, NominalModel, Power
+from quakedesign.laws import ImplicitStep, NominalModel, Power
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.fault_plant import FaultPlant
 
@@ -39,7 +39,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 # |y(τ)| ≤ Σ_i g_yi,j·W_i(t) for τ ≤ t in part j of the period, W_i(t) the essential supremum of |w_i| on [0, t] (for a
 # sampled input, over the samples up to t). Let the outputs in turn bound every input, |w_i| ≤ F_i + Σ_y c_iy·|y| at
 # every time, c ≥ 0, and let M_ik = max_j Σ_y c_iy·g_yk,j. If the spectral radius of M is below 1, then W(t) ≤ (1 −
-# M)⁻¹F for every t, and the outputs stay below max_j Σ_i g_yi,j·W_i for all t. *Proof.* W(t) ≤ F + M·W(t). W(t) is
+# M)⁻¹F for every t, and |y| is at most max_j Σ_i g_yi,j·W_i for all t. *Proof.* W(t) ≤ F + M·W(t). W(t) is
 # finite, because the solution of such a loop is bounded on [0, t]. (1 − M)⁻¹ = 1 + M + M² … has no negative entry. The
 # nominal loop is stable, as its gains are finite; stability of the uncertain loop is not assumed. ∎
 #
@@ -48,7 +48,8 @@ from quakedesign.plant.fault_plant import FaultPlant
 #
 #     a = φ − w·r′ − r″ + (s − s0)e1 − (w − w0)e2 + (β − β0)v,
 #
-# so F of a is a bound of |φ − w·r′ − r″|, and its c are half the ranges. The input ``drift`` is d = b·dp*/dt.
+# so F of a is a bound of |φ − w·r′ − r″|, and its c are the half-widths of the ranges. The input ``drift`` is d =
+# b·dp*/dt.
 #
 # **Class rate.** Let |φ| ≤ H and |φ′| ≤ Ḣ with φ(0) = 0, and let friction depend on the slip alone. Shift p* by
 # φ/(β·b), with the β of the plant: a no longer contains φ, v becomes b(p − p*) + φ/β, and (φ/β)′ is added to d. As N̂
@@ -59,7 +60,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 #
 # **Initial state.** Let the loop start at x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, instead of at rest. By superposition |y(τ)| ≤
 # h_y,j + Σ_i g_yi,j·W_i(t), where h_y,j bounds |y| of the free response in part j from every such initial state
-# (`free_peaks`). So the initial state is one more input, ``start``, with F = 1, no c and the gains h. Its row of M is
+# (`free_peaks`). So the initial state is one more input, ``start``, with F = 1, c = 0 and the gains h. Its row of M is
 # zero, so the spectral radius does not change. The s_i contain the bounds of e1(0) and e2(0), and the response of the
 # law's states to its first measurement. All other initial values remain 0: p = 0, and p* = 0 at r = 0, as r(0) = r′(0)
 # = 0. In class rate φ(0) = 0, so the shift of p* is also 0. With a slowly varying gain (below), the loops of all parts
@@ -67,7 +68,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 # E and R (below), are at least the bounds of the initial errors.
 #
 # **Noise.** Let a law measure e1 + n1 and e2 + n2 with |n1| ≤ N1 and |n2| ≤ N2 at the samples. Then the loop has two
-# more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and no c. They are any sequences within
+# more sampled inputs, ``slip_noise`` and ``rate_noise``, with F = N1 and N2 and c = 0. They are any sequences within
 # these bounds. Measurements quantised in steps of q have errors of at most q/2.
 #
 # **Implicit step.** In this paragraph w is the solution of the implicit step, not the damping. By the sector bounds of
@@ -95,7 +96,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 #
 # An input at t may thus be bounded by outputs up to t + T_s. The theorem still holds: fix t, and let the nominal loop
 # continue after t without inputs, except those that stand for the timing error of a measurement or a pressure from
-# before t. They obey the same bounds, and there is none after t + T_s. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is
+# before t. They obey the same bounds and vanish after t + T_s. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is
 # not larger. An implicit step uses e at the time of the measurement, up to which the bounds hold. So E grows only by N1
 # + J·r′, R by N2 + J·|r″|, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a mean of e with non-negative weights
 # of sum 1 over times within J of kT_s: it obeys every bound that all these values obey. ∎
@@ -125,23 +126,23 @@ _WORDS = {
     ("acceleration", "slip_rate_error"): "range of the slope in slip rate",
     ("acceleration", "push"): "input gain's range",
     ("aged", "push"): "change of the input gain",
-    ("drift", "slip_rate_error"): "drift of the disturbance due to the input gain",
+    ("drift", "slip_rate_error"): "change of the input gain under the disturbance",
     ("root", "slip_error"): "range of the implicit step's slope",
     ("late", "stepped"): "jitter, or the duration of a pressure change",
     **{("rate_noise", output): "jitter of the measurement" for output in OUTPUTS},
     ("slip_noise", "slip_rate_error"): "jitter of the measurement",
 }
-_LEFT_OUT = "truncation error of the modes of the layer"
+_LEFT_OUT = "truncation error of the diffusion modes"
 _HALVINGS = 96
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """Bounds for every trajectory of the uncertain quantities and all t ≥ 0; from a search, estimates of them.
+    """Bounds for all t ≥ 0 and every realisation of the uncertain quantities; from a search, estimates.
 
     Attributes
     ----------
-    found : bool
+    available : bool
         True; False for `NoProof`.
     slip_error : Fraction
         |e1| [m].
@@ -157,7 +158,7 @@ class Bounds:
         Upper bound of the spectral radius of M [-], below 1.
     """
 
-    found: ClassVar[Literal[True]] = True
+    available: ClassVar[Literal[True]] = True
     slip_error: Fraction
     slip_rate_error: Fraction
     push: Fraction
@@ -169,11 +170,11 @@ class Bounds:
 def certified_bounds(
     task: FaultPlant,
     loop: PeriodicLoop,
-    root: ImplicitRoot | None = None,
+    implicit_step: ImplicitStep | None = None,
     noise: Mapping[str, Fraction] = NOISELESS,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
-    """Bounds of the theorem for the nominal loop of a fault on its reference.
+    """Bounds of the theorem for the nominal loop of a fault that tracks its reference.
 
     `noise` gives the bounds of the noise inputs in SI units, `jitter` the bound J of measurement times [s].
 
@@ -183,22 +184,22 @@ def certified_bounds(
         When the nominal loop is not proved to be stable.
     """
     gains = norms(loop) if loop.segments else flow_norms(loop)
-    return best_bounds(task, gains, root, loop.period, noise, jitter=jitter)
+    return best_bounds(task, gains, implicit_step, loop.period, noise, jitter=jitter)
 
 
 def best_bounds(
     task: FaultPlant,
     gains: Gains,
-    root: ImplicitRoot | None,
+    implicit_step: ImplicitStep | None,
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
-    """Bounds of the theorem from the gains; in class ``rate`` the smaller of both classes."""
+    """Bounds of the theorem from the gains; in class ``rate`` the smaller of those of both classes."""
     classes = [task] if task.change is None else [task, replace(task, change=None)]
-    results = [bounds_from(one, gains, root, step, noise, spread, jitter) for one in classes]
-    proved = [bounds for bounds in results if bounds.found]
+    results = [bounds_from(one, gains, implicit_step, step, noise, spread, jitter) for one in classes]
+    proved = [bounds for bounds in results if bounds.available]
     if not proved:
         return results[0]
     every = {part.name: [getattr(bounds, part.name) for bounds in proved] for part in fields(Bounds)}
@@ -209,14 +210,17 @@ def best_bounds(
 def bounds_from(
     task: FaultPlant,
     gains: Gains,
-    root: ImplicitRoot | None,
+    implicit_step: ImplicitStep | None,
     step: Fraction,
     noise: Mapping[str, Fraction] = NOISELESS,
     spread: GainSpread | None = None,
     jitter: Fraction = _ZERO,
 ) -> Bounds | NoProof:
     """Bounds of the theorem from the gains of the nominal loop; gains in floats give an estimate."""
-    channels = (*channels_of(task, root, step, noise, spread, jitter), *beside(task, {name for _, name in gains}))
+    channels = (
+        *channels_of(task, implicit_step, step, noise, spread, jitter),
+        *reference_channels(task, {name for _, name in gains}),
+    )
     if ("push", "awaited") in gains:
         channels = tuple(through_layer(channels, gains))
     if all(isinstance(values[0], float) for values in gains.values()):
@@ -328,7 +332,7 @@ _ONE_OVER_E = Fraction(3679, 10000)  # rounded up
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class SlowGain:
+class VaryingGain:
     """Slowly varying input gain as used by a proof.
 
     Attributes
@@ -379,7 +383,7 @@ class SlowGain:
         return (task.beta[1] - task.beta[0]) / (2 * self.parts)
 
 
-def slow_gains(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
+def varying_gain_norms(loops: Iterable[PeriodicLoop], growth: Fraction) -> Gains:
     """Gains of the nominal loops of all parts, concatenated, including those of ``aged``.
 
     Raises
@@ -416,30 +420,32 @@ _BITS = 128
 _SECTOR_HALVINGS = 10
 
 
-def holds(root: ImplicitRoot, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
+def holds(implicit_step: ImplicitStep, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
     """Whether the sector encloses the solution for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]."""
     last = slip / step
-    low, high = root.slopes
+    low, high = implicit_step.slopes
     with ctx.workprec(_BITS):
         return all(
-            _above(root, step, rate, (away, along), (Fraction(0), last), _SECTOR_HALVINGS)
+            _above(implicit_step, step, rate, (away, along), (Fraction(0), last), _SECTOR_HALVINGS)
             for away, along in ((1 - low, -low), (high - 1, high))
         )
 
 
-def _above(root: ImplicitRoot, step: Fraction, rate: Fraction, slopes: Range, part: Range, halvings: int) -> bool:
+def _above(
+    implicit_step: ImplicitStep, step: Fraction, rate: Fraction, slopes: Range, part: Range, halvings: int
+) -> bool:
     """Whether a line is shown to lie above the solution on a part of the range of u."""
-    ahead, end = (root.remainder + min(slope * u for u in part) for slope in slopes)
-    if _least(root.pull, _below(step * ahead), _below(end)) + ball(end - rate) >= 0:
+    ahead, end = (implicit_step.remainder + min(slope * u for u in part) for slope in slopes)
+    if _least(implicit_step.pull, _below(step * ahead), _below(end)) + ball(end - rate) >= 0:
         return True
     middle = (part[0] + part[1]) / 2
     return halvings > 0 and all(
-        _above(root, step, rate, slopes, half, halvings - 1) for half in ((part[0], middle), (middle, part[1]))
+        _above(implicit_step, step, rate, slopes, half, halvings - 1) for half in ((part[0], middle), (middle, part[1]))
     )
 
 
 def _least(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
-    """Lower bound of q for arguments at or above given ones, in exact balls."""
+    """Lower bound of q for arguments at or above given ones, in ball arithmetic."""
     total = arb(0)
     for term in terms:
         inner = {"slip": slip, "rate": rate}

@@ -6,7 +6,7 @@ from quakedesign.files import Json
 from quakedesign.guarantees.exact.file_entries import Powers, TaskEntries, power_entries, powers, task_entries
 from quakedesign.guarantees.exact.stick_slip_proof import StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip, StickSlipClaims, StickSlipPolytope
-from quakedesign.laws.implicit_root import ImplicitRoot
+from quakedesign.laws.implicit_root import ImplicitStep
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.sos.exact.strict import Entries, made, need, read_as, written
 
@@ -36,9 +36,13 @@ class StickSlipFile(TaskEntries):
 
 def stick_slip_entries(claim: StickSlipProof) -> Json:
     """Content of the file for a claim, without format and kind."""
-    held, pull = claim.held, power_entries(claim.held.law.pull)
-    loop = made(StickSlipLoopEntries, held, held.law, pull=pull or None, longest=held.longest_step)
-    return dict(written(StickSlipFile(**task_entries(claim.task), loop=loop, set=claim.reach, claims=claim.claims)))
+    sampled_loop, pull = claim.sampled_loop, power_entries(claim.sampled_loop.law.pull)
+    loop = made(
+        StickSlipLoopEntries, sampled_loop, sampled_loop.law, pull=pull or None, longest=sampled_loop.longest_step
+    )
+    return dict(
+        written(StickSlipFile(**task_entries(claim.task), loop=loop, set=claim.invariant_set, claims=claim.claims))
+    )
 
 
 def read_stick_slip(raw: Json) -> StickSlipProof:
@@ -52,7 +56,7 @@ def read_stick_slip(raw: Json) -> StickSlipProof:
     file = read_as(StickSlipFile, raw)
     task, loop = file.plant(), file.loop
     need(task.change is None, "a bounded change of the disturbance is not used on the stick-slip plant")
-    pull = () if loop.pull is None else ImplicitRoot(pull=powers(loop.pull)).pull
+    pull = () if loop.pull is None else ImplicitStep(pull=powers(loop.pull)).pull
     law = made(StickSlipLaw, loop, pull=pull)
-    held = made(SampledStickSlip, loop, law=law, longest_step=loop.longest)
-    return StickSlipProof(task=task, held=held, reach=file.set, claims=file.claims)
+    sampled_loop = made(SampledStickSlip, loop, law=law, longest_step=loop.longest)
+    return StickSlipProof(task=task, sampled_loop=sampled_loop, invariant_set=file.set, claims=file.claims)

@@ -18,7 +18,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
     stick_slip_bounds,
 )
 from quakedesign.guarantees.exact.tracking_proof import TrackingProof
-from quakedesign.laws import ImplicitRoot
+from quakedesign.laws import ImplicitStep
 from quakedesign.laws.stick_slip_law import GAIN_UNITS
 from quakedesign.lyapunov.exact.certificate_files import STICK_SLIP
 from quakedesign.plant.fault_plant import FaultPlant
@@ -34,8 +34,8 @@ class StickSlipProof(Proof[StickSlipClaims]):
     Attributes
     ----------
     task : FaultPlant
-    held : SampledStickSlip
-    reach : StickSlipPolytope
+    sampled_loop : SampledStickSlip
+    invariant_set : StickSlipPolytope
     claims : StickSlipClaims
     healing : Fraction
         Δμ_h [-] included in the task's disturbance, see `covered_healing`; not part of the file.
@@ -45,8 +45,8 @@ class StickSlipProof(Proof[StickSlipClaims]):
     plant: ClassVar[str] = "stick-slip"
     covers_healing: ClassVar[bool] = True
     task: FaultPlant
-    held: SampledStickSlip
-    reach: StickSlipPolytope
+    sampled_loop: SampledStickSlip
+    invariant_set: StickSlipPolytope
     claims: StickSlipClaims
     healing: Fraction = Fraction(0)
 
@@ -76,9 +76,9 @@ class StickSlipProof(Proof[StickSlipClaims]):
         return self.claims.pressures[-1]
 
     @property
-    def root(self) -> ImplicitRoot | None:
+    def implicit_step(self) -> ImplicitStep | None:
         """Implicit step of a sliding mode."""
-        return ImplicitRoot(pull=self.held.law.pull) if self.held.law.pull else None
+        return ImplicitStep(pull=self.sampled_loop.law.pull) if self.sampled_loop.law.pull else None
 
     @property
     def controller(self) -> "StickSlipController":
@@ -89,12 +89,14 @@ class StickSlipProof(Proof[StickSlipClaims]):
         UnsupportedError
             For a sliding mode, whose gains the certificate does not state.
         """
-        if self.held.law.pull:
+        if self.sampled_loop.law.pull:
             raise UnsupportedError(
                 "a certificate of a sliding mode states its implicit step, not the gains. Use the controller of the "
                 "design, or run the file with simulate --certificate."
             )
-        return laws.StickSlipController(law=self.held.law, step=self.held.step, longest=self.held.longest_step)
+        return laws.StickSlipController(
+            law=self.sampled_loop.law, step=self.sampled_loop.step, longest=self.sampled_loop.longest_step
+        )
 
     def covered_healing(self, disturbance: Fraction = Fraction(0)) -> LowerBound:
         """Healing Δμ_h [-] that these claims also cover, for a disturbance bound [m/s²].
@@ -140,7 +142,7 @@ class StickSlipProof(Proof[StickSlipClaims]):
     def recomputed(self) -> StickSlipClaims | NoProof:
         """Claims that the theorem gives."""
         try:
-            return stick_slip_bounds(self.task, self.held, self.reach)
+            return stick_slip_bounds(self.task, self.sampled_loop, self.invariant_set)
         except ParameterError as error:
             return NoProof(reason=str(error))
 
@@ -149,32 +151,32 @@ class StickSlipProof(Proof[StickSlipClaims]):
         return self.claims.follow(bounds) and self.healing >= 0 and self.disturbance >= 0
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts, SI."""
-        held = self.held
+        """Exact numbers as strings, SI."""
+        sampled_loop = self.sampled_loop
         return {
             "plant": self.plant,
             "slip_error": self.claims.slip_error.exact,
             **self.claims.to_dict(),
             "covered_healing": float(self.covered_healing()),
             "healing": str(self.healing),
-            "step": str(held.step),
-            **({"longest_step": str(held.longest_step)} if held.longest_step else {}),
-            **{name: str(size) for name, size in held.noise.items()},
-            "law": {name: str(getattr(held.law, name)) for name in GAIN_UNITS},
+            "step": str(sampled_loop.step),
+            **({"longest_step": str(sampled_loop.longest_step)} if sampled_loop.longest_step else {}),
+            **{name: str(size) for name, size in sampled_loop.noise.items()},
+            "law": {name: str(getattr(sampled_loop.law, name)) for name in GAIN_UNITS},
         }
 
     def sentence(self) -> str:
         """Statement of the guarantee; bounds are rounded outward, conditions inward."""
-        task, held, claims = self.task, self.held, self.claims
+        task, sampled_loop, claims = self.task, self.sampled_loop, self.claims
         stress = LowerBound(self.disturbance / task.area_per_mass[1])
         size = f"{LowerBound(self.disturbance):.3g} m/s^2 ({stress.quantity('Pa')} of shear)"
         if self.healing:
             size += f" and friction at rest up to {LowerBound(self.healing):.3g} above friction in slip"
         behind, ahead = claims.slip_behind.quantity("m"), claims.slip_ahead.quantity("m")
         pressures = f"{claims.least_pressure.quantity('Pa')} and {claims.largest_pressure.quantity('Pa')}"
-        over = f"{UpperBound(held.step):.6g} s"
-        if held.longest_step:
-            over = f"sampling intervals from {over} to {LowerBound(held.longest_step):.6g} s in any order"
+        over = f"{UpperBound(sampled_loop.step):.6g} s"
+        if sampled_loop.longest_step:
+            over = f"sampling intervals from {over} to {LowerBound(sampled_loop.longest_step):.6g} s in any order"
         return (
             f"from rest, with zero-order hold over {over} and {self._measured()}, "
             f"for every disturbance of at most {size}, for every friction law and all constant parameters of the box: "
@@ -185,20 +187,21 @@ class StickSlipProof(Proof[StickSlipClaims]):
 
     def _measured(self) -> str:
         """Part of the statement on measurement errors, rounded inward."""
-        if not self.held.slip_noise:
+        if not self.sampled_loop.slip_noise:
             return "exact measurements of slip and slip rate"
-        return f"slip measured within {LowerBound(self.held.slip_noise).quantity('m')} and slip rate measured exactly"
+        noise = LowerBound(self.sampled_loop.slip_noise).quantity("m")
+        return f"slip measured within {noise} and slip rate measured exactly"
 
 
 def stick_slip_guarantee(
-    task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope
+    task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: StickSlipPolytope
 ) -> StickSlipProof | NoProof:
     """Claims that the theorem gives for a polytope, or the condition that fails."""
     try:
-        bounds = stick_slip_bounds(task, held, reach)
+        bounds = stick_slip_bounds(task, sampled_loop, invariant_set)
     except ParameterError as error:
         return NoProof(reason=str(error))
-    return StickSlipProof(task=task, held=held, reach=reach, claims=bounds.rounded())
+    return StickSlipProof(task=task, sampled_loop=sampled_loop, invariant_set=invariant_set, claims=bounds.rounded())
 
 
 FaultProof = TrackingProof | SlidingProof | StickSlipProof

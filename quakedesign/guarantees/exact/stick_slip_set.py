@@ -86,7 +86,7 @@ from quakedesign.files import Json
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
 from quakedesign.guarantees.exact.small_gain import holds
 from quakedesign.guarantees.exact.tracking_proof import above
-from quakedesign.laws.implicit_root import ImplicitRoot
+from quakedesign.laws.implicit_root import ImplicitStep
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.fault_plant import FaultPlant, Range
 
@@ -141,7 +141,7 @@ class StickSlipPolytope:
     Raises
     ------
     ParameterError
-        When the sizes do not fit.
+        When the dimensions do not match.
     """
 
     facets: tuple[tuple[Fraction, ...], ...]
@@ -256,12 +256,12 @@ class SampledStickSlip:
         return 2 * self.law.return_rate * self.slip_noise
 
     @property
-    def push_noise(self) -> Fraction:
+    def pressure_noise(self) -> Fraction:
         """Largest contribution of noise to U [Pa]."""
         return self.law.slip_gain * self.slip_noise
 
     def errors(self, task: FaultPlant, slip: Fraction, rate: Fraction) -> tuple[Fraction, Fraction]:
-        """Bounds of the measured slip error [m] and slip-rate error [m/s] from the true ones."""
+        """Bounds of the measured slip error [m] and slip-rate error [m/s], from those of slip error and slip rate."""
         return slip + self.slip_noise, max(rate, task.reference_rates[0])
 
     @property
@@ -270,7 +270,7 @@ class SampledStickSlip:
         return {}
 
     @property
-    def start(self) -> tuple[Fraction, Fraction]:
+    def initial_errors(self) -> tuple[Fraction, Fraction]:
         """Bounds of the initial errors [m, m/s], as `SampledLoop.start`: rest."""
         return Fraction(0), Fraction(0)
 
@@ -297,7 +297,7 @@ class StickSlipClaims:
 
     @property
     def slip_error(self) -> UpperBound:
-        """Slip less reference, absolute value [m]."""
+        """Absolute value of slip minus reference [m]."""
         return max(self.slip_behind, self.slip_ahead)
 
     @property
@@ -326,7 +326,7 @@ class StickSlipClaims:
         )
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts, SI."""
+        """Exact numbers as strings, SI."""
         return {
             "slip_behind": self.slip_behind.exact,
             "slip_ahead": self.slip_ahead.exact,
@@ -385,7 +385,7 @@ def _exact_array(values: object) -> np.ndarray:
 
 BALLS = Numbers(ball, _ball_exponential, curvature, _ball_array, _ball_middle)
 EXACT = Numbers(_exact, _ball_exponential, curvature, _exact_array, _ball_middle)
-"""Of rationals; only for what needs no exponential."""
+"""Exact rationals, for computations without exponentials."""
 
 
 # ----------------------------------------------------------------------
@@ -412,21 +412,21 @@ class Ranges:
     rest_pressure: Range
 
 
-def ranges(task: FaultPlant, ahead: Fraction, push: Range, moved: Fraction) -> Ranges:
+def ranges(task: FaultPlant, ahead: Fraction, feedback: Range, moved: Fraction) -> Ranges:
     """Ranges of the plant for bounds of slip and of U = p* − p [Pa].
 
     The slip is at most `ahead` [m] beyond the target, and at most `moved` [m] in a period.
 
-    β changes within a period by at most N̂|μ′|/b·`moved`, so that σ exceeds s/(bβ) by at most that share.
+    β changes within a period by at most N̂|μ′|/b·`moved`, so that σ exceeds s/(bβ) by at most this relative amount.
 
     Raises
     ------
     ParameterError
-        Where the theorem does not hold: the fault may open, slip backward, or its damping be negative.
+        Where the theorem does not hold: the fault may open or slip backward, or its damping may be negative.
     """
     wide = replace(task, target_slip=task.target_slip + ahead)
     low, high = wide.stress
-    stress = min(low, low + push[0]), max(high, high + push[1])
+    stress = min(low, low + feedback[0]), max(high, high + feedback[1])
     slope, chord, damping = task.slip_slopes(stress), task.slip_slopes((low, high)), task.rate_slopes(stress)
     if stress[0] <= 0:
         raise ParameterError("the fault may open: its effective normal stress may reach 0 Pa")
@@ -443,7 +443,9 @@ def ranges(task: FaultPlant, ahead: Fraction, push: Range, moved: Fraction) -> R
     return Ranges(slope=slope, damping=damping, chord=chord, rest_pressure=rest)
 
 
-def stop_bounds(task: FaultPlant, held: SampledStickSlip, plant: Ranges) -> tuple[tuple[Fraction, Fraction], ...]:
+def stop_bounds(
+    task: FaultPlant, sampled_loop: SampledStickSlip, plant: Ranges
+) -> tuple[tuple[Fraction, Fraction], ...]:
     """Pairs (g, h) with δ ≤ g·y + h for the slip δ [m] until a last stop within a period.
 
     Upper bounds of the exponentials: (1 − e^{−wm})/w ≤ m − wm²/2 + w²m³/6, (e^{wx} − 1 − wx)/w² ≤ x²/2/(1 − wx/3) and
@@ -454,7 +456,7 @@ def stop_bounds(task: FaultPlant, held: SampledStickSlip, plant: Ranges) -> tupl
     ParameterError
         For a period that is too long for the damping and the slope of friction.
     """
-    step, amplitude = held.longest, task.amplitude
+    step, amplitude = sampled_loop.longest, task.amplitude
     low, high = plant.damping
     least = Fraction(1, 2) + low * step / 24
     pairs = []
@@ -463,7 +465,7 @@ def stop_bounds(task: FaultPlant, held: SampledStickSlip, plant: Ranges) -> tupl
         m, x = share * step, (1 - share) * step
         room = 1 + plant.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
         if least >= 1 or low * x >= 1 or room <= 0:
-            raise ParameterError("T_s is too long against the damping and the slope of friction for a bound of stops")
+            raise ParameterError("T_s is too long, for this damping and friction slope, to bound the slip until a stop")
         start = m - low * m**2 / 2 + low**2 * m**3 / 6
         pairs.append((start / room, amplitude * x**2 / (1 - low * x / 3) / room))
     return tuple(pairs)
@@ -475,7 +477,7 @@ class Period:
 
     back: Numbers
     task: FaultPlant
-    held: SampledStickSlip
+    sampled_loop: SampledStickSlip
     plant: Ranges
     interval: Fraction
     of_rate: tuple[Any, Any]  # ξ and y at the end, per initial y
@@ -486,23 +488,29 @@ class Period:
 
     @classmethod
     def deciding(
-        cls, back: Numbers, task: FaultPlant, held: SampledStickSlip, plant: Ranges, rate: Fraction, push: Range
+        cls,
+        back: Numbers,
+        task: FaultPlant,
+        sampled_loop: SampledStickSlip,
+        plant: Ranges,
+        rate: Fraction,
+        feedback: Range,
     ) -> "list[Period]":
         """Periods whose check covers all intervals, for bounds of the slip rate [m/s] and of U [Pa]."""
         zero, one = _ZERO, Fraction(1)
         slope, damping = (sum(pair, _ZERO) / 2 for pair in (plant.slope, plant.damping))
         flow = (zero, one), (slope, -damping)
         tall = (*((*row, entry) for row, entry in zip(flow, (zero, one), strict=True)), (zero, zero, zero))
-        sizes, periods = back.bent(flow, held.longest), []
-        margin = _margin(back, task, held, plant, sizes, rate, push)
-        for interval in held.intervals:
+        sizes, periods = back.bent(flow, sampled_loop.longest), []
+        margin = _margin(back, task, sampled_loop, plant, sizes, rate, feedback)
+        for interval in sampled_loop.intervals:
             whole = back.exponential(tuple(tuple(v * interval for v in row) for row in tall))
             ends = [tuple(tuple(v * interval / NODES * i for v in row) for row in flow) for i in range(NODES + 1)]
             nodes = list(map(back.exponential, ends))
             period = cls(
                 back=back,
                 task=task,
-                held=held,
+                sampled_loop=sampled_loop,
                 plant=plant,
                 interval=interval,
                 of_rate=(whole[0][1], whole[1][1]),
@@ -515,10 +523,10 @@ class Period:
         return periods
 
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
-        """∫h(t)·t^j dt, j = 0 to 3, with h(t) ≥ |g(T − t)| for an impulse g.
+        """∫h(t)·t^j dt, j = 0 to 3, with h(t) ≥ |g(T − t)| for an impulse response g.
 
-        On a piece h is the chord of its ends plus h²/8·max|g″|. All integrals use this one function, since a factor of
-        a single integral may be negative.
+        On a piece of length ℓ, h is the chord of its end values plus ℓ²/8·max|g″|. All integrals use this one function,
+        since a factor of a single integral may be negative.
         """
         number, h = self.back.number, self.interval / NODES
         above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
@@ -532,7 +540,7 @@ class Period:
     def more(self, whole: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Contribution of the ranges of slope and damping to the factors of y and H − bβU."""
         number, plant = self.back.number, self.plant
-        growth = 1 / (1 - plant.slope[1] * self.held.longest**2 / 2)
+        growth = 1 / (1 - plant.slope[1] * self.sampled_loop.longest**2 / 2)
         per_slip = number((plant.slope[1] - plant.slope[0]) / 2 * growth)
         per_rate, steepest = number((plant.damping[1] - plant.damping[0]) / 2), number(plant.slope[1] * growth)
         of_rate = per_slip * whole[1] + per_rate * (whole[0] + steepest * whole[2])
@@ -542,20 +550,20 @@ class Period:
 def _margin(
     back: Numbers,
     task: FaultPlant,
-    held: SampledStickSlip,
+    sampled_loop: SampledStickSlip,
     plant: Ranges,
     sizes: tuple[tuple[Any, Any], ...],
     rate: Fraction,
-    push: Range,
+    feedback: Range,
 ) -> tuple[Any, ...]:
     """Bounds of Δ²/8·|V″| for factors of ξ and y, Δ the distance between checked intervals.
 
     `sizes` are bounds of the impulse responses of ξ and y and of their first two derivatives.
     """
-    number, longest, most = back.number, held.longest, task.beta[1] * task.authority
-    step = (longest - held.step) / PIECES if held.longest_step else _ZERO
-    still = task.reference_rates[1] * longest / 2 + held.target_noise
-    pushed = most * (max(map(abs, push)) + held.law.target_gain * still + held.push_noise)
+    number, longest, most = back.number, sampled_loop.longest, task.beta[1] * task.authority
+    step = (longest - sampled_loop.step) / PIECES if sampled_loop.longest_step else _ZERO
+    still = task.reference_rates[1] * longest / 2 + sampled_loop.target_noise
+    pushed = most * (max(map(abs, feedback)) + sampled_loop.law.target_gain * still + sampled_loop.pressure_noise)
     growth = 1 / (1 - plant.slope[1] * longest**2 / 2)
     per_slip, per_rate = (plant.slope[1] - plant.slope[0]) / 2 * growth, (plant.damping[1] - plant.damping[0]) / 2
     force = task.amplitude + pushed
@@ -612,11 +620,11 @@ class Rows:
     cut: bool = False
 
 
-def push_row(
-    held: SampledStickSlip, fastest: Fraction, combination: tuple[int, bool, int, int]
+def feedback_row(
+    sampled_loop: SampledStickSlip, fastest: Fraction, combination: tuple[int, bool, int, int]
 ) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction, tuple[Fraction, Fraction]]:
     """Factors of (e1, y, d) in U and its constant [Pa], and q1, q0 of r′ = q1·e1 + q0."""
-    law = held.law
+    law = sampled_loop.law
     q1, q0 = law.return_rate * combination[2], fastest * combination[3]
     return (-law.target_gain * (q1 - law.return_rate), law.rate_gain, Fraction(1)), -law.target_gain * q0, (q1, q0)
 
@@ -626,8 +634,8 @@ class _Carried:
     """Effect of law and reference on the facets in a combination, without the plant."""
 
     place: int
-    push: tuple[Fraction, Fraction, Fraction]
-    push0: Fraction
+    feedback: tuple[Fraction, Fraction, Fraction]
+    feedback0: Fraction
     of_error: np.ndarray
     constant: np.ndarray
     rising: np.ndarray  # factor of r′ itself
@@ -645,17 +653,17 @@ _Combination = tuple[int, bool, int, int]
 def _carried(
     back: Numbers,
     task: FaultPlant,
-    held: SampledStickSlip,
+    sampled_loop: SampledStickSlip,
     step: Fraction,
     facets: np.ndarray,
     ends: Sequence[tuple[int, _Combination]],
 ) -> Iterator[_Carried]:
-    number, law = back.number, held.law
+    number, law = back.number, sampled_loop.law
     n1, _, n3 = facets.T
-    (fastest, bend), noise = task.reference_rates, held.target_noise
-    predicted = n3 * number(law.level_gain + law.slip_gain * held.step / 2)
+    (fastest, bend), noise = task.reference_rates, sampled_loop.target_noise
+    predicted = n3 * number(law.level_gain + law.slip_gain * sampled_loop.step / 2)
     for place, combination in ends:
-        push, push0, (q1, q0) = push_row(held, fastest + noise, combination)
+        feedback, feedback0, (q1, q0) = feedback_row(sampled_loop, fastest + noise, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
         # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2.
         # r' in the law contains noise, so that the reference may move `noise` less.
@@ -664,8 +672,8 @@ def _carried(
         late = back.array(moves.tolist()) * late
         of_error = n1 - n1 * number(step * q1) - predicted * number(p1)
         constant = late - n1 * number(step * q0) - predicted * number(p0)
-        standstill = back.array((1 - moves).tolist()) * number(bend * held.longest / 2 + noise)
-        yield _Carried(place, push, push0, of_error, constant, -predicted * int(combination[1]), standstill)
+        standstill = back.array((1 - moves).tolist()) * number(bend * sampled_loop.longest / 2 + noise)
+        yield _Carried(place, feedback, feedback0, of_error, constant, -predicted * int(combination[1]), standstill)
 
 
 def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
@@ -677,8 +685,8 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
     facets, multipliers : ndarray
         In numbers of the back end; see `StickSlipPolytope`.
     """
-    back, held, task, plant = period.back, period.held, period.task, period.plant
-    number, law, step = back.number, held.law, held.step
+    back, sampled_loop, task, plant = period.back, period.sampled_loop, period.task, period.plant
+    number, law, step = back.number, sampled_loop.law, sampled_loop.step
     n1, n2, n3 = facets.T
     everyone, raised = np.arange(len(facets)), np.flatnonzero(back.middle(n3) > 0)
     level, slip, half = number(law.level_gain), number(law.slip_gain), number(step / 2)
@@ -690,7 +698,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
             (period.of_rate[0], period.of_force[0]), period.more(period.integrals(lone, none)), strict=True
         )
     ]
-    carried = list(_carried(back, task, held, period.interval, facets, list(enumerate(COMBINATIONS))))
+    carried = list(_carried(back, task, sampled_loop, period.interval, facets, list(enumerate(COMBINATIONS))))
     gap_margin = period.margin[0] * off  # for the chord of 1/β minus 1/β
     for cut in (False, True):
         which = raised if cut else everyone
@@ -713,12 +721,12 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
                 of_y = of_y + curved * gaps[0] + of_slip * period.of_rate[0] + of_rate * period.of_rate[1]
                 of_y = of_y if cut else of_y - a3 * slip * half
                 force = bound * (whole[0] + of_force + curved * gaps[1])
-                force = force + abs(pushed) * number(held.push_noise)
+                force = force + abs(pushed) * number(sampled_loop.pressure_noise)
                 force = force + abs(of_slip) * period.margin[0] + abs(of_rate) * period.margin[1] + curved * gap_margin
                 for part in carried:
-                    factors = [pushed * number(v) for v in part.push]
+                    factors = [pushed * number(v) for v in part.feedback]
                     columns = [part.of_error[which] + factors[0], of_y + factors[1], a3 + factors[2]]
-                    constants = part.constant[which] + pushed * number(part.push0) + force
+                    constants = part.constant[which] + pushed * number(part.feedback0) + force
                     constants = constants + part.moved(pushed * number(law.target_gain), which)
                     yield Rows(COMBINATIONS[part.place][0], which, np.column_stack(columns), constants, cut)
 
@@ -726,19 +734,19 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
 def resting_rows(
     back: Numbers,
     task: FaultPlant,
-    held: SampledStickSlip,
+    sampled_loop: SampledStickSlip,
     plant: Ranges,
     facets: np.ndarray,
     multipliers: np.ndarray,
 ) -> Iterator[Rows]:
     """Images of the facets after a period that ends at rest, in rational numbers."""
-    number, law = back.number, held.law
+    number, law = back.number, sampled_loop.law
     n1, _, n3 = facets.T
     rises = back.middle(n3) > 0
     raised, lowered = np.flatnonzero(rises), np.flatnonzero(~rises)
-    slip, half = number(law.slip_gain), number(held.step / 2)
-    both = (held.step, held.longest) if held.longest_step else (held.step,)
-    for part in chain(*(_carried(back, task, held, interval, facets, _AT_REST) for interval in both)):
+    slip, half = number(law.slip_gain), number(sampled_loop.step / 2)
+    both = (sampled_loop.step, sampled_loop.longest) if sampled_loop.longest_step else (sampled_loop.step,)
+    for part in chain(*(_carried(back, task, sampled_loop, interval, facets, _AT_REST) for interval in both)):
         for end in plant.chord:
             chord = number(end / task.authority)
             for which, share in ((raised, 0), (raised, 1), (lowered, None)):
@@ -748,7 +756,9 @@ def resting_rows(
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
                 constants = part.constant[which] + part.moved(0, which)
                 if share is None:  # n3 <= 0: a limited innovation is at least -T·v⁺/2 minus this
-                    constants = constants + (cut_off - a3 * slip) * number(held.law.rest_slip + 2 * held.slip_noise)
+                    constants = constants + (cut_off - a3 * slip) * number(
+                        sampled_loop.law.rest_slip + 2 * sampled_loop.slip_noise
+                    )
                 factors = np.column_stack([part.of_error[which], -cut_off * half, a3, a1 - a3 * chord + cut_off])
                 yield Rows(SLICES + part.place, which, factors, constants)
 
@@ -759,15 +769,15 @@ def resting_rows(
 Constraint = tuple[tuple[Fraction, ...], Fraction]
 
 
-def slices(task: FaultPlant, held: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
+def slices(task: FaultPlant, sampled_loop: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
     """Ends of the three slices: e1 up to 0, from there to max r′/c, and above."""
-    threshold, one = (task.reference_rates[0] + held.target_noise) / held.law.return_rate, Fraction(1)
+    threshold, one = (task.reference_rates[0] + sampled_loop.target_noise) / sampled_loop.law.return_rate, Fraction(1)
     up, down = (one, _ZERO, _ZERO), (-one, _ZERO, _ZERO)
     return ((up, _ZERO),), ((down, _ZERO), (up, threshold)), ((down, -threshold),)
 
 
 def polytopes(
-    task: FaultPlant, held: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], plant: Ranges | None
+    task: FaultPlant, sampled_loop: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], plant: Ranges | None
 ) -> list[list[Constraint]]:
     """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, δ) if ranges exist.
 
@@ -777,16 +787,18 @@ def polytopes(
     one = Fraction(1)
     own: list[Constraint] = [(row, one) for row in facets]
     own.append(((_ZERO, -one, _ZERO), _ZERO))
-    ends = slices(task, held)
+    ends = slices(task, sampled_loop)
     flat = [[*own, *end] for end in ends]
     if plant is None:
         return flat
-    stops = stop_bounds(task, held, plant)
+    stops = stop_bounds(task, sampled_loop, plant)
     most = task.beta[1] * task.authority
     for combination in (COMBINATIONS[place] for place in LEAST):
-        push, push0, _ = push_row(held, task.reference_rates[0] + held.target_noise, combination)
-        larger = (*(-most * v for v in push), plant.slope[0])
-        room = most * (push0 + held.push_noise) - task.amplitude
+        feedback, feedback0, _ = feedback_row(
+            sampled_loop, task.reference_rates[0] + sampled_loop.target_noise, combination
+        )
+        larger = (*(-most * v for v in feedback), plant.slope[0])
+        room = most * (feedback0 + sampled_loop.pressure_noise) - task.amplitude
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
         tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, room)]
         tall += [((_ZERO, -g, _ZERO, one), h) for g, h in stops]
@@ -820,16 +832,16 @@ class Verifier:
         solvable = np.abs(np.linalg.det((self.floats / lengths[:, None])[self.bases])) > _FLAT
         self.bases = self.bases[solvable]
         if not len(self.bases):
-            raise ParameterError("the constraints of each basis must be independent")
+            raise ParameterError("at least one basis of each polytope must have independent constraints")
         ends = _ball_middle(self.ends)
         self.vertices = np.linalg.solve(self.floats[self.bases], ends[self.bases][..., None])[..., 0]
         inside = (self.vertices @ self.floats.T <= ends + _NEAR * lengths).all(axis=1)
         if not inside.any():
-            raise ParameterError("the bases of each polytope must name its vertices")
+            raise ParameterError("at least one basis of each polytope must give a vertex of it")
         self.bases, self.vertices = self.bases[inside], self.vertices[inside]
 
     def proposed(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Constraints at the best vertex and multipliers, in floats; none is negative at an optimum."""
+        """Constraints at the best vertex, and their multipliers, in floats; at an optimum no multiplier is negative."""
         values = scaled @ self.vertices.T
         bases = self.bases[values.argmax(axis=1)]
         shares = np.linalg.solve(self.floats[bases].swapaxes(-1, -2), scaled[..., None])[..., 0]
@@ -866,7 +878,7 @@ class Verifier:
         return np.asarray(largest + constants)
 
     def _rest(self, left: np.ndarray, off: np.ndarray) -> np.ndarray:
-        """Bound of the remainder of the multipliers, within `off`, by the signs of e1, y and δ."""
+        """Bound of the remainder of the multipliers, within `cut_off`, by the signs of e1, y and δ."""
         left = left * np.array([self.sign, 1, 1, 1][: left.shape[1]])
         left[:, 2] = abs(left[:, 2])
         return np.asarray((np.maximum(left + off, 0) * self.sizes).sum(axis=1))
@@ -881,7 +893,9 @@ def _middles(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return middles, radii
 
 
-def stick_slip_bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
+def stick_slip_bounds(
+    task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: StickSlipPolytope
+) -> StickSlipClaims:
     """Bounds of the theorem.
 
     Raises
@@ -891,91 +905,96 @@ def stick_slip_bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlip
     """
     try:
         with ctx.workprec(BITS), np.errstate(all="ignore"):
-            return _bounds(task, held, reach)
+            return _bounds(task, sampled_loop, invariant_set)
     except ParameterError:
         raise
     except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # floats cannot propose multipliers for such numbers
-        raise ParameterError("numbers of the loop and its polytope must be of a size that floats hold") from None
+        raise ParameterError("numbers of the loop and its polytope must be within the range of floats") from None
 
 
-def _bounds(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> StickSlipClaims:
-    ahead, rate, _, lag, _ = reach.box
-    if any(row[0] * held.slip_noise + max(row[2], _ZERO) * held.push_noise > 1 for row in reach.facets):
+def _bounds(task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: StickSlipPolytope) -> StickSlipClaims:
+    ahead, rate, _, lag, _ = invariant_set.box
+    if any(
+        row[0] * sampled_loop.slip_noise + max(row[2], _ZERO) * sampled_loop.pressure_noise > 1
+        for row in invariant_set.facets
+    ):
         raise ParameterError("noise of the first measurement may put the loop outside of the polytope")
     fastest = task.reference_rates[0]
-    moved = fastest * held.longest
-    behind, before = lag + held.slip_noise + moved, ahead - held.slip_noise + moved
-    if held.law.pull:
-        root = ImplicitRoot(pull=held.law.pull)
-        if not holds(root, held.step, *held.errors(task, max(behind, before), rate)):
+    moved = fastest * sampled_loop.longest
+    behind, before = lag + sampled_loop.slip_noise + moved, ahead - sampled_loop.slip_noise + moved
+    if sampled_loop.law.pull:
+        root = ImplicitStep(pull=sampled_loop.law.pull)
+        if not holds(root, sampled_loop.step, *sampled_loop.errors(task, max(behind, before), rate)):
             raise ParameterError("the implicit step may not be deadbeat everywhere in the polytope")
-    push = pushes(task, held, reach)
-    plant = ranges(task, ahead + moved, push, rate * held.longest)
-    if plant.slope[1] * held.longest**2 >= 1:
-        raise ParameterError("T_s is too long against the weakening of friction")
-    deciding = verifiers(task, held, reach, plant)
-    periods = Period.deciding(BALLS, task, held, plant, rate, push)
-    for rows in chain(*facet_rows(periods, reach)):
+    feedback = feedback_range(task, sampled_loop, invariant_set)
+    plant = ranges(task, ahead + moved, feedback, rate * sampled_loop.longest)
+    if plant.slope[1] * sampled_loop.longest**2 >= 1:
+        raise ParameterError("T_s is too long for this weakening of friction")
+    deciding = verifiers(task, sampled_loop, invariant_set, plant)
+    periods = Period.deciding(BALLS, task, sampled_loop, plant, rate, feedback)
+    for rows in chain(*facet_rows(periods, invariant_set)):
         tops = deciding[rows.place].largest(rows.factors, rows.constants, rows.which)
         for facet, top in zip(rows.which, tops, strict=True):
             if not top <= 1:
                 kind = "slides" if rows.place < SLICES else "ends at rest"
                 raise ParameterError(f"the state may leave the polytope through facet {facet} in a period that {kind}")
-    if _bracket(task, held, plant, push[1]) > task.amplitude:
+    if _bracket(task, sampled_loop, plant, feedback[1]) > task.amplitude:
         raise ParameterError("the amplitude of the disturbance is too small for this range of the input gain")
     return StickSlipClaims(
         slip_behind=UpperBound(behind),
         slip_ahead=UpperBound(before),
         peak_slip_rate=UpperBound(rate),
-        least_pressure=LowerBound(plant.rest_pressure[0] - push[1]),
-        largest_pressure=UpperBound(plant.rest_pressure[1] - push[0]),
+        least_pressure=LowerBound(plant.rest_pressure[0] - feedback[1]),
+        largest_pressure=UpperBound(plant.rest_pressure[1] - feedback[0]),
     )
 
 
-def _bracket(task: FaultPlant, held: SampledStickSlip, plant: Ranges, push: Fraction) -> Fraction:
+def _bracket(task: FaultPlant, sampled_loop: SampledStickSlip, plant: Ranges, feedback: Fraction) -> Fraction:
     """Largest decrease [m/s²] of the bound H + δS·ξ + δw·y of |a| if ξ, y and U belong to different β.
 
     If this decrease is below H, the bound of |a| is not negative at either end of β, also where the response of a facet
     changes sign between them. For aperiodic sampling all of U counts, over the longest interval.
     """
-    step, growth = held.longest, 1 / (1 - plant.slope[1] * held.longest**2 / 2)
+    step, growth = sampled_loop.longest, 1 / (1 - plant.slope[1] * sampled_loop.longest**2 / 2)
     width, damping = (plant.slope[1] - plant.slope[0]) / 2, (plant.damping[1] - plant.damping[0]) / 2
     share = width * growth * step**2 / 2 + damping * step * (1 + plant.slope[1] * growth * step**2)
-    least = _ZERO if held.longest_step else task.beta[0]
-    return share * task.authority * (task.beta[1] - least) * max(push, _ZERO)
+    least = _ZERO if sampled_loop.longest_step else task.beta[0]
+    return share * task.authority * (task.beta[1] - least) * max(feedback, _ZERO)
 
 
 def verifiers(
-    task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope, plant: Ranges | None
+    task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: StickSlipPolytope, plant: Ranges | None
 ) -> list[Verifier]:
     """Verifiers of the 3 slices, and of the 7 combinations if ranges exist."""
-    ahead, rate, up, lag, down = reach.box
+    ahead, rate, up, lag, down = invariant_set.box
     sizes, longest = [max(ahead, lag), rate, max(up, down)], _ZERO
     if plant:
-        longest = max(min(g * rate + h for g, h in stop_bounds(task, held, plant)), Fraction(1, 10**30))
+        longest = max(min(g * rate + h for g, h in stop_bounds(task, sampled_loop, plant)), Fraction(1, 10**30))
         if task.amplitude + plant.slope[0] * longest < 0:
             raise ParameterError("the disturbance is too small for the condition of rest")
-    bases = (*reach.sliding, *(reach.resting if plant else ()))
+    bases = (*invariant_set.sliding, *(invariant_set.resting if plant else ()))
     return [
-        Verifier(lines, basis, [*sizes, longest][: len(basis[0])], place=place, facets=len(reach.facets))
-        for place, (lines, basis) in enumerate(zip(polytopes(task, held, reach.facets, plant), bases, strict=True))
+        Verifier(lines, basis, [*sizes, longest][: len(basis[0])], place=place, facets=len(invariant_set.facets))
+        for place, (lines, basis) in enumerate(
+            zip(polytopes(task, sampled_loop, invariant_set.facets, plant), bases, strict=True)
+        )
     ]
 
 
-def facet_rows(periods: Sequence[Period], reach: StickSlipPolytope) -> Iterator[Iterator[Rows]]:
+def facet_rows(periods: Sequence[Period], invariant_set: StickSlipPolytope) -> Iterator[Iterator[Rows]]:
     """Images of the facets: per period of the sliding map in balls, then of the rest map."""
-    stored = [[list(row) for row in rows] for rows in (reach.facets, reach.multipliers)]
+    stored = [[list(row) for row in rows] for rows in (invariant_set.facets, invariant_set.multipliers)]
     for period in periods:
         yield sliding_rows(period, *map(_ball_array, stored))
-    yield resting_rows(EXACT, periods[0].task, periods[0].held, periods[0].plant, *map(_exact_array, stored))
+    yield resting_rows(EXACT, periods[0].task, periods[0].sampled_loop, periods[0].plant, *map(_exact_array, stored))
 
 
-def pushes(task: FaultPlant, held: SampledStickSlip, reach: StickSlipPolytope) -> Range:
+def feedback_range(task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: StickSlipPolytope) -> Range:
     """Least and largest U = p* − p at a sample [Pa]."""
-    law, fastest = held.law, task.reference_rates[0] + held.target_noise
+    law, fastest = sampled_loop.law, task.reference_rates[0] + sampled_loop.target_noise
     row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
     factors = _exact_array([list(row), [-v for v in row]])
     constants = _exact_array([_ZERO, law.target_gain * fastest])
-    tops = [one.largest(factors, constants) for one in verifiers(task, held, reach, None)]
+    tops = [one.largest(factors, constants) for one in verifiers(task, sampled_loop, invariant_set, None)]
     high, low = (fraction_of(max(line[i] for line in tops)) for i in (0, 1))
-    return -low - held.push_noise, high + held.push_noise
+    return -low - sampled_loop.pressure_noise, high + sampled_loop.pressure_noise

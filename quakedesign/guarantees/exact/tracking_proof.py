@@ -20,12 +20,12 @@ from quakedesign.guarantees.exact.proof import NoProof, Proof
 from quakedesign.guarantees.exact.sampled_loop import Gains, SampledLoop
 from quakedesign.guarantees.exact.small_gain import (
     Bounds,
-    SlowGain,
+    VaryingGain,
     best_bounds,
     certified_bounds,
-    slow_gains,
+    varying_gain_norms,
 )
-from quakedesign.laws import ImplicitRoot, RestLimit
+from quakedesign.laws import ImplicitStep, RestLimit
 from quakedesign.loop import ContinuousLaw, PeriodicLoop, continuous_loop
 from quakedesign.lyapunov.exact.certificate_files import GUARANTEE
 from quakedesign.plant.fault_plant import FaultPlant
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 _DIGITS = 4
 _ENDS = ("least_pressure", "largest_pressure", "least_asked", "largest_asked")
-MARGIN = Fraction(1001, 1000)  # the standalone checker has slightly larger bounds, and is to prove the same claims
+MARGIN = Fraction(1001, 1000)  # the standalone checker has slightly larger bounds, but must prove the same claims
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +105,7 @@ class Claims:
         return fault, (self.least_asked, self.largest_asked)
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts, SI."""
+        """Exact numbers as strings, SI."""
         return {
             "slip_error": self.slip_error.exact,
             "slip_rate_error": self.slip_rate_error.exact,
@@ -197,11 +197,11 @@ class TrackingProof(Proof[Bounds]):
     Attributes
     ----------
     task : FaultPlant
-    held : SampledLoop
+    sampled_loop : SampledLoop
     claims : Claims
-    slow_gain : SlowGain, optional
+    varying_gain : VaryingGain, optional
         Slowly varying input gain of the proof; None for an arbitrary input gain.
-    reach : InvariantPolytope, optional
+    invariant_set : InvariantPolytope, optional
         Invariant set for aperiodic sampling; None for periodic sampling.
     """
 
@@ -209,16 +209,16 @@ class TrackingProof(Proof[Bounds]):
     plant: ClassVar[str] = "printed"
     scope: ClassVar[str] = "on the plant without stick"
     task: FaultPlant
-    held: SampledLoop
+    sampled_loop: SampledLoop
     claims: Claims
-    slow_gain: SlowGain | None = None
-    reach: InvariantPolytope | None = None
+    varying_gain: VaryingGain | None = None
+    invariant_set: InvariantPolytope | None = None
 
     def __repr__(self) -> str:
-        held, claims = self.held, self.claims
+        sampled_loop, claims = self.sampled_loop, self.claims
         errors = f"|e1| <= {claims.slip_error:.4g} m, |e2| <= {claims.slip_rate_error:.4g} m/s"
-        most = f" to {six_digits(held.longest_step)}" if held.longest_step else ""
-        return f"TrackingProof({self.task.name} held over {six_digits(held.step)}{most} s: {errors})"
+        most = f" to {six_digits(sampled_loop.longest_step)}" if sampled_loop.longest_step else ""
+        return f"TrackingProof({self.task.name} held over {six_digits(sampled_loop.step)}{most} s: {errors})"
 
     @property
     def peak_slip_rate(self) -> UpperBound:
@@ -236,18 +236,18 @@ class TrackingProof(Proof[Bounds]):
         return self.claims.by_name
 
     @property
-    def root(self) -> ImplicitRoot | None:
+    def implicit_step(self) -> ImplicitStep | None:
         """Implicit step of the law."""
-        return self.held.law.root
+        return self.sampled_loop.law.implicit_step
 
     @property
     def loop(self) -> PeriodicLoop:
         """Nominal error loop."""
-        return self.held.loop(self.task)
+        return self.sampled_loop.loop(self.task)
 
     @property
     def rest_limit(self) -> RestLimit | None:
-        """Limit at rest that the valve pressure never reaches, or None.
+        """Pressure limit at rest that the valve pressure never reaches, or None.
 
         None without a claim at the valve, or without `applied` in the law.
 
@@ -255,22 +255,30 @@ class TrackingProof(Proof[Bounds]):
         motion may be noise, or is slower than 1/100 of the largest reference rate. The claimed range of pressure is a
         limit too, unless the fault slips faster than is claimed.
         """
-        held, (low, high), (*fault, (least, largest)) = self.held, self.task.rest_pressure, self.claims.pressures
-        if not held.law.applied or (not fault and (held.lag or held.diffusion)):
+        sampled_loop, (low, high), (*fault, (least, largest)) = (
+            self.sampled_loop,
+            self.task.rest_pressure,
+            self.claims.pressures,
+        )
+        if not sampled_loop.law.applied or (not fault and (sampled_loop.lag or sampled_loop.diffusion)):
             return None
         away = max(largest - high, low - least)
         per_slip = max(map(abs, self.task.slip_chord)) / self.task.authority
-        late = per_slip * (held.delay + held.jitter + held.delay_jitter + held.ramp) * self.task.reference_rates[0]
+        late = (
+            per_slip
+            * (sampled_loop.delay + sampled_loop.jitter + sampled_loop.delay_jitter + sampled_loop.ramp)
+            * self.task.reference_rates[0]
+        )
         width = above(2 * away + late)
-        resolution = above(2 * held.slip_noise + _RESTS * self.task.reference_rates[0] * held.step)
-        most = max(held.step, held.longest_step) + 2 * held.off
+        resolution = above(2 * sampled_loop.slip_noise + _RESTS * self.task.reference_rates[0] * sampled_loop.step)
+        most = max(sampled_loop.step, sampled_loop.longest_step) + 2 * sampled_loop.timing_error
         return RestLimit(
             width=width,
             per_slip=above(per_slip),
             resolution=resolution,
             least=Fraction(least),
             largest=Fraction(largest),
-            fastest=above(2 * held.slip_noise + self.claims.peak_slip_rate * most),
+            fastest=above(2 * sampled_loop.slip_noise + self.claims.peak_slip_rate * most),
         )
 
     @property
@@ -285,48 +293,52 @@ class TrackingProof(Proof[Bounds]):
     @property
     def controller(self) -> "SampledController":
         """Law for `simulate` with its limit against windup."""
-        return replace(self.held.controller, rest_limit=self.rest_limit)
+        return replace(self.sampled_loop.controller, rest_limit=self.rest_limit)
 
     def recomputed(self) -> Bounds | NoProof:
         """Bounds that the theorem gives."""
-        if self.slow_gain is None:
-            return _bounds(self.task, self.held, self.loop, self.reach)
-        gains = _slow_gains(self.task, self.held, self.slow_gain)
+        if self.varying_gain is None:
+            return _bounds(self.task, self.sampled_loop, self.loop, self.invariant_set)
+        gains = _varying_gain_norms(self.task, self.sampled_loop, self.varying_gain)
         if isinstance(gains, NoProof):
             return gains
-        return _slow_bounds(self.task, self.held, self.slow_gain, gains, self.claims.slip_error)
+        return _bounds_with_varying_gain(self.task, self.sampled_loop, self.varying_gain, gains, self.claims.slip_error)
 
     def supported(self, bounds: Bounds) -> bool:
         """Whether the claims follow, and respect the sector of an implicit step and the limits of the pump."""
         return (
-            _root_within(self.task, self.held, self.claims)
-            and not _beyond_the_pump(self.held, self.claims)
-            and (self.slow_gain is None or bounds.slip_error < self.claims.slip_error)
+            _step_within(self.task, self.sampled_loop, self.claims)
+            and not _beyond_the_pump(self.sampled_loop, self.claims)
+            and (self.varying_gain is None or bounds.slip_error < self.claims.slip_error)
             and self.claims.follow(self.task, bounds)
         )
 
     def to_dict(self) -> Json:
-        """Exact claims as texts, SI."""
+        """Exact claims as strings, SI."""
         return self.claims.to_dict()
 
     def sentence(self) -> str:
         """Statement of the guarantee as text."""
-        held = self.held
-        when = f"with zero-order hold over {_seconds(held.step)}"
-        if held.longest_step:
-            shortest, longest = UpperBound(held.step), LowerBound(held.longest_step)
+        sampled_loop = self.sampled_loop
+        when = f"with zero-order hold over {_seconds(sampled_loop.step)}"
+        if sampled_loop.longest_step:
+            shortest, longest = UpperBound(sampled_loop.step), LowerBound(sampled_loop.longest_step)
             when = f"with zero-order hold over sampling intervals from {shortest:.6g} s to {longest:.6g} s in any order"
-        when += f", with a delay of {_seconds(held.delay)}" if held.delay else ""
-        when += f", through a lag of {_seconds(held.lag)}" if held.lag else ""
-        when += f", through a diffusion path of L^2/D = {_seconds(held.diffusion)}" if held.diffusion else ""
-        when += ", with the slip alone measured" if held.law.of_slip_alone else ""
-        for name, bound in ((name, bound) for name, bound in held.noise.items() if bound):
+        when += f", with a delay of {_seconds(sampled_loop.delay)}" if sampled_loop.delay else ""
+        when += f", through a lag of {_seconds(sampled_loop.lag)}" if sampled_loop.lag else ""
+        when += (
+            f", through a diffusion path of L^2/D = {_seconds(sampled_loop.diffusion)}"
+            if sampled_loop.diffusion
+            else ""
+        )
+        when += ", with the slip alone measured" if sampled_loop.law.of_slip_alone else ""
+        for name, bound in ((name, bound) for name, bound in sampled_loop.noise.items() if bound):
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
-        mean = LowerBound(held.averaging)
+        mean = LowerBound(sampled_loop.averaging)
         when += f", each measurement averaged over {mean:.6g} s around its instant" if mean else ""
-        when += _off_schedule(held.jitter, held.jitter + held.delay_jitter)
-        when += f", {held.pump.words()}" if held.pump else ""
-        return sentence_of(self.task, self.claims, when, _start(*held.start))
+        when += _off_schedule(sampled_loop.jitter, sampled_loop.jitter + sampled_loop.delay_jitter)
+        when += f", {sampled_loop.pump.words()}" if sampled_loop.pump else ""
+        return sentence_of(self.task, self.claims, when, _start(*sampled_loop.initial_errors))
 
 
 def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from rest") -> str:
@@ -352,75 +364,92 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
 
 
 def guarantee(
-    task: FaultPlant, held: SampledLoop, slow_gain: SlowGain | None = None, reach: InvariantPolytope | None = None
+    task: FaultPlant,
+    sampled_loop: SampledLoop,
+    varying_gain: VaryingGain | None = None,
+    invariant_set: InvariantPolytope | None = None,
 ) -> TrackingProof | NoProof:
     """Tightest rounded claims about a loop, or the reason why there are none.
 
     For a pump with a rate limit the ramp time is increased until the pump can make every pressure change within it.
 
-    Aperiodic sampling needs `reach`, and excludes `slow_gain`.
+    Aperiodic sampling needs `invariant_set`, and excludes `varying_gain`.
 
     Raises
     ------
     ParameterError
         For a loop without a steady state, or a slowly varying gain if friction depends on the slip rate.
     """
-    if reach is not None:
-        bounds = _bounds(task, held, held.loop(task), reach)
-        return bounds if not bounds.found else _of_claims(task, held, _rounded(task, bounds), reach=reach)
-    if held.pump is None or held.pump.rate is None or held.ramp:
-        return _proved(task, held, slow_gain)
-    ramp, longest = _FIRST * held.step, held.longest_ramp
-    proof = _proved(task, replace(held, ramp=ramp), slow_gain)
+    if invariant_set is not None:
+        bounds = _bounds(task, sampled_loop, sampled_loop.loop(task), invariant_set)
+        return (
+            bounds
+            if not bounds.available
+            else _of_claims(task, sampled_loop, _rounded(task, bounds), invariant_set=invariant_set)
+        )
+    if sampled_loop.pump is None or sampled_loop.pump.rate is None or sampled_loop.ramp:
+        return _proved(task, sampled_loop, varying_gain)
+    ramp, longest = _FIRST * sampled_loop.step, sampled_loop.longest_ramp
+    proof = _proved(task, replace(sampled_loop, ramp=ramp), varying_gain)
     for _ in range(_RAMPS):
-        if proof.found or proof.needs is None or ramp == longest:
+        if proof.available or proof.needs is None or ramp == longest:
             break
-        if slow := held.pump.too_slow(UpperBound(proof.needs), longest):
+        if slow := sampled_loop.pump.too_slow(UpperBound(proof.needs), longest):
             return replace(proof, reason=slow)
-        ramp = min(above(proof.needs / held.pump.rate * _RAMP_ROOM), longest)
-        proof = _proved(task, replace(held, ramp=ramp), slow_gain)
+        ramp = min(above(proof.needs / sampled_loop.pump.rate * _RAMP_ROOM), longest)
+        proof = _proved(task, replace(sampled_loop, ramp=ramp), varying_gain)
     return proof
 
 
-def _proved(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain | None) -> TrackingProof | NoProof:
-    claims = _claims(task, held) if slow_gain is None else _slow_claims(task, held, slow_gain)
-    return claims if isinstance(claims, NoProof) else _of_claims(task, held, claims, slow_gain)
+def _proved(task: FaultPlant, sampled_loop: SampledLoop, varying_gain: VaryingGain | None) -> TrackingProof | NoProof:
+    claims = (
+        _claims(task, sampled_loop)
+        if varying_gain is None
+        else _claims_with_varying_gain(task, sampled_loop, varying_gain)
+    )
+    return claims if isinstance(claims, NoProof) else _of_claims(task, sampled_loop, claims, varying_gain)
 
 
 def _of_claims(
     task: FaultPlant,
-    held: SampledLoop,
+    sampled_loop: SampledLoop,
     claims: Claims,
-    slow_gain: SlowGain | None = None,
-    reach: InvariantPolytope | None = None,
+    varying_gain: VaryingGain | None = None,
+    invariant_set: InvariantPolytope | None = None,
 ) -> TrackingProof | NoProof:
     """Claims, or the reason why there are none."""
-    if not _root_within(task, held, claims):
+    if not _step_within(task, sampled_loop, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoProof(reason=f"the implicit step leaves its sector at {errors}")
-    if reason := claims.opens(task) or _beyond_the_pump(held, claims):
-        slow = held.pump is not None and bool(held.pump.too_slow(claims.largest_step, held.ramp))
+    if reason := claims.opens(task) or _beyond_the_pump(sampled_loop, claims):
+        slow = sampled_loop.pump is not None and bool(
+            sampled_loop.pump.too_slow(claims.largest_step, sampled_loop.ramp)
+        )
         return NoProof(reason=reason, needs=claims.largest_step if slow else None, pressed=not slow)
-    return TrackingProof(task=task, held=held, claims=claims, slow_gain=slow_gain, reach=reach)
+    return TrackingProof(
+        task=task, sampled_loop=sampled_loop, claims=claims, varying_gain=varying_gain, invariant_set=invariant_set
+    )
 
 
-def _claims(task: FaultPlant, held: SampledLoop) -> Claims | NoProof:
-    bounds = _bounds(task, held, held.loop(task))
-    return bounds if not bounds.found else _rounded(task, bounds)
+def _claims(task: FaultPlant, sampled_loop: SampledLoop) -> Claims | NoProof:
+    bounds = _bounds(task, sampled_loop, sampled_loop.loop(task))
+    return bounds if not bounds.available else _rounded(task, bounds)
 
 
 def _rounded(task: FaultPlant, bounds: Bounds) -> Claims:
     return Claims.of(task, bounds).rounded()
 
 
-def _slow_claims(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Claims | NoProof:
+def _claims_with_varying_gain(
+    task: FaultPlant, sampled_loop: SampledLoop, varying_gain: VaryingGain
+) -> Claims | NoProof:
     """Claims from a fixed point: the slip error bounds the deviation of the input gain."""
-    gains, slip_error = _slow_gains(task, held, slow_gain), Fraction(0)
+    gains, slip_error = _varying_gain_norms(task, sampled_loop, varying_gain), Fraction(0)
     if isinstance(gains, NoProof):
         return gains
     for turn in range(_TURNS + _LEAPS):
-        bounds = _slow_bounds(task, held, slow_gain, gains, slip_error)
-        if not bounds.found:
+        bounds = _bounds_with_varying_gain(task, sampled_loop, varying_gain, gains, slip_error)
+        if not bounds.available:
             return bounds
         claims = _rounded(task, bounds)
         if claims.slip_error <= slip_error:
@@ -430,54 +459,66 @@ def _slow_claims(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Cl
     return NoProof(reason=reason)
 
 
-def _slow_gains(task: FaultPlant, held: SampledLoop, slow_gain: SlowGain) -> Gains | NoProof:
-    if held.longest_step:
+def _varying_gain_norms(task: FaultPlant, sampled_loop: SampledLoop, varying_gain: VaryingGain) -> Gains | NoProof:
+    if sampled_loop.longest_step:
         return NoProof(reason="aperiodic sampling has no guarantee with a slowly varying input gain")
-    loops = tuple(held.loop(task, model) for model in slow_gain.models(task))
+    loops = tuple(sampled_loop.loop(task, model) for model in varying_gain.models(task))
     try:
-        return slow_gains(loops, slow_gain.growth)
+        return varying_gain_norms(loops, varying_gain.growth)
     except ParameterError:
-        return _unstable(held)
+        return _unstable(sampled_loop)
 
 
-def _slow_bounds(
-    task: FaultPlant, held: SampledLoop, slow_gain: SlowGain, gains: Gains, slip_error: Fraction
+def _bounds_with_varying_gain(
+    task: FaultPlant, sampled_loop: SampledLoop, varying_gain: VaryingGain, gains: Gains, slip_error: Fraction
 ) -> Bounds | NoProof:
-    spread = slow_gain.spread(task, slip_error)
-    return best_bounds(task, gains, held.law.root, held.step, held.noise, spread, held.off)
+    spread = varying_gain.spread(task, slip_error)
+    return best_bounds(
+        task,
+        gains,
+        sampled_loop.law.implicit_step,
+        sampled_loop.step,
+        sampled_loop.noise,
+        spread,
+        sampled_loop.timing_error,
+    )
 
 
-def _root_within(task: FaultPlant, held: SampledLoop, claims: Claims) -> bool:
+def _step_within(task: FaultPlant, sampled_loop: SampledLoop, claims: Claims) -> bool:
     """Whether the sector of an implicit step, if there is one, is valid within the claims."""
-    root = held.law.root
-    errors = held.measured_errors(task, (claims.slip_error, claims.slip_rate_error))
-    return root is None or small_gain.holds(root, held.step, *errors)
+    root = sampled_loop.law.implicit_step
+    errors = sampled_loop.measured_errors(task, (claims.slip_error, claims.slip_rate_error))
+    return root is None or small_gain.holds(root, sampled_loop.step, *errors)
 
 
-def _beyond_the_pump(held: SampledLoop, claims: Claims) -> str:
+def _beyond_the_pump(sampled_loop: SampledLoop, claims: Claims) -> str:
     """Reason why the claims exceed a pump limit; empty if they do not."""
-    if held.pump is None:
+    if sampled_loop.pump is None:
         return ""
-    return held.pump.exceeded(*claims.pressures[-1]) or held.pump.too_slow(claims.largest_step, held.ramp)
+    return sampled_loop.pump.exceeded(*claims.pressures[-1]) or sampled_loop.pump.too_slow(
+        claims.largest_step, sampled_loop.ramp
+    )
 
 
 def _bounds(
-    task: FaultPlant, held: SampledLoop, loop: PeriodicLoop, reach: InvariantPolytope | None = None
+    task: FaultPlant, sampled_loop: SampledLoop, loop: PeriodicLoop, invariant_set: InvariantPolytope | None = None
 ) -> Bounds | NoProof:
-    if reach is not None and not held.longest_step:
+    if invariant_set is not None and not sampled_loop.longest_step:
         return NoProof(reason="periodic sampling needs no invariant set")
-    if reach is not None:
-        return reached_bounds(task, held, reach)
-    if held.longest_step:
+    if invariant_set is not None:
+        return reached_bounds(task, sampled_loop, invariant_set)
+    if sampled_loop.longest_step:
         return NoProof(reason="aperiodic sampling needs an invariant set")
     try:
-        return certified_bounds(task, loop, held.law.root, held.noise, held.off)
+        return certified_bounds(
+            task, loop, sampled_loop.law.implicit_step, sampled_loop.noise, sampled_loop.timing_error
+        )
     except ParameterError:
-        return _unstable(held)
+        return _unstable(sampled_loop)
 
 
-def _unstable(held: SampledLoop) -> NoProof:
-    over = f"with zero-order hold over {_seconds(held.step)}"
+def _unstable(sampled_loop: SampledLoop) -> NoProof:
+    over = f"with zero-order hold over {_seconds(sampled_loop.step)}"
     return NoProof(reason=f"{over} even the nominal loop is not stable, or decays too slowly")
 
 
@@ -546,7 +587,7 @@ class ContinuousProof(Proof[Bounds]):
         return self.claims.follow(self.task, bounds)
 
     def to_dict(self) -> Json:
-        """Exact claims as texts, SI, and their assumptions."""
+        """Exact claims as strings, SI, and their assumptions."""
         kind = "amplitude" if self.task.change is None else "rate"
         return {"disturbance_class": kind, **self.claims.to_dict(), "premises": list(PREMISES)}
 
@@ -564,7 +605,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | 
         For a law with a steady-state error at rest under a constant pressure.
     """
     bounds = _continuous_bounds(task, law)
-    if not bounds.found:
+    if not bounds.available:
         return bounds
     claims = Claims.of(task, bounds).rounded()
     if reason := claims.opens(task):

@@ -32,23 +32,23 @@ _SEED = 5
 _DIGITS = 7
 
 
-def aperiodic_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoProof:
+def aperiodic_guarantee(task: FaultPlant, sampled_loop: SampledLoop) -> TrackingProof | NoProof:
     """Guarantee with an invariant set from a search, or the reason why there is none."""
     proof: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves")
     for raised in _RAISED:
-        reach = _reach(task, held, raised)
-        if not isinstance(reach, InvariantPolytope):
-            return reach or proof
-        proof = guarantee(task, held, reach=reach)
-        if proof.found:
+        invariant_set = _rounded_set(task, sampled_loop, raised)
+        if not isinstance(invariant_set, InvariantPolytope):
+            return invariant_set or proof
+        proof = guarantee(task, sampled_loop, invariant_set=invariant_set)
+        if proof.available:
             break
     return proof
 
 
-def unclocked_estimate(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+def unclocked_estimate(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | None:
     """Estimated bounds from an invariant set with few facets; None without a set."""
-    middle = replace(held, step=(held.step + held.longest_step) / 2, longest_step=Fraction(0))
-    gains, loop = gains_of(middle.loop(task)), _Floats.of(task, held)
+    middle = replace(sampled_loop, step=(sampled_loop.step + sampled_loop.longest_step) / 2, longest_step=Fraction(0))
+    gains, loop = gains_of(middle.loop(task)), _Floats.of(task, sampled_loop)
     sides = loop.sides(loop.own, _FEW) if gains is not None and loop.fits else None
     if gains is None or sides is None:
         return None
@@ -81,9 +81,9 @@ class _Floats:
     force: float
 
     @classmethod
-    def of(cls, task: FaultPlant, held: SampledLoop) -> "_Floats":
+    def of(cls, task: FaultPlant, sampled_loop: SampledLoop) -> "_Floats":
         """Matrices of a loop with aperiodic sampling."""
-        loop, channels = held.loop(task), channels_of(task, None, held.step, held.noise)
+        loop, channels = sampled_loop.loop(task), channels_of(task, None, sampled_loop.step, sampled_loop.noise)
         seen, lift = (
             np.array([[int(v.p) / int(v.q) for v in row] for row in part.tolist()])
             for part in reduced(loop.segments[0].jump)
@@ -98,7 +98,7 @@ class _Floats:
             sampled=np.array([loop.sampled.get(channel.name, none) for channel in channels], dtype=float),
             own=np.array([float(channel.own) for channel in channels]),
             shares=np.array([[float(channel.shares.get(y, 0)) for y in loop.outputs] for channel in channels]),
-            interval=(float(held.step), float(held.longest_step)),
+            interval=(float(sampled_loop.step), float(sampled_loop.longest_step)),
             force=0.0 if task.change is None else float(task.amplitude),
         )
 
@@ -216,12 +216,12 @@ def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pus
     return np.asarray(np.array([after for _, after in images])[choice, row])
 
 
-def _reach(task: FaultPlant, held: SampledLoop, raised: float) -> InvariantPolytope | NoProof | None:
+def _rounded_set(task: FaultPlant, sampled_loop: SampledLoop, raised: float) -> InvariantPolytope | NoProof | None:
     """Invariant set in rounded numbers, which keeps its inputs within their bounds."""
-    loop = _Floats.of(task, held)
+    loop = _Floats.of(task, sampled_loop)
     if not loop.fits:
         return NoProof(reason="the law has too many states for a set that the loop never leaves")
-    bounds, sides, reach = loop.own, loop.sides(loop.own, _MANY), None
+    bounds, sides, invariant_set = loop.own, loop.sides(loop.own, _MANY), None
     if sides is None:
         return None
     columns = loop.columns(sides, _MANY)
@@ -229,7 +229,7 @@ def _reach(task: FaultPlant, held: SampledLoop, raised: float) -> InvariantPolyt
         largest = sides.largest(loop, bounds)
         wanted = loop.own + loop.shares @ largest
         if (wanted <= bounds).all():
-            reach = sides.exact(loop, bounds)
+            invariant_set = sides.exact(loop, bounds)
             if (wanted >= bounds / _LOOSE).all():
                 break
         share, more = loop.solved(bounds, largest, columns)
@@ -243,7 +243,7 @@ def _reach(task: FaultPlant, held: SampledLoop, raised: float) -> InvariantPolyt
         if following is None:
             break
         sides = following
-    return reach
+    return invariant_set
 
 
 def _facets(points: np.ndarray, count: int) -> np.ndarray:

@@ -40,7 +40,7 @@ from quakedesign.guarantees.search.linear_design import (
     unpredictable,
 )
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
-from quakedesign.laws import Controller, ImplicitRoot, Power, Sampling, SlidingMode
+from quakedesign.laws import Controller, ImplicitStep, Power, Sampling, SlidingMode
 from quakedesign.laws import compensated as compensated_law
 from quakedesign.laws.cta import ContinuousTwisting
 from quakedesign.laws.dia import DiscontinuousIntegral
@@ -127,7 +127,7 @@ _SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8"
 _REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # shares of a deadbeat slip-rate error
 _NEARLY = 2  # number of these slopes accepted as nearly deadbeat in the choice of a scale
 _MARGIN = Fraction(21, 20)
-_DEADBEAT = ImplicitRoot(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
+_DEADBEAT = ImplicitStep(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
 _STARTS = (0.2, 0.75), (0.35, 1.0)  # weight, and B0 over the midpoint of the input gain, for long and short T_s
 _BESIDE = 0.2, 3.0  # range of B0 over the midpoint
 _EVALUATIONS, _NEAR_ENOUGH, _WORST = 60, 0.9, 9.0
@@ -191,28 +191,28 @@ class Compensation:
     @property
     def deadbeat(self) -> bool:
         """Whether the implicit step ends at e1 + T_s·w = 0 within the proved errors."""
-        root = self.proof.root if self.proof.found else None
-        return root is not None and set(root.slopes) == {1} and not root.remainder
+        implicit_step = self.proof.implicit_step if self.proof.available else None
+        return implicit_step is not None and set(implicit_step.slopes) == {1} and not implicit_step.remainder
 
     @property
     def _scheme(self) -> str:
         return self.controller.sampling.scheme if self.controller.sampling else GUARANTEED
 
     def _end(self) -> str:
-        root = self.proof.root if self.proof.found else None
-        if root is None:
+        implicit_step = self.proof.implicit_step if self.proof.available else None
+        if implicit_step is None:
             return ""
-        low, high = (LowerBound(root.slopes[0]), UpperBound(root.slopes[1]))
+        low, high = (LowerBound(implicit_step.slopes[0]), UpperBound(implicit_step.slopes[1]))
         if self.deadbeat:
             deadbeat = "; within the proved errors its implicit step is deadbeat, e1 + T_s·w = 0"
             return f"{deadbeat}: its pressures are those of every law with a deadbeat step"
         return (
             f"; its implicit step ends at w = -γ·e1/T_s with γ from {low:.3g} to {high:.3g}, up to "
-            f"{UpperBound(root.remainder):.2g} m/s, within the proved errors"
+            f"{UpperBound(implicit_step.remainder):.2g} m/s, within the proved errors"
         )
 
     def to_dict(self) -> Json:
-        """Exact numbers as texts."""
+        """Exact numbers as strings."""
         law = self.controller
         return {
             "scheme": self._scheme,
@@ -242,26 +242,26 @@ def compensated(
         pull = implicit_pull(controller, step, authority)
     except UnsupportedError as error:
         return NoProof(reason=str(error))
-    held = _sampled(ImplicitRoot(pull=pull), weight, authority, step, setup)
-    first = guarantee(task, held)
-    if first.found:
+    sampled_loop = _sampled(ImplicitStep(pull=pull), weight, authority, step, setup)
+    first = guarantee(task, sampled_loop)
+    if first.available:
         return first
-    deadbeat = estimated(task, held)
-    if deadbeat is None or not deadbeat.bounds.found:
-        return best_guarantee(task, held)
+    deadbeat = estimated(task, sampled_loop)
+    if deadbeat is None or not deadbeat.bounds.available:
+        return best_guarantee(task, sampled_loop)
     size = deadbeat.bounds.slip_rate_error
     for share, slope in product(_REMAINDERS, _SLOPES):
-        root = ImplicitRoot(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
-        wider = replace(held, law=replace(held.law, root=root))
+        implicit_step = ImplicitStep(pull=pull, slopes=(slope, Fraction(1)), remainder=share * size)
+        wider = replace(sampled_loop, law=replace(sampled_loop.law, implicit_step=implicit_step))
         near = estimated(task, wider)
-        if near is None or not near.bounds.found:
+        if near is None or not near.bounds.available:
             continue
-        errors = near.bounds.slip_error + held.slip_noise, near.bounds.slip_rate_error + held.rate_noise
-        within = holds(root, step, *errors)
+        errors = near.bounds.slip_error + sampled_loop.slip_noise, near.bounds.slip_rate_error + sampled_loop.rate_noise
+        within = holds(implicit_step, step, *errors)
         proof = guarantee(task, wider) if within else None
-        if proof is not None and proof.found:
+        if proof is not None and proof.available:
             return proof
-    return best_guarantee(task, held)
+    return best_guarantee(task, sampled_loop)
 
 
 def design_compensated(
@@ -323,9 +323,9 @@ class Deadbeat(Kind):
         def cost(x: np.ndarray) -> float:
             if not (0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]):
                 return 2 * _WORST
-            held = self.held(task, x, step, setup=setup)
-            value = closeness(task, held)[0]
-            return value if value < _WORST else _WORST + min(spectral_radius(held.loop(task)), 1.0)
+            sampled_loop = self.sampled_loop(task, x, step, setup=setup)
+            value = closeness(task, sampled_loop)[0]
+            return value if value < _WORST else _WORST + min(spectral_radius(sampled_loop.loop(task)), 1.0)
 
         question = "nearly deadbeat", task, step, setup
         least, x = inf, np.array(_STARTS[0])
@@ -334,20 +334,24 @@ class Deadbeat(Kind):
             least, x = min((least, x), minimum, key=lambda reached: reached[0])
             if least < _NEAR_ENOUGH:
                 break
-        return Closest(least, x, self.held(task, x, step, setup=setup))
+        return Closest(least, x, self.sampled_loop(task, x, step, setup=setup))
 
-    def held(self, task: FaultPlant, numbers: np.ndarray, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop:
+    def sampled_loop(
+        self, task: FaultPlant, numbers: np.ndarray, step: Fraction, setup: ExactSetup = PLAIN
+    ) -> SampledLoop:
         """Loop with a deadbeat step, for any gains."""
         return _sampled(_DEADBEAT, *_settled(task, numbers), step, setup)
 
     def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
         """Proof for the smallest λ for which the step is deadbeat."""
-        return self.made(task, candidate.held.step, candidate.numbers, setup=candidate.held.setup).without_stick
+        return self.made(
+            task, candidate.sampled_loop.step, candidate.numbers, setup=candidate.sampled_loop.setup
+        ).without_stick
 
     def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, setup: ExactSetup = PLAIN) -> Compensation:
         """Controller with these numbers, and its guarantee."""
-        (weight, authority), held = _settled(task, numbers), self.held(task, numbers, step, setup=setup)
-        bounds = closeness(task, held)[1]
+        (weight, authority), sampled_loop = _settled(task, numbers), self.sampled_loop(task, numbers, step, setup=setup)
+        bounds = closeness(task, sampled_loop)[1]
         noise = setup.slip_noise, setup.rate_noise
         errors = None if bounds is None else (bounds.slip_error + noise[0], bounds.slip_rate_error + noise[1])
         return _made(task, self.controller, step, (weight, authority, errors), setup)
@@ -356,26 +360,28 @@ class Deadbeat(Kind):
         """Loop with the smallest peak."""
         weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, setup=setup)
         law = _made(task, self.controller, step, (weight, authority, errors), setup).controller
-        root = ImplicitRoot(pull=implicit_pull(law, step, authority))
-        return None if errors is None else _sampled(root, weight, authority, step, setup)
+        implicit_step = ImplicitStep(pull=implicit_pull(law, step, authority))
+        return None if errors is None else _sampled(implicit_step, weight, authority, step, setup)
 
     def continued(
         self, task: FaultPlant, step: Fraction, longest: Longest | None, setup: ExactSetup = PLAIN
     ) -> Compensation | None:
         """Design for a T_s [s] up to the longest, near given numbers; None without a proof."""
-        if longest is None or longest.guarantee.held.step < step:
+        if longest is None or longest.guarantee.sampled_loop.step < step:
             return None
         near = self.closest(task, step, longest.numbers, setup=setup)
         made = None if isinstance(near, NoProof) else self.made(task, step, near.numbers, setup=setup)
-        return made if made is not None and made.proof.found else None
+        return made if made is not None and made.proof.available else None
 
     def at(self, task: FaultPlant, longest: Longest, objective: str = "peak") -> Compensation:
         """Design for the longest T_s with a guarantee, else the law of the search."""
-        held = longest.guarantee.held
-        made = design_compensated(task, self.controller, held.step, objective=objective, setup=held.setup)
-        if made.proof.found:
+        sampled_loop = longest.guarantee.sampled_loop
+        made = design_compensated(
+            task, self.controller, sampled_loop.step, objective=objective, setup=sampled_loop.setup
+        )
+        if made.proof.available:
             return made
-        return self.made(task, held.step, longest.numbers, setup=held.setup)
+        return self.made(task, sampled_loop.step, longest.numbers, setup=sampled_loop.setup)
 
 
 def _settled(task: FaultPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]:
@@ -398,16 +404,18 @@ def recovered(proof: TrackingProof | StickSlipProof) -> Compensation:
         if again is not None:
             return again
         raise UnsupportedError(_NOT_RECOVERED)
-    held, law, root = proof.held, proof.held.law, proof.held.law.root
-    if root is not None and len(law.measured) == 3 and law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1:
+    sampled_loop, law, implicit_step = proof.sampled_loop, proof.sampled_loop.law, proof.sampled_loop.law.implicit_step
+    if implicit_step is not None and len(law.measured) == 3 and law.feedback[2] > 0 and 0 < law.measured[2][1] <= 1:
         gain, weight = 1 / law.feedback[2], law.measured[2][1]
-        authority = gain / held.step
+        authority = gain / sampled_loop.step
         settings = ("weight", weight), ("authority", authority)
-        sampling = Sampling(step=held.step, scheme=GUARANTEED, settings=settings, **held.path)
-        for base in _with_gains(root.pull, held.step, authority):
+        sampling = Sampling(step=sampled_loop.step, scheme=GUARANTEED, settings=settings, **sampled_loop.path)
+        for base in _with_gains(implicit_step.pull, sampled_loop.step, authority):
             controller = replace(base, gains=dict(base.gains), sampling=sampling)
-            matches = sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(root.pull)
-            if matches and compensated_law(root, weight, gain) == law:
+            matches = sorted_terms(implicit_pull(controller, sampled_loop.step, authority)) == sorted_terms(
+                implicit_step.pull
+            )
+            if matches and compensated_law(implicit_step, weight, gain) == law:
                 return Compensation(controller=controller, proof=proof)
     raise UnsupportedError(_NOT_RECOVERED)
 
@@ -420,18 +428,18 @@ _NOT_RECOVERED = (
 
 def _sticking(proof: StickSlipProof) -> Compensation | None:
     """Sliding mode whose implicit step a certificate on the stick–slip plant states."""
-    held, law = proof.held, proof.held.law
-    authority = 1 / (held.step * law.target_gain)
-    for base in _with_gains(law.pull, held.step, authority) if law.pull else ():
-        controller = sticking_controller(base, held)
-        if sorted_terms(implicit_pull(controller, held.step, authority)) == sorted_terms(law.pull):
+    sampled_loop, law = proof.sampled_loop, proof.sampled_loop.law
+    authority = 1 / (sampled_loop.step * law.target_gain)
+    for base in _with_gains(law.pull, sampled_loop.step, authority) if law.pull else ():
+        controller = sticking_controller(base, sampled_loop)
+        if sorted_terms(implicit_pull(controller, sampled_loop.step, authority)) == sorted_terms(law.pull):
             return Compensation(controller=controller, proof=proof)
     return None
 
 
-def sticking_controller(controller: SlidingMode, held: SampledStickSlip) -> SlidingMode:
+def sticking_controller(controller: SlidingMode, sampled_loop: SampledStickSlip) -> SlidingMode:
     """Sliding mode in the scheme ``stick-slip`` with the estimate of a law."""
-    law, step = held.law, held.step
+    law, step = sampled_loop.law, sampled_loop.step
     settings = {
         "authority": 1 / (step * law.target_gain),
         "weight": law.level_gain / law.target_gain,
@@ -486,17 +494,17 @@ def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, *
     proof = design_stick_slip(task, step, implicit=True, **wanted)
     if not isinstance(proof, StickSlipProof):
         return proof
-    held, claims = proof.held, proof.claims
-    errors = held.errors(task, claims.slip_error, claims.peak_slip_rate)
-    authority = 1 / (step * held.law.target_gain)
+    sampled_loop, claims = proof.sampled_loop, proof.claims
+    errors = sampled_loop.errors(task, claims.slip_error, claims.peak_slip_rate)
+    authority = 1 / (step * sampled_loop.law.target_gain)
     try:
         scale = _smallest_scale(controller, authority, step, errors, _SLOPES[:1])
     except UnsupportedError as error:
         return NoProof(reason=str(error))
     if scale is None:
         return NoProof(reason="the implicit step is deadbeat for no scale that is tried")
-    law = sticking_controller(controller.scaled(scale), held)
-    return Compensation(controller=law, proof=replace(proof, held=sticking_loop(law, held.slip_noise)))
+    law = sticking_controller(controller.scaled(scale), sampled_loop)
+    return Compensation(controller=law, proof=replace(proof, sampled_loop=sticking_loop(law, sampled_loop.slip_noise)))
 
 
 def sorted_terms(terms: tuple[Power, ...]) -> tuple[Power, ...]:
@@ -550,12 +558,12 @@ def _deadbeat(
 def _deadbeat_search(
     task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup
 ) -> list[str]:
-    """Result of `_deadbeat` as texts."""
+    """Result of `_deadbeat` as strings."""
     seen = dict[tuple[Fraction, Fraction], BoundsEstimate]()
     for weight, ratio in product(weights, _RATIOS):
         choice = weight, _short(ratio * task.model.gain)
         estimate = estimated(task, _sampled(_DEADBEAT, *choice, step, setup))
-        if estimate is not None and estimate.bounds.found:
+        if estimate is not None and estimate.bounds.available:
             seen[choice] = estimate
     if not seen:
         return [str(weights[0]), str(_short(task.model.gain))]
@@ -585,9 +593,9 @@ def _smallest_scale(
     """Smallest λ of the ladder whose solution lies in the sector up to a deadbeat step."""
     slip, rate = (_MARGIN * v for v in errors)
 
-    def deadbeat(slope: Fraction, root: Fraction) -> bool:
-        pull = implicit_pull(controller.scaled(root**6), step, authority)
-        return holds(ImplicitRoot(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
+    def deadbeat(slope: Fraction, implicit_step: Fraction) -> bool:
+        pull = implicit_pull(controller.scaled(implicit_step**6), step, authority)
+        return holds(ImplicitStep(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
 
     for slope in slopes:
         index = bisect_left(_ROOTS, True, key=partial(deadbeat, slope))
@@ -597,13 +605,13 @@ def _smallest_scale(
 
 
 def _sampled(
-    root: ImplicitRoot, weight: Fraction, authority: Fraction, step: Fraction, setup: ExactSetup
+    implicit_step: ImplicitStep, weight: Fraction, authority: Fraction, step: Fraction, setup: ExactSetup
 ) -> SampledLoop:
-    return setup.held(compensated_law(root, weight, step * authority), step)
+    return setup.with_law(compensated_law(implicit_step, weight, step * authority), step)
 
 
 def _bounds(estimate: BoundsEstimate) -> Bounds:
-    assert estimate.bounds.found
+    assert estimate.bounds.available
     return estimate.bounds
 
 

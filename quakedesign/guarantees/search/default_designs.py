@@ -26,7 +26,7 @@ from quakedesign.guarantees.search.compensated_search import (
 from quakedesign.guarantees.search.linear_design import (
     continued,
     design_at,
-    design_held,
+    design_sampled_law,
     longest_delay,
     longest_step,
     tightened,
@@ -81,7 +81,7 @@ class SampledDesign:
             ),
             Premise(
                 name="delay",
-                required=self.runs.held.delay if self.runs else Fraction(0),
+                required=self.runs.sampled_loop.delay if self.runs else Fraction(0),
                 certified=self.longest_delay,
                 unit="s",
                 note="from the measurement to the pressure: that of the design, and the longest for which a design, an "
@@ -106,22 +106,24 @@ def sampled_design(
         For an unknown objective.
     """
     wanted: Any = {"measured": measured, "setup": setup}
-    proof = design_held(task, step, objective=objective, **wanted)
+    proof = design_sampled_law(task, step, objective=objective, **wanted)
     longest = longest_step(task, **wanted)
-    if not proof.found:
+    if not proof.available:
         proof = continued(task, step, longest, **wanted) or proof
-    reason = proof.reason if not proof.found else ""
-    if not proof.found and longest is not None:
+    reason = proof.reason if not proof.available else ""
+    if not proof.available and longest is not None:
         proof = design_at(task, longest)
-    if not proof.found:
+    if not proof.available:
         return SampledDesign(step=step, runs=None, reason=reason)
-    delayed, own = longest_delay(task, proof.held.step, **wanted), proof.held.delay
+    delayed, own = longest_delay(task, proof.sampled_loop.step, **wanted), proof.sampled_loop.delay
     return SampledDesign(
         step=step,
         runs=proof,
         reason=reason,
-        longest_step=max(proof.held.step, longest.guarantee.held.step if longest else proof.held.step),
-        longest_delay=max(own, delayed.held.delay) if delayed else own,
+        longest_step=max(
+            proof.sampled_loop.step, longest.guarantee.sampled_loop.step if longest else proof.sampled_loop.step
+        ),
+        longest_delay=max(own, delayed.sampled_loop.delay) if delayed else own,
     )
 
 
@@ -140,22 +142,22 @@ def sampled_sliding_mode(
     laws = Deadbeat(law)
     made = design_compensated(task, law, step, objective=objective, setup=setup)
     longest = longest_step(task, kind=laws, setup=setup)
-    if not made.proof.found:
+    if not made.proof.available:
         made = laws.continued(task, step, longest, setup=setup) or made
-    reason = made.proof.reason if not made.proof.found else ""
+    reason = made.proof.reason if not made.proof.available else ""
     if reason and longest is not None:
         made = laws.at(task, longest, objective)
-    if not made.without_stick.found:
+    if not made.without_stick.available:
         return made, SampledDesign(step=step, runs=None, reason=reason)
     runs = tightened(made.without_stick)
-    held = runs.held
-    delayed = longest_delay(task, held.step, kind=laws, setup=setup)
+    sampled_loop = runs.sampled_loop
+    delayed = longest_delay(task, sampled_loop.step, kind=laws, setup=setup)
     return replace(made, proof=runs), SampledDesign(
         step=step,
         runs=runs,
         reason=reason,
-        longest_step=max(held.step, longest.guarantee.held.step if longest else held.step),
-        longest_delay=delayed.held.delay if delayed else Fraction(0),
+        longest_step=max(sampled_loop.step, longest.guarantee.sampled_loop.step if longest else sampled_loop.step),
+        longest_delay=delayed.sampled_loop.delay if delayed else Fraction(0),
     )
 
 
@@ -214,7 +216,7 @@ def sliding_mode(
     objective : str
         ``tracking`` or ``peak``.
     setup : ExactSetup
-        As in `design_held`.
+        As in `design_sampled_law`.
 
     Raises
     ------

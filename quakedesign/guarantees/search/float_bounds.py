@@ -18,7 +18,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.norms import START, Arithmetic, LoopResponses, SlowestMode, unstable
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import GainSpread, SampledLoop
-from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain, bounds_from
+from quakedesign.guarantees.exact.small_gain import Bounds, VaryingGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.fault_plant import FaultPlant
@@ -33,7 +33,7 @@ _ALIKE = 0.99  # ratio of decays above which two modes are not separated
 _SOON = 1024  # periods
 _ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # positions of nominal loops in the range of a slowly varying gain
 _SPREAD = Fraction(1, 16)  # deviation of the gain from theirs, relative to its range
-PARTS = SlowGain(parts=8, growth=Fraction(1))  # of estimates, which neglect the input ``aged``, and of proofs
+PARTS = VaryingGain(parts=8, growth=Fraction(1))  # of estimates, which neglect the input ``aged``, and of proofs
 _TURNS, _LEAP = 10, 1.4  # iterations of the slip error to its fixed point, and least factor of a late one
 _FEW = 2
 
@@ -46,31 +46,49 @@ class BoundsEstimate:
     drift_gain: float
 
 
-def estimated(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+def estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | None:
     """Bounds of the theorem by trapezoidal sums; None for an unstable or very slow loop."""
-    gains = gains_of(held.loop(task))
+    gains = gains_of(sampled_loop.loop(task))
     if gains is None:
         return None
-    bounds = bounds_from(task, gains, held.law.root, held.step, held.noise, None, held.off)
+    bounds = bounds_from(
+        task,
+        gains,
+        sampled_loop.law.implicit_step,
+        sampled_loop.step,
+        sampled_loop.noise,
+        None,
+        sampled_loop.timing_error,
+    )
     return BoundsEstimate(bounds, max(gains["slip_error", "drift"]))
 
 
-def slowly_estimated(task: FaultPlant, held: SampledLoop) -> BoundsEstimate | None:
+def slowly_estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | None:
     """Estimate with a slowly varying input gain, at the ends and the middle of its range."""
     low, high = task.beta
     every = []
     for share in _ENDS:
-        gains = gains_of(held.loop(task, replace(task.model, gain=(low + share * (high - low)) * task.authority)))
+        gains = gains_of(
+            sampled_loop.loop(task, replace(task.model, gain=(low + share * (high - low)) * task.authority))
+        )
         if gains is None:
             return None
         every.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
     whole = {key: tuple(v for gains in every for v in gains[key]) for key in every[0]}
     spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
-    bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
+    bounds = bounds_from(
+        task,
+        whole,
+        sampled_loop.law.implicit_step,
+        sampled_loop.step,
+        sampled_loop.noise,
+        spread,
+        sampled_loop.timing_error,
+    )
     return BoundsEstimate(bounds, max(whole["slip_error", "drift"]))
 
 
-def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None]:
+def closeness(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bounds | None]:
     """Small gain [-] with bounds if a proof is expected; else 1 + the small gain at zero error.
 
     For friction that depends on the slip alone the input gain varies slowly. Its deviation depends on the bound of the
@@ -78,12 +96,12 @@ def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None
     for an unstable or very slow nominal loop.
     """
     if task.friction.rate_slope:
-        values = estimated(task, held)
+        values = estimated(task, sampled_loop)
         bounds = None if values is None else values.bounds
         return _closeness(bounds, inf if bounds is None else _small(bounds))
     whole: dict[tuple[str, str], tuple[float, ...]] = {}
     for model in (PARTS.models(task)[0], PARTS.models(task)[-1]):
-        gains = gains_of(held.loop(task, model))
+        gains = gains_of(sampled_loop.loop(task, model))
         if gains is None:
             return inf, None
         whole = {key: whole.get(key, ()) + values for key, values in gains.items()}
@@ -91,9 +109,17 @@ def closeness(task: FaultPlant, held: SampledLoop) -> tuple[float, Bounds | None
     slip_error, least = 0.0, inf
     for turn in range(_TURNS):
         spread = replace(PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
-        bounds = bounds_from(task, whole, held.law.root, held.step, held.noise, spread, held.off)
+        bounds = bounds_from(
+            task,
+            whole,
+            sampled_loop.law.implicit_step,
+            sampled_loop.step,
+            sampled_loop.noise,
+            spread,
+            sampled_loop.timing_error,
+        )
         least = min(least, _small(bounds))
-        if not bounds.found or bounds.slip_error <= slip_error:
+        if not bounds.available or bounds.slip_error <= slip_error:
             return _closeness(bounds, least)
         slip_error = max(1.01 * float(bounds.slip_error), _LEAP * slip_error * (turn >= _FEW))
     return _closeness(None, least)
@@ -109,7 +135,7 @@ def _small(bounds: Bounds | NoProof) -> float:
 
 
 def _closeness(bounds: Bounds | NoProof | None, least: float) -> tuple[float, Bounds | None]:
-    return (_small(bounds), bounds) if bounds is not None and bounds.found else (1 + least, None)
+    return (_small(bounds), bounds) if bounds is not None and bounds.available else (1 + least, None)
 
 
 def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | None:
@@ -184,8 +210,8 @@ FLOATS: Arithmetic = cast("Any", Arithmetic)(
     column=lambda values: _FloatMatrix.of([(v,) for v in values]),
     identity=lambda size: floats(np.eye(size)),
     pieces=lambda segment, _: (float(segment.duration) / _PIECES,) * _PIECES,
-    beside=lambda parts: np.concatenate(parts, axis=1),
-    above=np.concatenate,
+    hstack=lambda parts: np.concatenate(parts, axis=1),
+    vstack=np.concatenate,
     majorant=lambda flow: floats(np.asarray(np.where(np.eye(len(flow)), np.maximum(flow, 0), np.abs(flow)))),
     absolute=np.abs,
     modulus=np.abs,

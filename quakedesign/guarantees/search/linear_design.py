@@ -24,7 +24,7 @@ from quakedesign.fault.model import require_ordinary
 from quakedesign.files import Json
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
-from quakedesign.guarantees.exact.small_gain import Bounds, SlowGain
+from quakedesign.guarantees.exact.small_gain import Bounds, VaryingGain
 from quakedesign.guarantees.exact.tracking_proof import (
     ContinuousProof,
     TrackingProof,
@@ -64,19 +64,21 @@ from quakedesign.plant.of_fault import uncertain_plant
 _SHARE = 0.5  # growth α as a share of the slowest decay rate
 
 
-def best_guarantee(task: FaultPlant, held: SampledLoop) -> TrackingProof | NoProof:
+def best_guarantee(task: FaultPlant, sampled_loop: SampledLoop) -> TrackingProof | NoProof:
     """Guarantee with a slowly varying input gain if that helps, else with an arbitrary one.
 
     With aperiodic sampling the guarantee uses an invariant set.
     """
-    if held.longest_step:
-        return aperiodic_guarantee(task, held)
-    slow = slow_gain(task, held)
-    proof = guarantee(task, held) if slow is None else guarantee(task, held, slow)
-    if slow is None or proof.found:
+    if sampled_loop.longest_step:
+        return aperiodic_guarantee(task, sampled_loop)
+    slow = varying_gain(task, sampled_loop)
+    proof = guarantee(task, sampled_loop) if slow is None else guarantee(task, sampled_loop, slow)
+    if slow is None or proof.available:
         return proof
-    anyhow = guarantee(task, held)
-    return anyhow if anyhow.found or anyhow.pressed else proof  # a pressure is reduced more easily than a small gain
+    anyhow = guarantee(task, sampled_loop)
+    return (
+        anyhow if anyhow.available or anyhow.pressed else proof
+    )  # the pressure is easier to reduce than the small-gain factor
 
 
 @overload
@@ -85,20 +87,20 @@ def tightened(proof: TrackingProof) -> TrackingProof: ...
 def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof: ...
 def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof:
     """Guarantee with a slowly varying input gain in place of one with an arbitrary gain, if one is found."""
-    if not proof.found or proof.slow_gain is not None or proof.reach is not None:
+    if not proof.available or proof.varying_gain is not None or proof.invariant_set is not None:
         return proof
-    better = best_guarantee(proof.task, proof.held)
-    return better if better.found else proof
+    better = best_guarantee(proof.task, proof.sampled_loop)
+    return better if better.available else proof
 
 
-def slow_gain(task: FaultPlant, held: SampledLoop) -> SlowGain | None:
+def varying_gain(task: FaultPlant, sampled_loop: SampledLoop) -> VaryingGain | None:
     """Parts and growth of a slowly varying input gain; None where the theorem excludes one.
 
     Friction must not depend on the slip rate, and all nominal loops must be stable.
     """
     if task.friction.rate_slope:
         return None
-    decay = min(_decay(held.loop(task, model)) for model in PARTS.models(task))
+    decay = min(_decay(sampled_loop.loop(task, model)) for model in PARTS.models(task))
     return replace(PARTS, growth=short(_SHARE * decay, 2)) if decay > 0 else None
 
 
@@ -114,7 +116,7 @@ OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
 _FEW = 45  # evaluations near a law that has a guarantee at another T_s or delay
 _SURE = 0.9  # closeness that is sufficient
-_NARROW = 1.25  # `room` with aperiodic sampling: a larger one increases the bound of the slip error too
+_NARROW = 1.25  # `allowance` with aperiodic sampling: a larger one increases the bound of the slip error too
 _FEWER = 80  # evaluations with aperiodic sampling
 _CREEPING = 0.1  # weight of slip error per period over that of slip-rate error, to avoid slow convergence
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most that a file may have
@@ -133,15 +135,15 @@ class Closest:
     Attributes
     ----------
     closeness : float
-        Closeness computed in floats: below 1 if a proof is expected, else the small gain plus 1.
+        Distance from a guarantee in floats: below 1 if a proof is expected, else the small-gain factor plus 1.
     numbers : numpy.ndarray
         Parameters of the law in its family.
-    held : SampledLoop
+    sampled_loop : SampledLoop
     """
 
     closeness: float
     numbers: np.ndarray
-    held: SampledLoop
+    sampled_loop: SampledLoop
 
     @property
     def small_gain(self) -> float:
@@ -157,7 +159,7 @@ def closest(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> Closest | NoProof:
-    """Law nearest to a guarantee, or one that clearly has one; `NoProof` if there is no law at all.
+    """Law nearest to a guarantee; the search stops at a law that clearly has one. `NoProof` if there is no law.
 
     The search begins near the parameters of another law if given, else near those of good laws of the family.
     """
@@ -172,7 +174,7 @@ def closest(
         least, x = min((least, x), laws.closest(start, _FEW if near is not None else _EVALUATIONS), key=lambda v: v[0])
         if least < _SURE:
             break
-    return Closest(least, x, laws.held(x))
+    return Closest(least, x, laws.sampled_loop(x))
 
 
 def nearby(
@@ -180,21 +182,21 @@ def nearby(
 ) -> TrackingProof | NoProof:
     """Design for the least certified slip-rate error near the parameters of another law.
 
-    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_held` uses it last.
+    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_sampled_law` uses it last.
     """
     laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
         return laws
-    proof = best_guarantee(task, laws.held(laws.least_peak_near(near)))
-    return proof if proof.found else best_guarantee(task, laws.held(near))
+    proof = best_guarantee(task, laws.sampled_loop(laws.least_peak_near(near)))
+    return proof if proof.available else best_guarantee(task, laws.sampled_loop(near))
 
 
-def design_held(
+def design_sampled_law(
     task: FaultPlant,
     step: Fraction,
     *,
     objective: str = "tracking",
-    room: float | None = None,
+    allowance: float | None = None,
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | NoProof:
@@ -204,7 +206,7 @@ def design_held(
     gains and process noise are chosen in the same way.
 
     ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a drifting
-    disturbance, among laws whose certified slip-rate error is at most `room` times the smallest. With a lag or a
+    disturbance, among laws whose certified slip-rate error is at most `allowance` times the smallest. With a lag or a
     diffusion path the law contains a model of the path.
 
     Parameters
@@ -213,7 +215,7 @@ def design_held(
     step : Fraction
         T_s [s].
     objective : str
-    room : float, optional
+    allowance : float, optional
         Largest slip-rate error of ``tracking``, relative to the smallest certified one [-]. Default 1.6; with an
         observer, whose smallest error is larger, 1.4; with aperiodic sampling 1.25.
     measured : str
@@ -240,34 +242,34 @@ def design_held(
     least, x = 10 * _FAILED, np.array(starts[0])
     for start in starts:
         least, x = min((least, x), laws.least_peak(start), key=lambda reached: reached[0])
-        if behind_rock and _hopeless(least):
+        if behind_rock and _far_from_proof(least):
             break
-    if behind_rock and (none := laws.without_bounds(x)) is not None and _hopeless(least):
+    if behind_rock and (none := laws.without_bounds(x)) is not None and _far_from_proof(least):
         return none  # such a proof takes a minute
     seen = laws.seen(x)
-    if objective == "tracking" and seen is not None and seen.bounds.found:
-        limit = (room or laws.room) * float(seen.bounds.slip_rate_error)
+    if objective == "tracking" and seen is not None and seen.bounds.available:
+        limit = (allowance or laws.allowance) * float(seen.bounds.slip_rate_error)
         _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
-    proof = best_guarantee(task, laws.held(x))
-    if not proof.found and seen is not None and seen.bounds.found and proof.pressed:
-        leaner = best_guarantee(task, laws.held(laws.least_pressure(x)[1]))
-        proof = leaner if leaner.found else proof
+    proof = best_guarantee(task, laws.sampled_loop(x))
+    if not proof.available and seen is not None and seen.bounds.available and proof.pressed:
+        leaner = best_guarantee(task, laws.sampled_loop(laws.least_pressure(x)[1]))
+        proof = leaner if leaner.available else proof
     noise = {name: v for name, v in laws.template.noise.items() if v}
-    if proof.found or not noise:
+    if proof.available or not noise:
         return proof
     quiet = replace(setup, slip_noise=Fraction(0), rate_noise=Fraction(0))
-    without = design_held(task, step, objective=objective, room=room, measured=measured, setup=quiet)
-    return proof if not without.found else _with_noise(without, noise)
+    without = design_sampled_law(task, step, objective=objective, allowance=allowance, measured=measured, setup=quiet)
+    return proof if not without.available else _with_noise(without, noise)
 
 
 def _with_noise(without: TrackingProof, noise: Mapping[str, Fraction]) -> TrackingProof | NoProof:
-    """Guarantee with noise of a law that is proved without noise."""
-    held = replace(without.held, **noise)  # type: ignore[arg-type]
-    proof = best_guarantee(without.task, held)
-    if proof.found:
+    """Guarantee, with noise, for a law that is proved without noise."""
+    sampled_loop = replace(without.sampled_loop, **noise)  # type: ignore[arg-type]
+    proof = best_guarantee(without.task, sampled_loop)
+    if proof.available:
         return proof
-    anyhow = guarantee(without.task, held)  # with an arbitrary input gain, which noise does not affect
-    why = anyhow.reason if not anyhow.found and anyhow.small_gain is None else "nothing is proved"
+    anyhow = guarantee(without.task, sampled_loop)  # with an arbitrary input gain, which noise does not affect
+    why = anyhow.reason if not anyhow.available and anyhow.small_gain is None else "nothing is proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     noises = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
     return replace(proof, reason=f"with {noises} {why}; without it a law is proved")
@@ -280,7 +282,7 @@ class _Laws:
     task: FaultPlant
     family: LawFamily
     template: SampledLoop
-    question: tuple[Any, ...]
+    problem: tuple[Any, ...]
 
     @classmethod
     def of(cls, task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup) -> "_Laws | NoProof":
@@ -294,10 +296,10 @@ class _Laws:
         require_known(measured, MEASURED, "measured")
         middle = (step + (setup.longest_step or step)) / 2  # prediction horizon of a law without a time input
         family = family_of(task, middle, measured, setup)
-        template = setup.held(family.law(np.array(family.starts[0])), step)
+        template = setup.with_law(family.law(np.array(family.starts[0])), step)
         return cls(task, family, template, (task, step, measured, setup))
 
-    def held(self, x: np.ndarray) -> SampledLoop:
+    def sampled_loop(self, x: np.ndarray) -> SampledLoop:
         """The loop of a law."""
         return replace(self.template, law=self.family.law(x))
 
@@ -306,29 +308,29 @@ class _Laws:
         judged = slowly_estimated if self.template.diffusion and not self.task.friction.rate_slope else estimated
         judged = unclocked_estimate if self.template.longest_step else judged
         try:
-            return judged(self.task, self.held(x)) if self.family.admits(x) else None
+            return judged(self.task, self.sampled_loop(x)) if self.family.admits(x) else None
         except LinAlgError:  # of a Riccati equation
             return None
 
     def closest(self, start: Sequence[float] | np.ndarray, evaluations: int) -> tuple[float, np.ndarray]:
-        """Smallest closeness to a guarantee near a start, with its numbers."""
+        """Smallest distance from a guarantee near a start, with the parameters of the law."""
 
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _FAILED * min(self.close(x)[0], 9.0)) / _FAILED
 
         return search_near(
-            ("closest", *self.question), cost, start, enough=_SURE, evaluations=evaluations, far=1 + _FAR, wide=True
+            ("closest", *self.problem), cost, start, enough=_SURE, evaluations=evaluations, far=1 + _FAR, wide=True
         )
 
     def least_peak_near(self, start: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Numbers of the smallest peak near a law that needs a slowly varying input gain."""
+        """Parameters with the smallest peak near a law that needs a slowly varying input gain."""
 
         def cost(x: np.ndarray) -> float:
             distance, bounds = self.close(x)
             peak = _FAILED * min(distance, 9.0) if bounds is None else _decibels(bounds, self.family.period)
             return self.quiet(x, peak)
 
-        return search_near(("near peak", *self.question), cost, start, evaluations=_FEW, wide=True)[1]
+        return search_near(("near peak", *self.problem), cost, start, evaluations=_FEW, wide=True)[1]
 
     def close(self, x: np.ndarray) -> tuple[float, Bounds | None]:
         """Closeness to a guarantee, and the bounds if one is expected."""
@@ -336,14 +338,14 @@ class _Laws:
             seen = self.seen(x)
             return (inf, None) if seen is None else closeness_of_bounds(seen.bounds)
         try:
-            return closeness(self.task, self.held(x)) if self.family.admits(x) else (inf, None)
+            return closeness(self.task, self.sampled_loop(x)) if self.family.admits(x) else (inf, None)
         except LinAlgError:  # of a Riccati equation
             return inf, None
 
     def without_bounds(self, x: np.ndarray) -> NoProof | None:
         """Reason why a law has no bounds; None if it has bounds or does not exist."""
         seen = self.seen(x)
-        return seen.bounds if seen is not None and not seen.bounds.found else None
+        return seen.bounds if seen is not None and not seen.bounds.available else None
 
     def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
         """Smallest peak cost near a start, with its numbers; ends early far from a guarantee.
@@ -356,19 +358,19 @@ class _Laws:
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _peak_cost(self.seen(x), self.family.period))
 
-        return search_near(("peak", *self.question), cost, start, far=far, **settings)
+        return search_near(("peak", *self.problem), cost, start, far=far, **settings)
 
     def least_pressure(self, start: Sequence[float] | np.ndarray) -> tuple[float, np.ndarray]:
         """Smallest estimated change of the pressure near a start, in decibels, with its parameters."""
 
         def cost(x: np.ndarray) -> float:
             seen = self.seen(x)
-            if seen is None or not seen.bounds.found:
+            if seen is None or not seen.bounds.available:
                 return 10 * _FAILED
             most = seen.bounds.push if seen.bounds.valve_push is None else seen.bounds.valve_push
             return self.quiet(x, 10 * log10(float(most)))
 
-        return search_near(("pressure", *self.question), cost, start, **self._effort)
+        return search_near(("pressure", *self.problem), cost, start, **self._effort)
 
     def least_drift(self, start: Sequence[float] | np.ndarray, limit: float) -> tuple[float, np.ndarray]:
         """Smallest drift cost near a start, for a bounded slip-rate error [m/s]."""
@@ -376,12 +378,12 @@ class _Laws:
         def cost(x: np.ndarray) -> float:
             return self.quiet(x, _drift_cost(self.seen(x), limit))
 
-        return search_near(("drift", limit, *self.question), cost, start, **self._effort)
+        return search_near(("drift", limit, *self.problem), cost, start, **self._effort)
 
     @property
-    def room(self) -> float:
-        """Largest slip-rate error of ``tracking`` over the smallest certified one, see `design_held`."""
-        return _NARROW if self.template.longest_step else self.family.room
+    def allowance(self) -> float:
+        """Largest slip-rate error of ``tracking`` over the smallest certified one, see `design_sampled_law`."""
+        return _NARROW if self.template.longest_step else self.family.allowance
 
     @property
     def _effort(self) -> Json:
@@ -389,7 +391,7 @@ class _Laws:
         return {"evaluations": _FEWER} if self.template.longest_step else {}
 
     def quiet(self, x: np.ndarray, cost: float) -> float:
-        """Cost of a law; a penalty if the law settles too slowly while the fault is at rest."""
+        """Cost of a law, with a penalty if the law settles too slowly while the fault is at rest."""
         if cost >= 10 * _FAILED:
             return cost
         slowest = _SETTLES ** float(self.template.step / self.family.period)
@@ -397,23 +399,23 @@ class _Laws:
         return cost if over <= 1 else max(cost, min(over, 9.0) * _FAILED)
 
 
-def _hopeless(cost: float) -> bool:
+def _far_from_proof(cost: float) -> bool:
     """Whether the small gain at the end of a search is too large for a guarantee."""
     return _HOPELESS * _FAILED < cost < 9 * _FAILED
 
 
 def unpredictable(task: FaultPlant, step: Fraction) -> NoProof | None:
-    """`NoProof` if model errors grow too fast within a period for any sampled law; else None."""
+    """`NoProof` if the errors grow too much within a period for any sampled law; else None."""
     require_ordinary(step=step)
     rate, slip = float(task.model.rate), max(float(task.model.slip), 0.0)
     growth = float(step) * (hypot(rate, 2 * sqrt(slip)) - rate) / 2
     if growth <= _MOST_GROWTH:
         return None
-    return NoProof(reason=f"errors grow by e^{growth:.3g} within T_s = {float(step):.4g} s")
+    return NoProof(reason=f"errors grow by a factor of e^{growth:.3g} within T_s = {float(step):.4g} s")
 
 
 def search_near(
-    question: tuple[Any, ...], cost: Callable[[np.ndarray], float], start: Sequence[float] | np.ndarray, **settings: Any
+    problem: tuple[Any, ...], cost: Callable[[np.ndarray], float], start: Sequence[float] | np.ndarray, **settings: Any
 ) -> tuple[float, np.ndarray]:
     """Result of `_search`, cached by a key that determines the cost; see `quakedesign.cache`."""
 
@@ -421,7 +423,7 @@ def search_near(
         least, x = _search(cost, start, **settings)
         return [least, x.tolist()]
 
-    least, x = search_once(search, *question, np.array(start).tolist(), sorted(settings.items()))
+    least, x = search_once(search, *problem, np.array(start).tolist(), sorted(settings.items()))
     return least, np.array(x)
 
 
@@ -462,7 +464,7 @@ def _peak_cost(estimate: BoundsEstimate | None, period: Fraction) -> float:
     """Decibels of the slip-rate error; without a bound, a penalty for the distance from one."""
     if estimate is None:
         return 10 * _FAILED
-    if not estimate.bounds.found:
+    if not estimate.bounds.available:
         return _FAILED * min(float(estimate.bounds.small_gain or 9), 9.0)
     return _decibels(estimate.bounds, period)
 
@@ -472,7 +474,7 @@ def _decibels(bounds: Bounds, period: Fraction) -> float:
 
 
 def _drift_cost(estimate: BoundsEstimate | None, limit: float) -> float:
-    if estimate is None or not estimate.bounds.found:
+    if estimate is None or not estimate.bounds.available:
         return 10 * _FAILED
     over = max(0.0, float(estimate.bounds.slip_rate_error) / limit - 1)
     return 10 * log10(estimate.drift_gain) + 1000 * over
@@ -502,7 +504,7 @@ _ANY_RATE = Fraction(10**30)  # [Pa/s]
 
 @dataclass(frozen=True, slots=True)
 class Longest:
-    """A guarantee at nearly the longest time that has one, and the numbers of its law."""
+    """A guarantee at nearly the longest feasible time, and the parameters of its law."""
 
     guarantee: TrackingProof
     numbers: np.ndarray
@@ -540,7 +542,7 @@ class Linear(Kind):
 
     def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
         """Proof with a slowly varying input gain if that helps."""
-        return best_guarantee(task, candidate.held)
+        return best_guarantee(task, candidate.sampled_loop)
 
     def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
         """Loop with the smallest change of pressure near the smallest peak."""
@@ -548,7 +550,7 @@ class Linear(Kind):
         if isinstance(laws, NoProof):
             return None
         peak = min((laws.least_peak(start) for start in laws.family.starts), key=lambda reached: reached[0])[1]
-        return laws.held(laws.least_pressure(peak)[1])
+        return laws.sampled_loop(laws.least_pressure(peak)[1])
 
 
 def longest_step(
@@ -562,7 +564,7 @@ def longest_step(
     ----------
     task : FaultPlant
     measured, setup
-        As in `design_held`.
+        As in `design_sampled_law`.
     kind : Kind, optional
         Kind of the laws; linear ones unless given.
     """
@@ -587,17 +589,19 @@ def continued(
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
     """Design at T_s, searched near a law for a longer T_s, after a search without it failed; None if unproved."""
-    if longest is None or longest.guarantee.held.step < step:
+    if longest is None or longest.guarantee.sampled_loop.step < step:
         return None
     proof = nearby(task, step, longest.numbers, measured=measured, setup=setup)
-    return proof if proof.found else None
+    return proof if proof.available else None
 
 
 def design_at(task: FaultPlant, longest: Longest) -> TrackingProof:
     """Design for a small slip-rate error at the T_s and setup of a guarantee."""
-    held = longest.guarantee.held
-    proof = nearby(task, held.step, longest.numbers, measured=measured_by(held.law), setup=held.setup)
-    return min((longest.guarantee, *([proof] if proof.found else [])), key=lambda g: g.claims.slip_rate_error)
+    sampled_loop = longest.guarantee.sampled_loop
+    proof = nearby(
+        task, sampled_loop.step, longest.numbers, measured=measured_by(sampled_loop.law), setup=sampled_loop.setup
+    )
+    return min((longest.guarantee, *([proof] if proof.available else [])), key=lambda g: g.claims.slip_rate_error)
 
 
 def longest_delay(
@@ -695,18 +699,18 @@ def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fr
 
 def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, setup: ExactSetup) -> tuple[str, TrackingProof] | None:
     """Smallest pump, or largest disturbance, for which a low-pressure law is proved."""
-    pump, held = setup.pump, laws.leanest(task, step, setup=setup)
-    if held is None:
+    pump, sampled_loop = setup.pump, laws.leanest(task, step, setup=setup)
+    if sampled_loop is None:
         return None
     if pump is not None and pump.limits is not None:
-        proof = best_guarantee(task, replace(held, pump=_unlimited(pump)))
-        if proof.found:
+        proof = best_guarantee(task, replace(sampled_loop, pump=_unlimited(pump)))
+        if proof.available:
             low, high = map(Fraction, proof.claims.pressures[-1])
             wider = replace(pump, least=min(pump.limits[0], low), largest=max(pump.limits[1], high))
-            return SATURATION, replace(proof, held=replace(proof.held, pump=wider))
+            return SATURATION, replace(proof, sampled_loop=replace(proof.sampled_loop, pump=wider))
 
     def attempt(amplitude: Fraction) -> TrackingProof | NoProof:
-        return best_guarantee(replace(task, amplitude=amplitude), held)
+        return best_guarantee(replace(task, amplitude=amplitude), sampled_loop)
 
     if not task.amplitude:
         return None
@@ -727,10 +731,12 @@ def _ramped(pump: Pump | None, ramp: Fraction) -> Pump | None:
 
 def with_lowest_rate(proof: TrackingProof) -> TrackingProof:
     """The same guarantee for the slowest pump that makes the largest change within the ramp."""
-    held, step = proof.held, proof.claims.largest_step
-    if held.pump is None or step is None or not held.ramp:
+    sampled_loop, step = proof.sampled_loop, proof.claims.largest_step
+    if sampled_loop.pump is None or step is None or not sampled_loop.ramp:
         return proof
-    slower = replace(proof, held=replace(held, pump=replace(held.pump, rate=above(step / held.ramp))))
+    slower = replace(
+        proof, sampled_loop=replace(sampled_loop, pump=replace(sampled_loop.pump, rate=above(step / sampled_loop.ramp)))
+    )
     return slower if slower.check() is Verdict.PROVED else proof
 
 
@@ -785,7 +791,7 @@ def _farthest(
     for _ in range(_ATTEMPTS if good is not None else 0):
         assert good is not None
         proof = laws.proved(problem_with(at)[0], good)
-        if proof.found:
+        if proof.available:
             return Longest(proof, good.numbers)
         at = Fraction(f"{float(at * _BACK):.3g}")
         nearer = search(at, good.numbers)
@@ -845,7 +851,7 @@ def reached(
     time, good, bad, small_gain = first, None, None, None
     for _ in range(attempts):
         proof = attempt(time)
-        if proof.found:
+        if proof.available:
             proofs.append(proof)
             good = time
         else:
@@ -903,7 +909,7 @@ def certified_peaks(
     require_known(disturbance_class, CLASSES, "disturbance class", UnknownNameError)
     if controller.offset:
         raise ParameterError(
-            "a certified peak needs a law with p = 0 at the start. Received the offset "
+            "a certified peak needs p = 0 initially. Received the offset "
             f"{float(controller.offset):.4g} Pa. Use the offset 0."
         )
     law = exact_integrals(tuple(controller.gains.values()), of_state=controller.feedback == "state")
@@ -915,7 +921,7 @@ def certified_peaks(
         continuous_peaks(uncertain_plant(fault, rate_limited=disturbance_class == "rate"), law),
         controller.limits,
     )
-    if limits is None or not peaks.found:
+    if limits is None or not peaks.available:
         return peaks
     low, high = peaks.claims.least_pressure, peaks.claims.largest_pressure
     if limits.lowest < low and high < limits.highest:

@@ -40,7 +40,7 @@ _WITHOUT_PATH = 6  # states without a model of the path: e1, e2, π2, d, valve, 
 
 
 def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> int:
-    """Number of diffusion modes in a law that keeps the loop within a file's state limit.
+    """Largest number of diffusion modes in a law for which the loop stays within the state limit of a file.
 
     Negative if even no mode fits. A law of the slip alone has one state more.
     """
@@ -78,7 +78,7 @@ class PathFeedback:
         return cls(errors_model, flow, first, unit, unit * gain)
 
     def gains(self, slip: float, pressure: float) -> Row:
-        """Gains for logarithms of the weights of slip error and pressure; slip-rate error has 1.
+        """Gains for logarithms of the weights of slip error and pressure; the slip-rate error has the weight 1.
 
         The unit of time is L²/D or, without a diffusion path, T_s plus delay and lag.
 
@@ -101,7 +101,7 @@ def _regulator(update: np.ndarray, command: np.ndarray, weights: np.ndarray, of_
 
 
 def _filter(update: np.ndarray, process: np.ndarray) -> np.ndarray:
-    """Corrections of all states per innovation of the first, which is measured with noise of variance 1."""
+    """Steady-state Kalman gain for a measurement of the first state with noise variance 1."""
     covariance = solve_discrete_are(update.T, np.eye(len(update))[:, :1], process, np.eye(1))
     return np.array(covariance[:, 0] / (covariance[0, 0] + 1))
 
@@ -157,14 +157,14 @@ _FAINT = 1e-12  # process noise of all states, so that the filter forgets its in
 class LawFamily:
     """Laws with parameters x, with their initial values and admissible range.
 
-    The objective ``tracking`` may have `room` times the least bound of the slip-rate error. To avoid slow convergence,
-    the peak cost also includes a weighted slip error divided by `period` [s].
+    The objective ``tracking`` may have `allowance` times the least bound of the slip-rate error. To avoid slow
+    convergence, the peak cost also includes a weighted slip error divided by `period` [s].
     """
 
     law: Callable[[np.ndarray], LinearLaw]
     starts: tuple[tuple[float, ...], ...]
     admits: Callable[[np.ndarray], bool]
-    room: float
+    allowance: float
     period: Fraction
 
 
@@ -244,12 +244,12 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
         first = starts if path else _OBSERVERS
         starts = tuple((*k[:2], decades + a, decades + b) for k, (*_, a, b) in zip(first, _OBSERVERS, strict=False))
     period = step + setup.diffusion
-    return LawFamily(law, starts, admits, room=1.4 if observed else 1.6, period=period)
+    return LawFamily(law, starts, admits, allowance=1.4 if observed else 1.6, period=period)
 
 
 @dataclass(frozen=True, slots=True)
 class _Kalman:
-    """Kalman filters of slip error, slip-rate error and acceleration level, from the slip."""
+    """Kalman filters for slip error, slip-rate error and disturbance acceleration, from the slip."""
 
     follows: np.ndarray
     units: np.ndarray
@@ -267,7 +267,7 @@ class _Kalman:
         return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
 
     def corrections(self, acceleration: float, level: float) -> tuple[Fraction, Fraction, Fraction]:
-        """Corrections per innovation of the slip, by the Riccati equation of the filter."""
+        """Kalman gain for the slip, by the Riccati equation of the filter."""
         pushed = self.follows[:, 2] * [1, 1, 0]
         process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
         first, second, third = map(short, self.units @ _filter(self.follows, process))
@@ -275,7 +275,7 @@ class _Kalman:
 
 
 def _flow(model: NominalModel) -> np.ndarray:
-    """Generator of e1, e2 and a constant acceleration."""
+    """System matrix of e1, e2 and a constant acceleration."""
     return np.array([[0, 1, 0], [float(model.slip), -float(model.rate), 1], [0, 0, 0]])
 
 
@@ -403,7 +403,7 @@ def sliding_law(
         corrections = dict(zip(corrected, _filter(plant[np.ix_(corrected, corrected)], process), strict=True))
     except (LinAlgError, ValueError):
         raise ParameterError(
-            "step, delay and diffusion time must be short compared with the growth of the instability of slow sliding. "
+            "step, delay and diffusion time must be short compared with the growth time of the instability. "
             "Received values for which the Riccati equation has no solution. Shorten the step or the diffusion path."
         ) from None
     feedback = [short(v, _DIGITS) for v in gains]
@@ -464,7 +464,7 @@ def near_path(model: SlidingModel) -> Fraction:
 
 
 def growth_rate(model: SlidingModel) -> float:
-    """Real part of the fastest eigenvalue [1/s] about steady sliding, without control."""
+    """Largest real part of the eigenvalues [1/s] about steady sliding, without control."""
     return max(pole.real for pole in sliding_poles(model))
 
 

@@ -72,7 +72,7 @@ def sliding_block_guarantee(
         if plant is None or rate is None:
             break
         proof = plant_guarantee(plant, law, _PIECES)
-        if proof.found and max(proof.claims.controls) * MPA < claims.push:
+        if proof.available and max(proof.claims.controls) * MPA < claims.push:
             return replace(proof, notes=(_slip_rates(blocks, rate),))
     return NoProof(reason="the bounds that an estimate finds are not proved")
 

@@ -67,21 +67,21 @@ _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 
 
 def proved_sliding(
-    task: SlidingPlant, held: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]
+    task: SlidingPlant, sampled_loop: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]
 ) -> SlidingProof | NoProof:
     """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or the reason why there are none."""
     corner = worst_corner(task)
-    claims = _claims(corner, held, log_rate)
-    if claims is None or (corner != task and _excess(corner, held, claims) >= _NEAR):
+    claims = _claims(corner, sampled_loop, log_rate)
+    if claims is None or (corner != task and _excess(corner, sampled_loop, claims) >= _NEAR):
         return NoProof(reason=_too_much(task, log_rate))
     try:
-        cuts = _cut(task, held, claims, [MOST_CELLS - 1])
-        by_estimate = SlidingProof(task=task, held=held, cuts=cuts, claims=claims)
+        cuts = _cut(task, sampled_loop, claims, [MOST_CELLS - 1])
+        by_estimate = SlidingProof(task=task, sampled_loop=sampled_loop, cuts=cuts, claims=claims)
         smaller = replace(by_estimate, claims=_smallest_claims(by_estimate))
         if smaller.check() is Verdict.PROVED:
             return smaller
-        _cut(corner, held, claims, [0], exactly=True)  # if this fails, no cuts of the box help
-        return replace(by_estimate, cuts=_cut(task, held, claims, [MOST_CELLS - 1], exactly=True))
+        _cut(corner, sampled_loop, claims, [0], exactly=True)  # if this fails, no cuts of the box help
+        return replace(by_estimate, cuts=_cut(task, sampled_loop, claims, [MOST_CELLS - 1], exactly=True))
     except ParameterError:
         return NoProof(reason=f"{_too_much(task, log_rate)} in {MOST_CELLS} cells of the box")
 
@@ -94,8 +94,8 @@ def _smallest_claims(proof: SlidingProof) -> SlidingClaims:
     """
     claims = proof.claims
     for _ in range(_MEASURED):
-        worst = max(proof.cells, key=lambda cell: _excess(cell, proof.held, claims))
-        bounds, estimate = cell_bounds(worst, proof.held, claims), _estimate(worst, proof.held, claims)
+        worst = max(proof.cells, key=lambda cell: _excess(cell, proof.sampled_loop, claims))
+        bounds, estimate = cell_bounds(worst, proof.sampled_loop, claims), _estimate(worst, proof.sampled_loop, claims)
         if isinstance(bounds, NoProof) or estimate is None:
             break
         room = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in _NAMES}
@@ -103,14 +103,14 @@ def _smallest_claims(proof: SlidingProof) -> SlidingClaims:
     return claims
 
 
-def _followed(proof: SlidingProof, claims: SlidingClaims, room: Mapping[str, float]) -> SlidingClaims:
+def _followed(proof: SlidingProof, claims: SlidingClaims, margins: Mapping[str, float]) -> SlidingClaims:
     """Claims that follow by the estimate with a margin, iterated until they hardly change."""
     for _ in range(_SHRINKING):
-        every = [_estimate(cell, proof.held, claims) for cell in proof.cells]
+        every = [_estimate(cell, proof.sampled_loop, claims) for cell in proof.cells]
         if any(one is None for one in every):
             break
-        most = {name: max(float(one[name]) for one in every if one) for name in room}
-        following = {name: min(most[name] * v, float(getattr(claims, name))) for name, v in room.items()}
+        most = {name: max(float(one[name]) for one in every if one) for name in margins}
+        following = {name: min(most[name] * v, float(getattr(claims, name))) for name, v in margins.items()}
         still = all(v > 0.99 * float(getattr(claims, name)) for name, v in following.items())
         claims = _as_claims(following)
         if still:
@@ -118,11 +118,11 @@ def _followed(proof: SlidingProof, claims: SlidingClaims, room: Mapping[str, flo
     return claims
 
 
-def largest_stress(task: SlidingPlant, held: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
+def largest_stress(task: SlidingPlant, sampled_loop: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]) -> Fraction:
     """Estimate of the largest stress [Pa] that `proved_sliding` proves; 0 for none."""
     corner = worst_corner(task)
     claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
-    estimates = [_estimate(replace(corner, stress=stress), held, claims) for stress in (Fraction(0), some)]
+    estimates = [_estimate(replace(corner, stress=stress), sampled_loop, claims) for stress in (Fraction(0), some)]
     rest, more = (0.0 if one is None else float(one["log_rate"]) for one in estimates)
     room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
     if None in estimates or room <= 0:
@@ -191,9 +191,9 @@ def searched_sliding(
     corner = worst_corner(task)
     claims = _guess(corner, log_rate)
 
-    def held(x: np.ndarray) -> SampledLoop | None:
+    def sampled_loop(x: np.ndarray) -> SampledLoop | None:
         law = _law(corner, task, step, setup, x)
-        return None if law is None else setup.held(law, step)
+        return None if law is None else setup.with_law(law, step)
 
     costs: list[float] = []
 
@@ -202,7 +202,7 @@ def searched_sliding(
         return costs[-1]
 
     def estimated(x: np.ndarray) -> float:
-        tried = held(x)
+        tried = sampled_loop(x)
         if tried is None:
             return _FAILED
         model = model_of(corner, claims)
@@ -223,11 +223,11 @@ def searched_sliding(
 
     best = min([np.array(start) for start in _STARTS] + ([] if near is None else [near]), key=cost)
     if min(costs) <= enough:
-        return held(best), best
+        return sampled_loop(best), best
     simplex = np.vstack([best, best + np.diag(_SIMPLEX)])
     options = {"initial_simplex": simplex, "maxfev": most}
     reached = minimize(cost, best, method="Nelder-Mead", options=options, callback=ends)
-    return (held(reached.x) if reached.fun < _FAILED / 2 else None), reached.x
+    return (sampled_loop(reached.x) if reached.fun < _FAILED / 2 else None), reached.x
 
 
 def worst_corner(task: SlidingPlant) -> SlidingPlant:
@@ -283,11 +283,11 @@ def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
     return SlidingClaims(**{name: UpperBound(short(float(v), _SHORT)) for name, v in values.items()})
 
 
-def _claims(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> SlidingClaims | None:
+def _claims(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingClaims | None:
     """Self-consistent claims by the estimate, with the given bound of y; None without any."""
     claims = _guess(task, log_rate)
     for _ in range(_TURNS):
-        estimate = _estimate(task, held, claims)
+        estimate = _estimate(task, sampled_loop, claims)
         if estimate is None:
             return None
         wider = {k: float(estimate[k]) * _ROOM / _NEAR for k in _NAMES}
@@ -302,28 +302,28 @@ def _claims(task: SlidingPlant, held: SampledLoop, log_rate: Fraction) -> Slidin
     return claims if float(estimate["log_rate"]) < float(log_rate) else None
 
 
-def _estimate(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> dict[str, Any] | None:
+def _estimate(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims) -> dict[str, Any] | None:
     model = model_of(task, claims)
-    return None if model is None else _estimate_of(loop_of(held, model, task), task, held, claims)
+    return None if model is None else _estimate_of(loop_of(sampled_loop, model, task), task, sampled_loop, claims)
 
 
 def _estimate_of(
-    loop: PeriodicLoop, task: SlidingPlant, held: SampledLoop, claims: SlidingClaims
+    loop: PeriodicLoop, task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims
 ) -> dict[str, Any] | None:
     gains = gains_of(loop)
     if gains is None:
         return None
     count = len(next(iter(gains.values())))
-    ends = [held.step * Fraction(i, count - 1) for i in range(count)] if len(loop.segments) == 1 else None
+    ends = [sampled_loop.step * Fraction(i, count - 1) for i in range(count)] if len(loop.segments) == 1 else None
     phases = after_a_step(loop)
     if len(phases) != count:
         phases = tuple(ends) if ends and loop.fading else (max(phases),) * count
-    bounds = bounds_from(task, held, claims, loop, gains, phases)
+    bounds = bounds_from(task, sampled_loop, claims, loop, gains, phases)
     return None if isinstance(bounds, NoProof) else bounds
 
 
 def _cut(
-    task: SlidingPlant, held: SampledLoop, claims: SlidingClaims, left: list[int], *, exactly: bool = False
+    task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims, left: list[int], *, exactly: bool = False
 ) -> Cuts:
     """Cuts of a box until the claims follow on every cell; `left` limits their number.
 
@@ -335,8 +335,8 @@ def _cut(
         When the limit is exceeded.
     """
     wide = [axis for axis in _AXES if task.ranges[axis][0] < task.ranges[axis][1]]
-    if _excess(task, held, claims) < (_NEAR if wide else 1):
-        bounds = cell_bounds(task, held, claims) if exactly else None
+    if _excess(task, sampled_loop, claims) < (_NEAR if wide else 1):
+        bounds = cell_bounds(task, sampled_loop, claims) if exactly else None
         if not exactly or (isinstance(bounds, dict) and follows(bounds, claims)):
             return (None,)
     if not wide or left[0] < 1:
@@ -347,14 +347,14 @@ def _cut(
     left[0] -= 1
     middles = {axis: (task.ranges[axis][0] + task.ranges[axis][1]) / 2 for axis in wide}
     halves = {axis: parts(task, axis, at) for axis, at in middles.items()}
-    axis = min(wide, key=lambda name: _excess(halves[name][_ENDS[name]], held, claims))
-    below, above = (_cut(part, held, claims, left, exactly=exactly) for part in halves[axis])
+    axis = min(wide, key=lambda name: _excess(halves[name][_ENDS[name]], sampled_loop, claims))
+    below, above = (_cut(part, sampled_loop, claims, left, exactly=exactly) for part in halves[axis])
     return ((axis, middles[axis]), *below, *above)
 
 
-def _excess(task: SlidingPlant, held: SampledLoop, claims: SlidingClaims) -> float:
+def _excess(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims) -> float:
     """Largest ratio of bound and claim, by the estimate."""
-    estimate = _estimate(task, held, claims)
+    estimate = _estimate(task, sampled_loop, claims)
     if estimate is None:
         return _FAILED
     return max(float(estimate[k]) / float(getattr(claims, k)) for k in _NAMES)
@@ -389,14 +389,14 @@ _QUIETER = Fraction(1, 10), Fraction(1, 100), Fraction(0)  # shares of the slip 
 
 
 @dataclass(frozen=True, kw_only=True)
-class WellReach:
+class FarthestWell:
     """Largest share of a path for which a law was found.
 
     Attributes
     ----------
     share : Fraction
         Share of the path [-]; 0 if no law was found.
-    held : SampledLoop or None
+    sampled_loop : SampledLoop or None
         Law for this share.
     numbers : array or None
         Its parameters, near which a search may begin.
@@ -405,12 +405,12 @@ class WellReach:
     """
 
     share: Fraction = Fraction(0)
-    held: SampledLoop | None = None
+    sampled_loop: SampledLoop | None = None
     numbers: np.ndarray | None = None
     log_rate: Fraction = LOG_RATES[-1]
 
 
-def suitable(task: SlidingPlant, step: Fraction) -> Fraction:
+def admissible_step(task: SlidingPlant, step: Fraction) -> Fraction:
     """T_s [s] if within a factor of 2 of D_c/(20 V), else D_c/(20 V) with two digits."""
     suits = task.ranges["critical_slip"][0] / task.rate / int(AGEINGS)
     return step if suits / _SUITABLE <= step <= _SUITABLE * suits else two_digits(suits)
@@ -418,7 +418,7 @@ def suitable(task: SlidingPlant, step: Fraction) -> Fraction:
 
 def farthest(
     task: SlidingPlant, step: Fraction, setup: ExactSetup, *, stressed: bool, most: Fraction = Fraction(1)
-) -> WellReach:
+) -> FarthestWell:
     """Largest share of a path for which a law is found, by continuation from a short path.
 
     Parameters
@@ -435,7 +435,7 @@ def farthest(
     """
     ageing = task.ranges["critical_slip"][0] / task.rate
     rates = LOG_RATES[::-1] if stressed else LOG_RATES[-1:]
-    reached = WellReach()
+    reached = FarthestWell()
     share = min(most, _EASY * ageing / (setup.lag + setup.diffusion))
     for _ in range(1 + _NEARER):
         reached = _followed_well(task, step, setup, share, reached, rates)
@@ -458,16 +458,16 @@ def _followed_well(
     step: Fraction,
     setup: ExactSetup,
     share: Fraction,
-    before: WellReach,
+    before: FarthestWell,
     rates: tuple[Fraction, ...],
-) -> WellReach:
+) -> FarthestWell:
     """Law for a share of the path, near the previous one, or the previous one if the search fails."""
     for log_rate in rates:
-        held, numbers = searched_sliding(
+        sampled_loop, numbers = searched_sliding(
             task, step, log_rate, shortened(setup, share), near=before.numbers, enough=_ENOUGH, most=_LAWS
         )
-        if held is not None:
-            return WellReach(share=share, held=held, numbers=numbers, log_rate=log_rate)
+        if sampled_loop is not None:
+            return FarthestWell(share=share, sampled_loop=sampled_loop, numbers=numbers, log_rate=log_rate)
     return before
 
 
@@ -476,8 +476,8 @@ def shortened(setup: ExactSetup, share: Fraction) -> ExactSetup:
     return replace(setup, lag=share * setup.lag, diffusion=share * setup.diffusion)
 
 
-def what_would_do(
-    fault: Fault, task: SlidingPlant, reach: WellReach, setup: ExactSetup, prove: Prove, *, spread: Fraction
+def possible_remedy(
+    fault: Fault, task: SlidingPlant, well: FarthestWell, setup: ExactSetup, prove: Prove, *, spread: Fraction
 ) -> str:
     """Remedies that have a proof, as text: a share of the path, or a smaller V.
 
@@ -486,23 +486,25 @@ def what_would_do(
     fault : Fault
     task : SlidingPlant
         Of the fault.
-    reach : WellReach
+    well : FarthestWell
     setup : ExactSetup
         As of `designed_sliding`.
     prove : callable
     spread : Fraction
         Of the task.
     """
-    if reach.held is None or reach.numbers is None:
+    if well.sampled_loop is None or well.numbers is None:
         return "no guarantee was found with a well that is much nearer either: a smaller spread, stress or noise may do"
     for noise in (setup.slip_noise, *quieter(setup)):
         loop = setup if noise == setup.slip_noise else replace(setup, slip_noise=noise)
-        held = replace(reach.held, slip_noise=noise)
-        proof = prove(task, held, reach.log_rate)
-        sentences = [_slower(fault, task, reach, loop, prove, spread)]
-        if proof.found:
-            path = (f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(held, name)))
-            sentences.append(f"at this V for {' and '.join(path)} with T_s = {float(held.step):.3g} s{_under(proof)}")
+        sampled_loop = replace(well.sampled_loop, slip_noise=noise)
+        proof = prove(task, sampled_loop, well.log_rate)
+        sentences = [_slower(fault, task, well, loop, prove, spread)]
+        if proof.available:
+            path = (f"{title} = {float(v):.3g} s" for name, title in PATH.items() if (v := getattr(sampled_loop, name)))
+            sentences.append(
+                f"at this V for {' and '.join(path)} with T_s = {float(sampled_loop.step):.3g} s{_under(proof)}"
+            )
         if remedies := ", and ".join(filter(None, sentences)):
             return f"a proof was found {with_noise(noise, setup)}{remedies}"
     return "a smaller spread, stress or noise may do"
@@ -526,16 +528,18 @@ def with_noise(noise: Fraction, setup: ExactSetup) -> str:
 
 
 def _slower(
-    fault: Fault, task: SlidingPlant, reach: WellReach, setup: ExactSetup, prove: Prove, spread: Fraction
+    fault: Fault, task: SlidingPlant, well: FarthestWell, setup: ExactSetup, prove: Prove, spread: Fraction
 ) -> str:
     """Task with the same slip and a smaller V that is proved through the path; else empty."""
-    time = float(short(_SLOWER * fault.reference.operation_time / float(reach.share), _WELL_DIGITS))
+    time = float(short(_SLOWER * fault.reference.operation_time / float(well.share), _WELL_DIGITS))
     reference = replace(fault.reference, operation_time=time)
     slow = replace(fault, reference=reference, sampling_time=sliding_step(fault.friction, reference))
     slower, step = slow_sliding_plant(slow, task.stress, spread), rational(slow.sampling_time)
-    held, _ = searched_sliding(slower, step, reach.log_rate, setup, near=reach.numbers, enough=_ENOUGH, most=_LAWS)
-    proof = None if held is None else prove(slower, held, reach.log_rate)
-    if proof is None or not proof.found:
+    sampled_loop, _ = searched_sliding(
+        slower, step, well.log_rate, setup, near=well.numbers, enough=_ENOUGH, most=_LAWS
+    )
+    proof = None if sampled_loop is None else prove(slower, sampled_loop, well.log_rate)
+    if proof is None or not proof.available:
         return ""
     return (
         f"with this path for V = {float(slower.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "

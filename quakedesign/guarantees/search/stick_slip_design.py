@@ -134,9 +134,9 @@ def tuned(
 # Convex hull of the states that disturbances reach, grown from sample to sample.
 
 
-def _noises(held: SampledStickSlip) -> list[float]:
+def _noises(sampled_loop: SampledStickSlip) -> list[float]:
     """Extreme errors of the measured slip [m]."""
-    size = float(held.slip_noise)
+    size = float(sampled_loop.slip_noise)
     return [-size, size] if size else [0.0]
 
 
@@ -148,7 +148,7 @@ class _Start:
     """
 
     task: FaultPlant
-    held: SampledStickSlip
+    sampled_loop: SampledStickSlip
     noise: float
     slip: np.ndarray
     rate: np.ndarray
@@ -161,17 +161,19 @@ class _Start:
     force: np.ndarray
 
     @classmethod
-    def of(cls, task: FaultPlant, held: SampledStickSlip, plant: Ranges, states: np.ndarray, noise: float) -> "_Start":
+    def of(
+        cls, task: FaultPlant, sampled_loop: SampledStickSlip, plant: Ranges, states: np.ndarray, noise: float
+    ) -> "_Start":
         """States with the ends of all ranges; the input gain varies slowest."""
-        law = held.law
+        law = sampled_loop.law
         slip, rate, level = (column[:, None] for column in states.T)
         kinds = product(task.beta, (Fraction(0), task.reference_rates[0]), plant.slope)
         beta, reference, slope = np.array(list(kinds), dtype=float).T
-        target = reference - float(law.return_rate) * (slip + noise - float(held.slip_noise))
+        target = reference - float(law.return_rate) * (slip + noise - float(sampled_loop.slip_noise))
         push = float(law.rate_gain) * rate - float(law.target_gain) * target + level + float(law.slip_gain) * noise
         force, scaled = beta * float(task.authority) * push, float(task.authority * task.beta[0]) * push
         predicted = np.maximum(target, 0)
-        return cls(task, held, noise, slip, rate, level, reference, beta, slope, predicted, scaled, force)
+        return cls(task, sampled_loop, noise, slip, rate, level, reference, beta, slope, predicted, scaled, force)
 
     def ended(
         self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray, interval: float, later: float | None = None
@@ -180,7 +182,11 @@ class _Start:
 
         By default the noise of the next sample has the opposite sign.
         """
-        law, half, later = self.held.law, float(self.held.step) / 2, -self.noise if later is None else later
+        law, half, later = (
+            self.sampled_loop.law,
+            float(self.sampled_loop.step) / 2,
+            -self.noise if later is None else later,
+        )
         innovation = moved + later - self.noise - half * (self.rate + self.predicted)
         lowest = -half * self.predicted - float(law.rest_slip)
         innovation = np.where(rests, np.maximum(innovation, lowest), innovation) + self.noise - later
@@ -190,34 +196,34 @@ class _Start:
 
 
 @dataclass(frozen=True)
-class _Reach:
+class _ReachableStates:
     """The two maps of the theorem, and the plant itself, on many states at once."""
 
     task: FaultPlant
-    held: SampledStickSlip
+    sampled_loop: SampledStickSlip
     plant: Ranges
     periods: list[Period]
     excess: float = 0.0  # excess of friction at rest over that in slip in simulations [m/s²]
 
     @classmethod
-    def of(cls, task: FaultPlant, held: SampledStickSlip) -> "_Reach":
+    def of(cls, task: FaultPlant, sampled_loop: SampledStickSlip) -> "_ReachableStates":
         none = Fraction(0), Fraction(0)
-        plant = ranges(task, task.target_slip / 100, none, task.amplitude * held.longest**2)
-        return cls(task, held, plant, Period.deciding(FLOATS, task, held, plant, Fraction(0), none))
+        plant = ranges(task, task.target_slip / 100, none, task.amplitude * sampled_loop.longest**2)
+        return cls(task, sampled_loop, plant, Period.deciding(FLOATS, task, sampled_loop, plant, Fraction(0), none))
 
     def after(self, states: np.ndarray) -> np.ndarray:
         """States one period later: simulated ones, and extremes of both maps."""
         images = list[np.ndarray]()
-        for noise in _noises(self.held):
-            start = _Start.of(self.task, self.held, self.plant, states, noise)
+        for noise in _noises(self.sampled_loop):
+            start = _Start.of(self.task, self.sampled_loop, self.plant, states, noise)
             images += [self.simulated(states, noise).reshape(-1, 3), *self._resting(start)]
             images += [ends for period in self.periods for ends in self._sliding(start, period)]
         return np.vstack(images)
 
     def simulated(self, states: np.ndarray, noise: float, later: float | None = None) -> np.ndarray:
         """Simulated states after a period of the stick–slip plant, (states, choices, 3)."""
-        start = _Start.of(self.task, self.held, self.plant, states, noise)
-        ends = sorted({float(self.held.step), float(self.held.longest)})
+        start = _Start.of(self.task, self.sampled_loop, self.plant, states, noise)
+        ends = sorted({float(self.sampled_loop.step), float(self.sampled_loop.longest)})
         runs = [
             start.ended(*self._run(start, sign, turn, end), end, later)
             for end in ends
@@ -229,13 +235,13 @@ class _Reach:
     def _resting(self, start: "_Start") -> Iterator[np.ndarray]:
         """States after the rest map."""
         stop = np.min(
-            [float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.held, self.plant)], axis=0
+            [float(g) * start.rate + float(h) for g, h in stop_bounds(self.task, self.sampled_loop, self.plant)], axis=0
         )
         stop = stop + 0 * start.force
         most, amplitude = float(self.task.beta[1] / self.task.beta[0]), float(self.task.amplitude)
         for share in (0.0, 0.5, 1.0):
             possible = most * start.push >= amplitude + float(self.plant.slope[0]) * share * stop
-            for interval in {float(self.held.step), float(self.held.longest)}:
+            for interval in {float(self.sampled_loop.step), float(self.sampled_loop.longest)}:
                 yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True), interval)[possible]
 
     def _sliding(self, start: "_Start", period: Period) -> Iterator[np.ndarray]:
@@ -278,7 +284,7 @@ class _Reach:
 
     def hull(self, tell: Tell) -> np.ndarray | None:
         """Vertices of the hull of all states reached from rest; None if unbounded."""
-        points = _at_first(self.held)
+        points = _at_first(self.sampled_loop)
         directions = np.random.default_rng(0).standard_normal((1500, 3))
         first, before = None, np.zeros(6)
         for turn in range(_ROUNDS):
@@ -304,10 +310,10 @@ class _Reach:
         return points
 
 
-def _at_first(held: SampledStickSlip) -> np.ndarray:
+def _at_first(sampled_loop: SampledStickSlip) -> np.ndarray:
     """Initial states at rest, for the two extreme measurement errors of the first sample."""
-    noise = float(held.slip_noise)
-    return np.array([[noise, 0, 0], [noise, 0, noise * float(held.law.slip_gain)]])
+    noise = float(sampled_loop.slip_noise)
+    return np.array([[noise, 0, 0], [noise, 0, noise * float(sampled_loop.law.slip_gain)]])
 
 
 def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarray:
@@ -327,7 +333,7 @@ def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarra
 def _rows(periods: list[Period], facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
     for period in periods:
         yield from sliding_rows(period, facets, multipliers)
-    yield from resting_rows(FLOATS, period.task, period.held, period.plant, facets, multipliers)
+    yield from resting_rows(FLOATS, period.task, period.sampled_loop, period.plant, facets, multipliers)
 
 
 def _normals(points: np.ndarray, count: int) -> np.ndarray:
@@ -403,13 +409,13 @@ def _dyadic(value: float) -> Fraction:
 
 
 @lru_cache(maxsize=64)
-def _wide_periods(task: FaultPlant, held: SampledStickSlip, size: tuple[float, ...]) -> list[Period]:
+def _wide_periods(task: FaultPlant, sampled_loop: SampledStickSlip, size: tuple[float, ...]) -> list[Period]:
     """Periods with widened ranges for states of a given size."""
-    law, (slip, rate, level) = held.law, (_ROOM * short(v, 4) for v in size)
-    most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + held.target_noise))
-    most = most + law.rate_gain * rate + level + held.push_noise
-    plant = ranges(task, slip, (-most, most), rate * held.longest)
-    return Period.deciding(FLOATS, task, held, plant, rate / _ROOM, (-most / _ROOM, most / _ROOM))
+    law, (slip, rate, level) = sampled_loop.law, (_ROOM * short(v, 4) for v in size)
+    most = law.target_gain * (law.return_rate * slip + _ROOM * (task.reference_rates[0] + sampled_loop.target_noise))
+    most = most + law.rate_gain * rate + level + sampled_loop.pressure_noise
+    plant = ranges(task, slip, (-most, most), rate * sampled_loop.longest)
+    return Period.deciding(FLOATS, task, sampled_loop, plant, rate / _ROOM, (-most / _ROOM, most / _ROOM))
 
 
 @dataclass
@@ -427,7 +433,7 @@ class _Growing:
     """A polytope {n·z ≤ h} that grows until it contains its images."""
 
     task: FaultPlant
-    held: SampledStickSlip
+    sampled_loop: SampledStickSlip
     normals: np.ndarray
     heights: np.ndarray
     multipliers: np.ndarray
@@ -452,16 +458,16 @@ class _Growing:
 
     def periods(self) -> list[Period]:
         """Periods with slightly widened ranges; sizes are rounded to two digits, as ranges are slow to compute."""
-        return _wide_periods(self.task, self.held, tuple(float(f"{float(v):.1e}") for v in self.size))
+        return _wide_periods(self.task, self.sampled_loop, tuple(float(f"{float(v):.1e}") for v in self.size))
 
     def images(self) -> "_Images | None":
         """Largest value of every normal after a period, with the best multipliers; None for an empty polytope."""
         periods = self.periods()
         plant = periods[0].plant
         facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
-        sizes = np.append(self.size, self.size[1] * float(self.held.longest))
+        sizes = np.append(self.size, self.size[1] * float(self.sampled_loop.longest))
         corners = []
-        for place, constraints in enumerate(polytopes(self.task, self.held, facets, plant)):
+        for place, constraints in enumerate(polytopes(self.task, self.sampled_loop, facets, plant)):
             tall = len(constraints[0][0])
             at = _corners(constraints, sizes[:tall], self.centres.get(place))
             if at is None and tall == 3:
@@ -481,7 +487,7 @@ class _Growing:
 
     def _tried(self, many: bool) -> np.ndarray:
         """Multipliers of every facet to try: present ones and neighbours; with `many` a grid."""
-        law = self.held.law
+        law = self.sampled_loop.law
         n2, n3 = self.normals[:, 1:].T
         plain = n2 + n3 * float(law.level_gain)
         size = np.maximum(np.abs(plain), np.abs(n3) * float(law.target_gain))
@@ -506,8 +512,11 @@ class _Growing:
 
     def _images(self, periods: list[Period], corners: list[Any]) -> "_Images":
         """Largest values as functions of the heights, and the images of the facets as functions of the state."""
-        sizes = np.append(self.size, self.size[1] * float(self.held.longest))
-        count, steps = len(self.normals), np.array(stop_bounds(self.task, self.held, periods[0].plant), dtype=float)
+        sizes = np.append(self.size, self.size[1] * float(self.sampled_loop.longest))
+        count, steps = (
+            len(self.normals),
+            np.array(stop_bounds(self.task, self.sampled_loop, periods[0].plant), dtype=float),
+        )
         images = _Images(np.full(count, -np.inf), np.zeros((count, count)), np.zeros((count, 3)), np.zeros(count))
         for rows in _rows(periods, self.normals, self.multipliers):
             at = corners[rows.place]
@@ -542,8 +551,8 @@ class _Growing:
         if rows.factors.shape[1] > 3:
             left[:, 1] += np.maximum(rows.factors[chosen, 3], 0) * steps[-1, 0]
         slice_number = rows.place if rows.place < SLICES else COMBINATIONS[rows.place - SLICES][0]
-        fastest = self.task.reference_rates[0] + self.held.target_noise
-        end = float(fastest / self.held.law.return_rate) if slice_number == 1 else np.inf
+        fastest = self.task.reference_rates[0] + self.sampled_loop.target_noise
+        end = float(fastest / self.sampled_loop.law.return_rate) if slice_number == 1 else np.inf
         constants = rows.constants[chosen] + (np.maximum(left[:, 0], 0) * end if slice_number == 1 else 0)
         small = _TINY * self.heights[rows.which[chosen]]
         of_error = (left[:, 0] * (-1 if slice_number == 0 else 1) * sizes[0] <= small) | (slice_number == 1)
@@ -611,7 +620,7 @@ class _Growing:
         Images tend to a normal whose largest factor of ξ is 0. Rounding or another range of slopes makes it positive.
         Then ψ of `stick_slip_set`, the bound of (chord of 1/β) − 1/β, enters, and the heights would grow without bound.
         """
-        law, half = self.held.law, float(self.held.step) / 2
+        law, half = self.sampled_loop.law, float(self.sampled_loop.step) / 2
         slip, level = float(law.slip_gain), float(law.level_gain)
         n1, n2, n3 = normals.T
         most = float(chord / self.task.authority)
@@ -641,7 +650,10 @@ class _Growing:
                 more.append(normal / length / size)
             if len(more) == _ADDED:
                 break
-        more.append(np.array([0, float(self.held.law.slip_gain * self.held.step) / 2 * (1 + _WIDER), -1]) / size[2])
+        more.append(
+            np.array([0, float(self.sampled_loop.law.slip_gain * self.sampled_loop.step) / 2 * (1 + _WIDER), -1])
+            / size[2]
+        )
         self.normals = np.vstack([self.normals, more])
         self.least = np.concatenate([self.least, (np.array(more) @ self.points.T).max(axis=1)])
         self.multipliers = np.vstack([self.multipliers, np.zeros((len(more), 5))])
@@ -660,8 +672,8 @@ class _Growing:
         """Polytope in rational numbers of few digits, with the constraints that meet at each vertex."""
         facets = tuple(tuple(_dyadic(float(v)) for v in row) for row in self.facets)
         periods, bases = self.periods(), list[list[tuple[int, ...]]]()
-        sizes = np.append(self.size, self.size[1] * float(self.held.longest))
-        groups = polytopes(self.task, self.held, facets, periods[0].plant)
+        sizes = np.append(self.size, self.size[1] * float(self.sampled_loop.longest))
+        groups = polytopes(self.task, self.sampled_loop, facets, periods[0].plant)
         for constraints in groups:
             at = _corners(constraints, sizes[: len(constraints[0][0])])
             if at is None:
@@ -683,7 +695,7 @@ class _Growing:
         bases: list[list[tuple[int, ...]]],
     ) -> None:
         """Add vertices lost by rounding, by linear programs."""
-        sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.held.longest))]
+        sizes = [short(float(v), 6) for v in (*self.size, self.size[1] * float(self.sampled_loop.longest))]
         verifiers = [
             Verifier(constraints, vertices, sizes[: len(vertices[0])], place=place, facets=len(facets))
             for place, (constraints, vertices) in enumerate(zip(groups, bases, strict=True))
@@ -702,38 +714,40 @@ class _Growing:
 # Gains with a proof for a fault.
 
 
-def proved(task: FaultPlant, held: SampledStickSlip, tell: Tell = lambda what, done: None) -> StickSlipProof | NoProof:
+def proved(
+    task: FaultPlant, sampled_loop: SampledStickSlip, tell: Tell = lambda what, done: None
+) -> StickSlipProof | NoProof:
     """Guarantee of a law with a polytope from a search, or the reason why there is none."""
     fresh = list[StickSlipProof | NoProof]()
 
     def search() -> dict[str, Any]:
         with np.errstate(all="ignore"):  # overflow gives no proposal
-            fresh.append(_searched(task, held, tell))
-        return {"set": written(fresh[0].reach)} if fresh[0].found else {"reason": fresh[0].reason}
+            fresh.append(_searched(task, sampled_loop, tell))
+        return {"set": written(fresh[0].invariant_set)} if fresh[0].available else {"reason": fresh[0].reason}
 
-    stored = search_once(search, "polytope of a stick-slip law", task, held)
+    stored = search_once(search, "polytope of a stick-slip law", task, sampled_loop)
     if fresh:
         return fresh[0]
     if "reason" in stored:
         return NoProof(reason=stored["reason"])
-    return stick_slip_guarantee(task, held, read_as(StickSlipPolytope, stored["set"]))
+    return stick_slip_guarantee(task, sampled_loop, read_as(StickSlipPolytope, stored["set"]))
 
 
-def _searched(task: FaultPlant, held: SampledStickSlip, tell: Tell) -> StickSlipProof | NoProof:
+def _searched(task: FaultPlant, sampled_loop: SampledStickSlip, tell: Tell) -> StickSlipProof | NoProof:
     proof: StickSlipProof | NoProof
     proof = NoProof(reason="no polytope was found that the loop never leaves")
     try:
-        points = _Reach.of(task, held).hull(tell)
+        points = _ReachableStates.of(task, sampled_loop).hull(tell)
         if points is None:
             return NoProof(reason="the states that disturbances reach grow without bound")
         normals = _normals(points, _FACETS)
         heights = (normals @ points.T).max(axis=1)
-        growing = _Growing(task, held, normals, heights, np.zeros((len(normals), 5)), heights, points)
+        growing = _Growing(task, sampled_loop, normals, heights, np.zeros((len(normals), 5)), heights, points)
         for growing.margin in _MARGINS:
-            if not growing.grown(tell) or (reach := growing.exact()) is None:
+            if not growing.grown(tell) or (invariant_set := growing.exact()) is None:
                 return proof
-            proof = stick_slip_guarantee(task, held, reach)
-            if proof.found:
+            proof = stick_slip_guarantee(task, sampled_loop, invariant_set)
+            if proof.available:
                 break
     except ParameterError as error:
         return NoProof(reason=str(error))
@@ -782,25 +796,27 @@ def design_stick_slip(
     longer = float(longest_step / step) if longest_step else 1.0
     for *shares, gain in DEADBEAT if implicit else (APERIODIC if longest_step else TUNINGS)[objective]:
         try:
-            held = tuned(task, step, (*shares, gain * longer), slip_noise, implicit=implicit)
-            held = replace(held, longest_step=longest_step)
+            sampled_loop = tuned(task, step, (*shares, gain * longer), slip_noise, implicit=implicit)
+            sampled_loop = replace(sampled_loop, longest_step=longest_step)
         except (ParameterError, ArithmeticError, ValueError):
             return NoProof(reason="the gains are outside the range of floats")
-        proof = _healed(task, held, healing, tell)
-        if proof.found:
+        proof = _healed(task, sampled_loop, healing, tell)
+        if proof.available:
             return proof
         none.append(proof)
     return none[0]
 
 
-def _healed(task: FaultPlant, held: SampledStickSlip, healing: Fraction, tell: Tell) -> StickSlipProof | NoProof:
+def _healed(
+    task: FaultPlant, sampled_loop: SampledStickSlip, healing: Fraction, tell: Tell
+) -> StickSlipProof | NoProof:
     """Proof with the disturbance enlarged by the healing under the least pressure."""
     least = task.rest_pressure[0] - _LOWER * task.normal_stress
     for _ in range(_GUESSES):
         more = task.area_per_mass[1] * healing * (task.normal_stress - least)
-        proof = proved(replace(task, amplitude=task.amplitude + more), held, tell)
-        if not proof.found or proof.covered_healing(task.amplitude) >= healing:
-            return replace(proof, healing=healing) if proof.found else proof
+        proof = proved(replace(task, amplitude=task.amplitude + more), sampled_loop, tell)
+        if not proof.available or proof.covered_healing(task.amplitude) >= healing:
+            return replace(proof, healing=healing) if proof.available else proof
         least = Fraction(proof.claims.least_pressure) - _LOWER * task.normal_stress
     return NoProof(reason="the pressure falls too far for this healing")
 
@@ -819,24 +835,24 @@ def worst_stick_slip(proof: StickSlipProof, *, periods: int = 60) -> WorstCase:
     """
     task, claims = proof.task, proof.claims
     excess = proof.healing * task.area_per_mass[0] * (task.normal_stress - Fraction(claims.largest_pressure))
-    plain = _Reach.of(replace(task, amplitude=proof.disturbance), proof.held)
-    reaches, noises = [replace(plain, excess=e) for e in sorted({0.0, float(excess)})], _noises(proof.held)
-    facets, extremes = np.array(proof.reach.facets, dtype=float), np.zeros(3)
+    plain = _ReachableStates.of(replace(task, amplitude=proof.disturbance), proof.sampled_loop)
+    reaches, noises = [replace(plain, excess=e) for e in sorted({0.0, float(excess)})], _noises(proof.sampled_loop)
+    facets, extremes = np.array(proof.invariant_set.facets, dtype=float), np.zeros(3)
     for high in (False, True):  # which end of β
-        first = _at_first(proof.held)
+        first = _at_first(proof.sampled_loop)
         states = {noise: first[[int(noise < 0)]] for noise in noises}  # keys: measurement error of the sample
         for _ in range(periods):
             before = dict(states)
             for later in noises:
                 ends = [states[later]]
-                for reach, (noise, starts) in product(reaches, before.items()):
-                    after = reach.simulated(starts, noise, later)
+                for invariant_set, (noise, starts) in product(reaches, before.items()):
+                    after = invariant_set.simulated(starts, noise, later)
                     half = after.shape[1] // 2  # the two halves of the choices differ in β
                     ends.append((after[:, half:] if high else after[:, :half]).reshape(-1, 3))
                 points = np.vstack(ends)
                 states[later] = points[np.unique((facets @ points.T).argmax(axis=1))]
         points = np.vstack(list(states.values()))
-        points[:, 0] -= float(proof.held.slip_noise)
+        points[:, 0] -= float(proof.sampled_loop.slip_noise)
         extremes = np.maximum(extremes, [-points[:, 0].min(), points[:, 0].max(), points[:, 1].max()])
     behind, ahead, rate = (float(v) for v in extremes)
     return WorstCase(slip_error=max(behind, ahead), slip_behind=behind, slip_ahead=ahead, peak_slip_rate=rate)

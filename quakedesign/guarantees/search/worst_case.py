@@ -22,7 +22,7 @@ from quakedesign.guarantees.exact.sliding_small_gain import loop_of, model_of
 from quakedesign.guarantees.exact.tracking_proof import ContinuousProof, TrackingProof
 from quakedesign.guarantees.search.float_bounds import PERIODS, moved, periods_to_forget
 from quakedesign.laws import NOISES
-from quakedesign.laws.implicit_root import root_of
+from quakedesign.laws.implicit_root import step_solution
 from quakedesign.loop import PeriodicLoop
 from quakedesign.loop.periodic import Matrix, Row
 from quakedesign.plant.fault_plant import FaultPlant
@@ -39,19 +39,19 @@ _CLIMBING, _CLIMBS = 48, 8  # trajectories improved from the best of those, and 
 _CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are replaced by those of the adjoint, in turn
 _BLOCK = 8  # pieces that change together, at most
 _RESTING, _ROUNDS = 96, 9  # trajectories of 128 periods that rest, then accelerate; rounds of variation
-_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest begin and longest duration of the first acceleration, in periods
+_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest start and longest duration of the first acceleration, in periods
 _NEAR = np.array([[2], [2], [_PIECES]])  # pieces by which start, length and end of the rest change from round to round
 _MOST_RESTED = 128  # periods
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are also evaluated for a loop with initial errors
-_SLOW = 0.05  # rate of a slow reference over its largest rate
+_SLOW = 0.05  # rate of a slow reference as a fraction of its largest rate
 _LEVELS = 400  # grid levels above 0 of a disturbance of bounded rate
 _SEED = 7
-_NEARLY = Fraction(31, 32)  # largest shift over the time between two events, so that they never coincide
+_NEARLY = Fraction(31, 32)  # largest shift as a fraction of the time between two events, so that they never coincide
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class WorstCase:
-    """Largest values that a search reached, absolute values: lower bounds of the worst case.
+    """Largest absolute values that a search reached: lower bounds of the worst case.
 
     Attributes
     ----------
@@ -91,8 +91,8 @@ def worst_tracking(claim: TrackingProof | ContinuousProof, *, sticks: bool = Fal
     last period, or at a time between its samples, where the error is larger with a delay. In continuous time a period
     is 1/|λ| of the fastest pole. In the class `rate` the disturbance is the optimal one for a costate (`_steepest`).
     With `sticks` friction prevents backward slip, and the reference has its largest rate or 1/20 of it. Further
-    trajectories then switch after random times, or rest until the reference has made up the proved slip error, then
-    accelerate (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact
+    trajectories then switch after random times, or rest until the reference has caught up by the proved slip error,
+    then accelerate (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact
     solution, also outside its sector. With jitter each event is earliest or latest; with aperiodic sampling each
     interval is shortest or longest. Pressures step at once, and an averaged measurement is that at the midpoint of its
     interval.
@@ -130,7 +130,7 @@ def _searched(claim: TrackingProof | ContinuousProof, sticks: bool) -> list[floa
 
 def _resting(claim: TrackingProof, like: "_CourseSearch") -> "_CourseSearch":
     """Search for the slip-rate error after a rest ahead of the fastest reference."""
-    way = claim.task.reference_rates[0] * claim.held.step
+    way = claim.task.reference_rates[0] * claim.sampled_loop.step
     periods = like.periods + int(np.ceil(min(float(claim.claims.slip_error / way), _MOST_RESTED)))
     courses = max(_RESTING * 2 * PERIODS // (periods * len(like.parts)), _LEAST_COURSES)
     numbers = np.array([number for number in range(8 * courses) if number % 16 in (6, 7, 14, 15)])
@@ -157,7 +157,7 @@ class _Event:
 class _EventPieces:
     """One event: its jump, e^{Ah} and contributions of constant inputs for every vertex, and h [s]."""
 
-    of: _Event
+    event: _Event
     jump: np.ndarray
     steps: np.ndarray
     added: np.ndarray
@@ -171,24 +171,24 @@ class _EventPieces:
 _ON_TIME: dict[str, Any] = dict.fromkeys(("jitter", "delay_jitter", "averaging", "ramp"), Fraction(0))
 
 
-def _on_time(held: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction]:
+def _on_time(sampled_loop: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction]:
     """Loop without jitter, largest shift of its samples, largest lead of its pressures.
 
-    Pressures that arrive with a sample shift with it. Events keep their order. A first sample that must be at its
+    A pressure that arrives at a sample shifts with it. Events keep their order. A first sample that must be at its
     nominal instant counts as the earliest one.
     """
-    off, late, delay = held.jitter, held.jitter + held.delay_jitter, held.delay
-    if any(held.start) or held.law.first:
+    off, late, delay = sampled_loop.jitter, sampled_loop.jitter + sampled_loop.delay_jitter, sampled_loop.delay
+    if any(sampled_loop.initial_errors) or sampled_loop.law.first:
         off /= 2
-    part = delay % held.step
+    part = delay % sampled_loop.step
     alone = not off and not part
     if alone:
         delay, late = delay + late, late / 2 * _NEARLY  # at the due time or later
     elif part:
-        off = min(off, part / 2, (held.step - part) / 2)
-        late = min(late, _NEARLY * (part - off), _NEARLY * (held.step - part - off))
+        off = min(off, part / 2, (sampled_loop.step - part) / 2)
+        late = min(late, _NEARLY * (part - off), _NEARLY * (sampled_loop.step - part - off))
         delay += late
-    plain = replace(held, delay=delay, pump=None, longest_step=Fraction(0), **_ON_TIME)
+    plain = replace(sampled_loop, delay=delay, pump=None, longest_step=Fraction(0), **_ON_TIME)
     return plain, off, 2 * late if alone or part else Fraction(0)
 
 
@@ -231,15 +231,20 @@ class _Limit:
 
     @classmethod
     def of(
-        cls, claim: TrackingProof, held: SampledLoop, size: int, back: np.ndarray, numbers: np.ndarray | None = None
+        cls,
+        claim: TrackingProof,
+        sampled_loop: SampledLoop,
+        size: int,
+        back: np.ndarray,
+        numbers: np.ndarray | None = None,
     ) -> "_Limit | None":
         """Limit at rest of a guarantee along references of given rates [m/s]; None if it has none."""
-        limit, law, authority = claim.rest_limit, claim.held.law, float(claim.task.authority)
+        limit, law, authority = claim.rest_limit, claim.sampled_loop.law, float(claim.task.authority)
         if limit is None:
             return None
-        place, step = 2 + len(law.states), float(claim.held.step)
+        place, step = 2 + len(law.states), float(claim.sampled_loop.step)
         fed = np.zeros(size)
-        commanded = _command_response(claim.task, held)
+        commanded = _command_response(claim.task, sampled_loop)
         fed[: len(commanded)] = commanded
         fed[2:place] = [float(v) / authority for v in law.applied]
         rests = float(limit.resolution) - back * step  # largest change of the slip error between samples at rest
@@ -279,12 +284,12 @@ class _Limit:
         self.rest = np.clip(self.rest - drifted, *self.ends)
 
 
-def _command_response(task: FaultPlant, held: SampledLoop) -> list[float]:
+def _command_response(task: FaultPlant, sampled_loop: SampledLoop) -> list[float]:
     """Response of all states to a unit command, at the first jump of a period."""
     zero = Fraction(0)
-    still = tuple((zero, zero) for _ in held.law.states)
-    law = replace(held.law, measured=still, feedback=(1 / task.authority, zero), root=None, first=())
-    jump = replace(held, law=law, rate_noise=zero).loop(task).segments[0].jump
+    still = tuple((zero, zero) for _ in sampled_loop.law.states)
+    law = replace(sampled_loop.law, measured=still, feedback=(1 / task.authority, zero), implicit_step=None, first=())
+    jump = replace(sampled_loop, law=law, rate_noise=zero).loop(task).segments[0].jump
     return [float(row[0] - (i == 0)) for i, row in enumerate(jump)]
 
 
@@ -301,14 +306,14 @@ class _CourseSearch:
         numbers: np.ndarray | None = None,
     ) -> None:
         task, loop = claim.task, claim.loop
-        held, off, early = (
-            _on_time(claim.held) if isinstance(claim, TrackingProof) else (None, Fraction(0), Fraction(0))
+        sampled_loop, off, early = (
+            _on_time(claim.sampled_loop) if isinstance(claim, TrackingProof) else (None, Fraction(0), Fraction(0))
         )
-        loop = held.loop(task) if held else loop
-        root, noise = (held.law.root, held.noise) if held else (None, {})
+        loop = sampled_loop.loop(task) if sampled_loop else loop
+        implicit_step, noise = (sampled_loop.law.implicit_step, sampled_loop.noise) if sampled_loop else (None, {})
         self.limit = float(task.amplitude) if task.change is not None else None
         flow, inputs = _with_disturbance(task, loop)
-        self.size, self.root, self.step = len(flow), root, float(loop.period)
+        self.size, self.implicit_step, self.step = len(flow), implicit_step, float(loop.period)
         self.sudden = _filled(loop.sampled.get("root", ()), self.size)
         self.noise = np.array([float(noise.get(name, 0)) for name in NOISES])
         self.heard = np.array([_filled(loop.sampled.get(name, ()), self.size) for name in NOISES])
@@ -318,10 +323,10 @@ class _CourseSearch:
         push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
         ends = product(*map(dict.fromkeys, (task.beta, task.slip_chord, task.rate_chord)))
         vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
-        more = claim.held.slack if isinstance(claim, TrackingProof) else Fraction(0)
+        more = claim.sampled_loop.slack if isinstance(claim, TrackingProof) else Fraction(0)
         events = _events(loop, off, early, more) if loop.segments else [_flowing(flow)]
         self.parts = [_pieces(vertices, inputs, event, none=more > 0) for event in events]
-        self.punctual = bool(held and (held.law.first or any(held.start)))  # at first
+        self.punctual = bool(sampled_loop and (sampled_loop.law.first or any(sampled_loop.initial_errors)))  # at first
         if periods is None:
             periods = _periods_to_forget(self.parts, len(loop.states))
             courses = 2 * max(courses // 2 * PERIODS // periods, _LEAST_COURSES) if numbers is None else courses
@@ -330,9 +335,9 @@ class _CourseSearch:
         self.back = float(task.reference_rates[0]) * paces if sticks else None
         self.rest_limit = None
         if self.back is not None and isinstance(claim, TrackingProof):
-            self.rest_limit = _Limit.of(claim, held or claim.held, self.size, self.back, numbers)
+            self.rest_limit = _Limit.of(claim, sampled_loop or claim.sampled_loop, self.size, self.back, numbers)
         self.allowed = np.ones((courses, len(self.parts[0].steps)), dtype=bool)
-        slow = isinstance(claim, TrackingProof) and claim.slow_gain is not None
+        slow = isinstance(claim, TrackingProof) and claim.varying_gain is not None
         if (slow or self.limit is not None) and beta[0] < beta[1]:  # β varies slowly: it remains at one end
             half = len(vertices) // 2
             self.allowed[numbers % 2 == 0, :half] = self.allowed[numbers % 2 == 1, half : len(vertices)] = False
@@ -347,7 +352,7 @@ class _CourseSearch:
         self.largest = (0.0, 0.0)
 
     def follow(self, costates: np.ndarray, sweeps: int) -> np.ndarray:
-        """Sweeps of the maximum principle, forward and backward; the last forward costates."""
+        """Forward and backward sweeps of the maximum principle; returns the costates of the last forward sweep."""
         slopes = None
         last = costates
         for left in reversed(range(sweeps)):
@@ -449,11 +454,11 @@ class _CourseSearch:
         for number, costate in enumerate(costates):
             part = self.parts[number // _PIECES % len(self.parts)]
             if number % _PIECES == 0:
-                if not part.of.late:
+                if not part.event.late:
                     now = self._soon(part, state, costates, number)
-                jumps = ~now if part.of.late else now
+                jumps = ~now if part.event.late else now
                 after = self._sampled(part, state, costate)
-                after = limit.cut(after, jumps) if limit and part.of.samples else after
+                after = limit.cut(after, jumps) if limit and part.event.samples else after
                 state = np.where(jumps[:, None], after, state)
                 jumped.append(jumps)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
@@ -477,7 +482,7 @@ class _CourseSearch:
 
     def _soon(self, part: _EventPieces, state: np.ndarray, costates: np.ndarray, number: int) -> np.ndarray:
         """Mask of trajectories that jump now, by costate if the jump may move to the next event."""
-        if not part.of.soon or number + _PIECES >= len(costates) or (self.punctual and number == 0):
+        if not part.event.soon or number + _PIECES >= len(costates) or (self.punctual and number == 0):
             return np.ones(len(state), dtype=bool)
         following = self.parts[(number // _PIECES + 1) % len(self.parts)]
         on = part.moved_on()
@@ -499,17 +504,19 @@ class _CourseSearch:
     def _sampled(self, part: _EventPieces, state: np.ndarray, costate: np.ndarray) -> np.ndarray:
         """States after a jump; a sample adds noise by the costate after the first piece."""
         after: np.ndarray = state @ part.jump.T
-        if not part.of.samples:
+        if not part.event.samples:
             return after
         noise = self.noise * np.sign(costate @ part.steps[0] @ self.heard.T)
         return np.asarray(after + noise @ self.heard + self._beside_the_line(state[:, :2] + noise))
 
     def _beside_the_line(self, measured: np.ndarray) -> np.ndarray | float:
         """Solution of the implicit step minus its linear approximation in the nominal loop."""
-        if self.root is None:
+        if self.implicit_step is None:
             return 0.0
-        line = float(self.root.middle) / self.step * measured[:, 0]
-        return np.outer(root_of(self.root.pull, self.step, measured[:, 0], measured[:, 1]) + line, self.sudden)
+        line = float(self.implicit_step.middle) / self.step * measured[:, 0]
+        return np.outer(
+            step_solution(self.implicit_step.pull, self.step, measured[:, 0], measured[:, 1]) + line, self.sudden
+        )
 
     def _projected(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
         """Project every state onto the admissible slip rates; mask of states at rest."""
@@ -641,7 +648,7 @@ def _periods_to_forget(parts: list[_EventPieces], size: int) -> int:
     """Periods until the state has decayed at the slowest vertex, within limits."""
     maps = np.eye(parts[0].jump.shape[0])[None]
     for part in parts:
-        jump = np.eye(len(part.jump)) if part.of.late else part.jump
+        jump = np.eye(len(part.jump)) if part.event.late else part.jump
         maps = np.linalg.matrix_power(part.steps, _PIECES) @ jump @ maps
     return periods_to_forget(np.abs(np.linalg.eigvals(maps[:, :size, :size])).max())
 
@@ -664,12 +671,12 @@ _AXES = ("direct_effect", "evolution_effect", "critical_slip")
 def worst_sliding(claim: SlidingProof) -> WorstCase:
     """Worst case found under adversarial stress at the corners of the box, without inertia.
 
-    For every corner and every final piece, the stress and the reference rate take their extremes by the sign of the
-    impulse response of the linearised loop: the worst case of the linear loop. The errors are those of the nonlinear
-    plant, with four Runge–Kutta steps in each part of the period. Inputs may jump between pieces. A last search has
-    shorter pieces, at the corner and the normal stress with the largest rate. The normal stress is that at the start,
-    or that at the end of the task, where the rate responds more to stress. Measurements are exact. Rates below V count
-    like rates above it: |ln(v/V)|.
+    For every corner and every final piece, the stress and the reference rate take their extremes according to the sign
+    of the impulse response of the linearised loop: the worst case of the linear loop. The errors are those of the
+    nonlinear plant, with four Runge–Kutta steps in each part of the period. Inputs may jump between pieces. A last
+    search has shorter pieces, at the corner and the normal stress with the largest rate. The normal stress is that at
+    the start, or that at the end of the task, where the rate responds more to stress. Measurements are exact. Rates
+    below V count like rates above it: |ln(v/V)|.
     """
     rate, slip = search_once(lambda: _searched_sliding(claim), "worst sliding", claim)
     return WorstCase(log_rate=rate, slip_error=slip, peak_slip_rate=float(claim.task.rate) * exp(rate))
@@ -705,7 +712,7 @@ def courses(
         loop, maps = plant.linear(slope)
         aims = np.array([np.array(loop.outputs["log_rate"], dtype=float), np.eye(len(loop.states))[0]])
         count = len(maps)
-        signs = np.ones((2, _remembered(maps) * count, 2 * count))
+        signs = np.ones((2, _cached(maps) * count, 2 * count))
         for last in range(count):
             costates = aims
             for number in range(signs.shape[1] - count + last, -1, -1):
@@ -715,7 +722,7 @@ def courses(
         yield float(claim.task.stress) * signs[0], float(claim.task.swing) * signs[1]
 
 
-def _remembered(maps: list[tuple[Any, Any, Any]]) -> int:
+def _cached(maps: list[tuple[Any, Any, Any]]) -> int:
     whole = np.eye(len(maps[0][0]))
     for step, _, jump in maps:
         whole = step @ jump @ whole
@@ -733,7 +740,7 @@ class SlidingPieces:
     ) -> None:
         self._claim, self._corner, self._pieces = claim, corner, pieces
         model: Any = model_of(claim.task, claim.claims)
-        self._loop = loop_of(claim.held, model, claim.task)
+        self._loop = loop_of(claim.sampled_loop, model, claim.task)
         normal = float(corner.ranges["normal_stress"][0] - corner.pressure_per_slip * slip)
         self._strength, self._weakening = (normal * float(corner.ranges[a][0]) for a in _AXES[:2])
         self._rate, self._stiffness = float(corner.rate), float(corner.stiffness)
@@ -753,7 +760,7 @@ class SlidingPieces:
             strength=strength.limit_denominator(10**9),
             weakening=Fraction(self._weakening).limit_denominator(10**9),
         )
-        loop = loop_of(self._claim.held, plain, self._corner)
+        loop = loop_of(self._claim.sampled_loop, plain, self._corner)
         flow, pushes = np.array(loop.flow, dtype=float), np.zeros((len(loop.states), 2))
         pushes[:, 0], pushes[0, 1] = np.array(loop.inputs["stress"], dtype=float), -self._rate
         return loop, [(*moved(flow, pushes, length), jump) for length, jump in _parts(loop, self._pieces)]

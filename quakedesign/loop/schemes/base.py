@@ -83,7 +83,7 @@ class Scheme(ABC):
     """One step of length T_s of a closed loop, written in CasADi SX.
 
     The state of a run is [x1, x2, ξ, memory]. The memory belongs to the scheme: values that a controller stores from
-    one sample to the next, and parameters, stored there so that one machine code serves all their values.
+    one sample to the next, and parameters, stored there so that the same compiled code serves all their values.
     """
 
     name: ClassVar[str]
@@ -132,7 +132,7 @@ SIGNALS = (
     discrete_law.next_reference_rate,
     discrete_law.step,
     discrete_law.authority,
-    discrete_law.held,
+    discrete_law.applied_pressure,
 )
 
 
@@ -312,7 +312,7 @@ class Sampled(Scheme, Decided):
     substeps : int
         Steps of the integrator per sample, 1 … 100.
     measurement : Measurement or Sensor
-        A sensor other than `Measurement` needs the slip alone, not the slip rate, and requires its own sampling period.
+        A sensor other than `Measurement` uses the slip alone, and requires the sampling period for which it was made.
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
     clock : AperiodicClock or None
@@ -439,14 +439,14 @@ class Sampled(Scheme, Decided):
         return control_step(type(self), DiscreteLaw.of(loop.controller, loop.constant_pressure))
 
     def _sample(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ControlSample:
-        """Measure, evaluate the law, actuate its pressure; ξ does not wind up where a stage limits the pressure."""
+        """Measure, evaluate the law, apply its pressure; ξ does not wind up where a stage limits the pressure."""
         count = len(loop.integrals)
         entries = iter(ca.vertsplit(state[2 + count :]))
         part = {name: [next(entries) for _ in values] for name, values in self._parts(loop).items()}
         seen, noise = self.measurement.measure(part["deviation"], part["noise"], state[:2])
         ahead = self.clock.shortest if self.clock else 1
         inputs = self._inputs(loop, counter, step, seen, ahead)
-        inputs |= {discrete_law.authority: part["authority"][0], discrete_law.held: part["held"][0]}
+        inputs |= {discrete_law.authority: part["authority"][0], discrete_law.applied_pressure: part["held"][0]}
         signals = ca.vertcat(*(inputs[symbol] for symbol in SIGNALS))
         before = state[2 : 2 + count]
         given = signals, before, ca.vertcat(*part["law"]), ca.vertcat(*part["own"])

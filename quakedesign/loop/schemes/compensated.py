@@ -103,7 +103,7 @@ class Compensated(Sampled):
         begun, before, ahead_before, estimate, weight, *limit = own
         pull, feed_forward, slope = expressions
         gain, rate_error = values[discrete_law.step] * values[discrete_law.authority], values[discrete_law.rate_error]
-        pushed = values[discrete_law.held] - ahead_before
+        pushed = values[discrete_law.applied_pressure] - ahead_before
         follows = begun > 0 if pull != 0 else False
         estimate = ca.if_else(follows, followed(rate_error, before, pushed, estimate, weight, gain), 0)
         solved = inclusion(pull).solve(values)

@@ -398,7 +398,7 @@ def by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> Linear
     def fed(seen: tuple[Fraction, ...]) -> tuple[Fraction, Fraction]:
         return seen[0] + seen[1] * now, zero
 
-    def remembered(own: tuple[Fraction, ...], seen: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
+    def buffered(own: tuple[Fraction, ...], seen: tuple[Fraction, ...]) -> tuple[Fraction, ...]:
         return (*own, *(seen[1] * share for share in before))
 
     shifted = [
@@ -407,9 +407,9 @@ def by_differences(law: LinearLaw, step: Fraction, order: int = ORDER) -> Linear
     return replace(
         law,
         states=(*law.states, *names),
-        update=(*(remembered(own, seen) for own, seen in zip(law.update, law.measured, strict=True)), *shifted),
+        update=(*(buffered(own, seen) for own, seen in zip(law.update, law.measured, strict=True)), *shifted),
         measured=(*map(fed, law.measured), *((Fraction(place == 0), zero) for place in range(order))),
-        output=remembered(law.output, law.feedback),
+        output=buffered(law.output, law.feedback),
         feedback=fed(law.feedback),
         applied=law.applied and (*law.applied, *[zero] * order),
     )

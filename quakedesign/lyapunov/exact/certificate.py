@@ -103,7 +103,7 @@ def _check_witnesses(certificate: Evidence, obligations: Iterable[Obligation]) -
         expected.append(one.name)
         require(one.name in certificate.witnesses, f"the witness of {one.name!r} is missing.")
         holds = proves(one, certificate.witnesses[one.name], certificate.loop.domain)
-        require(holds, f"the witness of {one.name!r} does not prove its polynomial.")
+        require(holds, f"the witness of {one.name!r} does not prove that its polynomial is non-negative.")
     extra = "the witnesses are not those of the obligations in their order."
     require(expected == list(certificate.witnesses), extra)
 

@@ -141,7 +141,7 @@ class Variant:
     domain: Domain | None  # None without a certificate, or if it has no bounds of its states
 
     def to_dict(self) -> Json:
-        """Plain values in SI units; exact coefficients as texts."""
+        """Plain values in SI units; exact coefficients as strings."""
         return {
             "feedforward": self.feedforward.name,
             "coefficients": {name: str(v) for name, v in self.feedforward.coefficients.items()},

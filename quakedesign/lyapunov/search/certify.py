@@ -56,7 +56,7 @@ def certify(
     Raises
     ------
     ParameterError
-        For gains or ranges that are no numbers, a range that is empty or not positive, a law with other uncertain
+        For gains or ranges that are not numbers, a range that is empty or not positive, a law with other uncertain
         parameters, or a law that is not homogeneous in its weights.
     CertificateError
         When certificates do not support a part of the law, such as a squared uncertain parameter.
@@ -418,7 +418,7 @@ def largest_lipschitz(
 
     first = _reachable(base) if limit is None else first_below(limit)
     line = _Line("lipschitz", at, lambda x: {"d": 1.0}, Fraction(0), first, limit)
-    return _reach(line, subject, _chosen(degrees, base), began)
+    return _largest(line, subject, _chosen(degrees, base), began)
 
 
 def largest_gain_range(
@@ -471,7 +471,7 @@ def largest_gain_range(
     line = _Line(
         "beta-factor" if symmetric else "beta", at, direction, floor, Fraction(11, 10) * floor, None, _WIDE * floor
     )
-    return _reach(line, subject, _chosen(degrees, base), began)
+    return _largest(line, subject, _chosen(degrees, base), began)
 
 
 def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
@@ -496,7 +496,7 @@ def against(loop: Loop, refuted: Certificate | None) -> str:
     return "simulated" if escape(loop) is not None else "none"
 
 
-def _reach(line: _Line, subject: Subject, degrees: tuple[int, ...], began: float) -> CertifiedLimit:
+def _largest(line: _Line, subject: Subject, degrees: tuple[int, ...], began: float) -> CertifiedLimit:
     value: Fraction | None = None
     beyond: Fraction | None = None
     degree: int | None = None

@@ -257,7 +257,7 @@ def _identity_holds(statement: Statement, proof: SumOfSquares) -> bool:
 
 
 def multiplier_is_positive(statement: Statement, squares: tuple[Square, ...]) -> bool:
-    """Whether the multiplier is positive on a dense subset; on the whole set if its interior may be empty."""
+    """Whether the multiplier is positive on a dense subset; on all of the set if the set may have no interior."""
     size = len(statement.variables)
     one = (0,) * size
     if not squares:

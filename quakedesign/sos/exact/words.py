@@ -136,7 +136,7 @@ def region_words(region: Region) -> list[str]:
 
 
 def region_entries(region: Region) -> Json:
-    """Entries about a region for JSON; exact numbers are texts."""
+    """Entries about a region for JSON; exact numbers are strings."""
     shown = region.proved or region.refuted
     point = region.refuted.refutation if region.refuted is not None else None
     return {

@@ -1,7 +1,7 @@
 """Search for a proof of positivity: methods, multipliers, and the undecided answer.
 
 Methods: Gram matrices by conic programming with rounding, and factorisation into a square and a cofactor.
-Multipliers are powers of the sum of squares, or sums of squares found in floating point. Exact arithmetic
+Multipliers are powers of 1 + Σx_i² (or a similar sum), or sums of squares found in floating point. Exact arithmetic
 decides every proof.
 """
 
@@ -46,7 +46,7 @@ from quakedesign.sos.solve.joint import Demand, joint_program
 from quakedesign.sos.solve.rounding import scaled
 
 # ----------------------------------------------------------------------
-# Multipliers of a polynomial P on ℝⁿ: powers of the sum of squares, and sums of squares that are searched for P.
+# Multipliers of a polynomial P on ℝⁿ: powers of 1 + Σx_i², and sums of squares found by a search.
 #
 # Let σ be a sum of squares of given degree. That σ·P is also a sum of squares is a linear conic condition on σ. σ is
 # computed in floating point and scaled variables, rounded, and proved to be a sum of squares. The caller decides σ·P

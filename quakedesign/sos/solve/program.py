@@ -1,6 +1,6 @@
 """Sum-of-squares programmes with decision variables, solved, rounded and proved.
 
-The solver is Clarabel through cvxpy. `Membership` solves many polynomials of one shape with one model.
+The solver is Clarabel through cvxpy. `Membership` computes the margins of many polynomials of one shape with one model.
 """
 
 import math
@@ -214,7 +214,7 @@ class Program:
         self._forced = self._forced.on_faces(faces, self.decisions)
         return any(face is not None for face in faces)
 
-    def proposal(self, room: float) -> list[float] | None:
+    def proposal(self, margin: float) -> list[float] | None:
         """Decisions with the largest margin, in floating point without proof; None if none are found.
 
         Parameters
@@ -222,10 +222,10 @@ class Program:
         room : float
             Loss of objective allowed for the margin, relative to max(1, |optimum|).
         """
-        if not room >= 0 or math.isinf(room):
-            raise PolynomialError(f"room must be a number of at least 0. Received {room!r}. Give for example 0.01.")
+        if not margin >= 0 or math.isinf(margin):
+            raise PolynomialError(f"room must be a number of at least 0. Received {margin!r}. Give for example 0.01.")
         self.problem()
-        solution = next(self._interior((room,)), None)
+        solution = next(self._interior((margin,)), None)
         return None if solution is None else np.asarray(self._vector.value).tolist()
 
     def _interior(self, losses: Sequence[float]) -> Iterator[tuple[float, float]]:
@@ -324,7 +324,7 @@ class Program:
 
 
 def largest(
-    question: Callable[[Fraction], Answer], low: Any, high: Any, *, relative: float = 1e-4
+    problem: Callable[[Fraction], Answer], low: Any, high: Any, *, relative: float = 1e-4
 ) -> tuple[Fraction, Answer] | None:
     """Largest level proved by a bisection, with its proof; None if the lowest level is not proved.
 
@@ -337,7 +337,7 @@ def largest(
         Width of the final bracket relative to its upper end.
     """
     below, above = rational(low, "low"), rational(high, "high")
-    answer = question(below)
+    answer = problem(below)
     if answer.verdict is not Positivity.SOS:
         return None
     best = below, answer
@@ -347,7 +347,7 @@ def largest(
         while Fraction(8, grid) > width:
             grid *= 10
         middle = nearest(float((below + above) / 2), grid)
-        answer = question(middle)
+        answer = problem(middle)
         if answer.verdict is Positivity.SOS:
             below, best = middle, (middle, answer)
         else:

@@ -15,9 +15,9 @@ from quakedesign.guarantees import Claims, SampledLoop, TrackingProof, load_guar
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, guarantee_text
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds
 from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof, peaks
-from quakedesign.guarantees.exact.sampled_loop import Channel, beside, through_layer
+from quakedesign.guarantees.exact.sampled_loop import Channel, reference_channels, through_layer
 from quakedesign.guarantees.exact.sliding_proof import _inside
-from quakedesign.laws import ImplicitRoot, Power, compensated, summed_integrals
+from quakedesign.laws import ImplicitStep, Power, compensated, summed_integrals
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.plant import uncertain_plant
 from quakedesign.plant.plant_values import ExactSector
@@ -54,7 +54,7 @@ def test_a_law_of_the_reference_has_no_guarantee_with_a_diffusion_path_aperiodic
     law = replace(plain, of_reference=((F(1), F(0)),) * (len(plain.states) + 1))
     assert replace(LOOP, law=law).law.of_reference
     sign = Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip")
-    rooted = compensated(ImplicitRoot(pull=(sign,), slopes=(F(0), F(0)), remainder=F(0)), F(1, 2), F(1))
+    rooted = compensated(ImplicitStep(pull=(sign,), slopes=(F(0), F(0)), remainder=F(0)), F(1, 2), F(1))
     changed = {
         "diffusion": {"law": law, "diffusion": F(1)},
         "longest_step": {"law": law, "longest_step": F(2)},
@@ -74,11 +74,11 @@ def test_inputs_beside_the_disturbance_have_the_bounds_of_the_reference():
         "start": (F(1), {}),
         "late": (F(0), {"stepped": F(1)}),
     }
-    found = {channel.name: (channel.own, channel.shares) for channel in beside(TASK, set(expected))}
+    found = {channel.name: (channel.own, channel.shares) for channel in reference_channels(TASK, set(expected))}
     assert found == expected
     assert len({rates[0], rates[1], jerk, F(0)}) == 4
     for name in expected:
-        assert [channel.name for channel in beside(TASK, {name})] == [name]
+        assert [channel.name for channel in reference_channels(TASK, {name})] == [name]
 
 
 @pytest.mark.parametrize("fades", [True, False])
@@ -98,7 +98,7 @@ def test_the_truncation_error_of_a_layer_acts_where_the_pressure_does(fades):
 
 
 def test_a_loop_with_a_diffusion_path_has_the_response_of_the_omitted_modes_as_an_input():
-    loop = load_guarantee(FOLDER / "guarantee_late_real-fault.json").held
+    loop = load_guarantee(FOLDER / "guarantee_late_real-fault.json").sampled_loop
     layered = replace(LOOP, diffusion=F(1)).loop(TASK)
     assert "awaited" in {*layered.inputs, *layered.fading}
     assert "awaited_told" in layered.sampled
@@ -126,7 +126,7 @@ def test_the_slip_acceleration_is_bounded_by_the_claims(least, largest):
     away = max(F(largest * 10**6) - high, low - F(least * 10**6))
     slopes = [max(abs(v) for v in chord) for chord in (TASK.slip_chord, TASK.rate_chord)]
     bound = slopes[0] * F(1, 10**4) + slopes[1] * F(1, 10**3) + TASK.beta[1] * TASK.authority * away
-    found = TrackingProof(task=TASK, held=LOOP, claims=claims).slip_acceleration
+    found = TrackingProof(task=TASK, sampled_loop=LOOP, claims=claims).slip_acceleration
     assert found == bound + TASK.amplitude + TASK.reference_force
 
 
@@ -134,9 +134,9 @@ def test_the_limit_at_rest_follows_from_the_claims_at_the_valve():
     """Width: twice |p − p*| at the valve, and the motion of the reference during all delays."""
     proof = load_guarantee(FOLDER / "guarantee_no-clock_lab-fault.json")
     errors = {"delay": F(1, 5000), "jitter": F(1, 10**5), "delay_jitter": F(1, 2 * 10**5), "slip_noise": F(1, 10**6)}
-    held = replace(proof.held, longest_step=F(0), **errors)
+    held = replace(proof.sampled_loop, longest_step=F(0), **errors)
     claims = replace(CLAIMS, largest_step=UpperBound(F(10**6)))
-    found = TrackingProof(task=proof.task, held=held, claims=claims).rest_limit
+    found = TrackingProof(task=proof.task, sampled_loop=held, claims=claims).rest_limit
     rate, (low, high) = proof.task.reference_rates[0], proof.task.rest_pressure
     per_slip = max(abs(v) for v in proof.task.slip_chord) / proof.task.authority
     away = max(15 * 10**6 - high, low + 20 * 10**6)
@@ -149,17 +149,19 @@ def test_the_limit_at_rest_follows_from_the_claims_at_the_valve():
     for name, value in exact.items():
         assert value <= getattr(found, name) <= value * F(1002, 1000), name
     assert (found.least, found.largest) == (-20 * 10**6, 15 * 10**6)
-    aperiodic = TrackingProof(task=proof.task, held=proof.held, claims=CLAIMS).rest_limit
-    resolution = 2 * proof.held.slip_noise + rate * proof.held.step / 100
+    aperiodic = TrackingProof(task=proof.task, sampled_loop=proof.sampled_loop, claims=CLAIMS).rest_limit
+    resolution = 2 * proof.sampled_loop.slip_noise + rate * proof.sampled_loop.step / 100
     assert resolution <= aperiodic.resolution <= resolution * F(1002, 1000)
-    fastest = 2 * proof.held.slip_noise + F(1, 500) * proof.held.longest_step
+    fastest = 2 * proof.sampled_loop.slip_noise + F(1, 500) * proof.sampled_loop.longest_step
     assert fastest <= aperiodic.fastest <= fastest * F(1002, 1000)
 
 
 @pytest.mark.parametrize("path", ["lag", "diffusion"])
 def test_there_is_no_limit_at_rest_without_a_claim_at_the_valve(path):
     proof = load_guarantee(FOLDER / "guarantee_no-clock_lab-fault.json")
-    behind = TrackingProof(task=proof.task, held=replace(proof.held, longest_step=F(0), **{path: F(1)}), claims=CLAIMS)
+    behind = TrackingProof(
+        task=proof.task, sampled_loop=replace(proof.sampled_loop, longest_step=F(0), **{path: F(1)}), claims=CLAIMS
+    )
     assert behind.rest_limit is None
     asked = {"least_asked": LowerBound(F(-21 * 10**6)), "largest_asked": UpperBound(F(16 * 10**6))}
     found = replace(behind, claims=replace(CLAIMS, **asked)).rest_limit
@@ -297,7 +299,7 @@ def test_a_statement_about_the_stick_slip_plant_names_what_it_covers():
     assert "friction at rest up to 2e-05 above friction in slip" in replace(exact, healing=F(2, 10**5)).sentence()
     assert "longest_step" not in exact.to_dict()
     assert free.to_dict()["longest_step"] == "23/125"
-    assert (exact.root, mode.root.pull) == (None, mode.held.law.pull)
+    assert (exact.implicit_step, mode.implicit_step.pull) == (None, mode.sampled_loop.law.pull)
     for proof in (exact, noisy):
         assert proof.bounds["slip_error"] == max(proof.claims.slip_behind, proof.claims.slip_ahead)
         assert proof.bounds["slip_rate_error"] == max(proof.claims.peak_slip_rate, proof.task.reference_rates[0])
@@ -320,9 +322,15 @@ def test_a_claim_with_more_healing_than_disturbance_is_undecided(healing):
 def test_a_statement_about_slow_sliding_names_what_it_covers():
     proof = load_guarantee(FOLDER / "sliding_crustal-patch.json")
     task, text = proof.task, proof.sentence()
-    assert ("exact measurements" in text) is not bool(proof.held.slip_noise)
-    assert "m in the measured slip" in replace(proof, held=replace(proof.held, slip_noise=F(1, 10**6))).sentence()
-    assert "exact measurements of slip" in replace(proof, held=replace(proof.held, slip_noise=F(0))).sentence()
+    assert ("exact measurements" in text) is not bool(proof.sampled_loop.slip_noise)
+    assert (
+        "m in the measured slip"
+        in replace(proof, sampled_loop=replace(proof.sampled_loop, slip_noise=F(1, 10**6))).sentence()
+    )
+    assert (
+        "exact measurements of slip"
+        in replace(proof, sampled_loop=replace(proof.sampled_loop, slip_noise=F(0))).sentence()
+    )
     assert ("every reference whose rate" in text) is bool(task.swing)
     size, planned = proof.claims.push, task.pressure_per_slip * task.distance
     assert proof.pressures == (-size, planned + size)
@@ -364,18 +372,18 @@ def test_a_file_says_each_part_of_a_loop_whatever_else_there_is(setup):
     """Read again, it is the same loop; a pump without limits is none."""
     counted = {"largest_step": UpperBound(5)} if setup.get("largest_step") else {}
     loop = replace(LOOP, **{name: value for name, value in setup.items() if name != "largest_step"})
-    claim = TrackingProof(task=TASK, held=loop, claims=replace(CLAIMS, **counted))
+    claim = TrackingProof(task=TASK, sampled_loop=loop, claims=replace(CLAIMS, **counted))
     again = read_guarantee(json.loads(guarantee_text(claim)))
-    assert again.held == (replace(loop, pump=None) if loop.pump == Pump() else loop)
+    assert again.sampled_loop == (replace(loop, pump=None) if loop.pump == Pump() else loop)
     assert again.claims == claim.claims
 
 
 @pytest.mark.parametrize(("rows", "stands"), [("00", False), ("10", True), ("01", True)])
 def test_a_law_of_the_reference_has_a_row_that_is_not_zero(rows, stands):
     law = replace(LAW, of_reference=((F(0), F(0)),) * len(LAW.states) + ((F(rows[0]), F(rows[1])),))
-    raw = guarantee_document(TrackingProof(task=TASK, held=replace(LOOP, law=law), claims=CLAIMS))
+    raw = guarantee_document(TrackingProof(task=TASK, sampled_loop=replace(LOOP, law=law), claims=CLAIMS))
     if stands:
-        assert read_guarantee(raw).held.law == law
+        assert read_guarantee(raw).sampled_loop.law == law
     else:
         with pytest.raises(CertificateError, match="of_reference must not be zero"):
             read_guarantee(raw | {"loop": raw["loop"] | {"of_reference": [["0", "0"]] * (len(LAW.states) + 1)}})

@@ -23,7 +23,7 @@ from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
 from quakedesign.laws import (
     ErrorModel,
-    ImplicitRoot,
+    ImplicitStep,
     Power,
     compensated,
     disturbance_estimate,
@@ -57,7 +57,7 @@ def implicit(scale, slope, remainder="0"):
     factors = (7 * rho**4 * push, 5 * rho**3 * push, F("2.3") * rho**6 * STEP * push, F("1.1") * rho**6 * STEP * push)
     parts = zip(factors, ("1/3", "1/2", "0", "0"), ("slip", "rate", "slip", "rate"), strict=True)
     pull = tuple(Power(factor=(c, c), exponent=F(p), argument=of) for c, p, of in parts)
-    root = ImplicitRoot(pull=pull, slopes=(F(slope), F(1)), remainder=F(remainder))
+    root = ImplicitStep(pull=pull, slopes=(F(slope), F(1)), remainder=F(remainder))
     return SampledLoop(law=compensated(root, F("0.3"), GAIN), step=STEP)
 
 
@@ -147,7 +147,7 @@ def test_both_checkers_accept_what_the_package_writes(name, rate_limited):
 @pytest.mark.slow
 def test_a_layer_behind_a_delay_is_accepted_by_both():
     text = guarantee_text(claim("late rock"))
-    assert parse_guarantee(text).held == LOOPS["late rock"]
+    assert parse_guarantee(text).sampled_loop == LOOPS["late rock"]
     assert standalone(text) == package(text) == "proved"
 
 
@@ -188,7 +188,7 @@ def test_a_file_of_before_noise_is_one_without():
     raw = json.loads(guarantee_text(claim("noisy")))
     del raw["loop"]["noise"]
     assert standalone(json.dumps(raw)) == package(json.dumps(raw)) == "proved"
-    assert parse_guarantee(json.dumps(raw)).held == LOOPS["estimate"]
+    assert parse_guarantee(json.dumps(raw)).sampled_loop == LOOPS["estimate"]
 
 
 def test_the_root_lies_between_its_lines_for_all_errors_that_it_is_told():

@@ -20,7 +20,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_g
 from quakedesign.guarantees.exact.norms import free_peaks, norms
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import THROUGH_ROCK, family_of
-from quakedesign.laws import ImplicitRoot, Power, compensated
+from quakedesign.laws import ImplicitStep, Power, compensated
 from quakedesign.loop import PeriodicLoop, Segment
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -164,8 +164,8 @@ def stored(name="real-fault"):
 @cache
 def started(name="real-fault", slip="1e-5", rate="4e-5", slow=False):
     known = stored(name)
-    held = replace(known.held, initial_slip=F(slip), initial_slip_rate=F(rate))
-    return guarantee(known.task, held, known.slow_gain if slow else None)
+    held = replace(known.sampled_loop, initial_slip=F(slip), initial_slip_rate=F(rate))
+    return guarantee(known.task, held, known.varying_gain if slow else None)
 
 
 def exact_course(held, model, authority, error, count):
@@ -189,7 +189,7 @@ def test_without_disturbance_and_ranges_the_claims_are_the_peaks_of_the_free_res
     known = stored()
     friction = replace(known.task.friction, weakening=F(0), static=F("0.25"), least=F("0.25"), largest=F("0.25"))
     still = replace(known.task, friction=friction, amplitude=F(0), growths=(F(0), F(0)), target_slip=F(1, 10**30))
-    held = replace(known.held, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"))
+    held = replace(known.sampled_loop, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"))
     found = guarantee(still, held)
     ways = [np.array([1e-5, 4e-5]), np.array([1e-5, -4e-5])]
     seen = np.max([abs(exact_course(held, still.model, still.authority, e, 60)) for e in ways], axis=(0, 1))
@@ -202,7 +202,7 @@ def test_without_disturbance_and_ranges_the_claims_are_the_peaks_of_the_free_res
 
 def test_a_larger_start_is_guaranteed_less_and_none_is_rest():
     known = stored()
-    rest = guarantee(known.task, known.held)
+    rest = guarantee(known.task, known.sampled_loop)
     near, far = started(), started(slip="2e-5", rate="8e-5")
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "largest_pressure"):
         assert getattr(rest.claims, name) < getattr(near.claims, name) < getattr(far.claims, name)
@@ -287,7 +287,7 @@ def test_what_the_law_makes_at_first_of_the_errors_counts():
     """A law that begins with the slip rate it is told is not kicked by it; the claims of one do not serve the other."""
     raw = document()
     told = with_entry(raw, ("loop", "first"), [["0", "100"], ["0", "0"]])
-    assert parse_guarantee(json.dumps(told)).held.law.first == ((F(0), F(100)), (F(0), F(0)))
+    assert parse_guarantee(json.dumps(told)).sampled_loop.law.first == ((F(0), F(100)), (F(0), F(0)))
     with pytest.raises(checker.Refused, match=r"must follow|must stay below"):
         checker.verify(told)
     assert parse_guarantee(json.dumps(told)).check() is Verdict.UNDECIDED
@@ -298,10 +298,10 @@ def test_what_the_law_makes_at_first_of_the_errors_counts():
 
 def test_an_implicit_step_begins_with_the_slip_rate_that_it_is_told_noise_included():
     pull = (Power(factor=(F(1), F(1)), exponent=F(0), argument="slip"),)
-    law = compensated(ImplicitRoot(pull=pull), F("0.3"), F("4e-9"))
+    law = compensated(ImplicitStep(pull=pull), F("0.3"), F("4e-9"))
     assert law.first == ((F(0), F(1)), (F(0), F(0)), (F(0), F(0)))
     cta = stored("cta_real-fault")
-    held = replace(cta.held, law=replace(cta.held.law, first=law.first), rate_noise=F("1e-6"))
+    held = replace(cta.sampled_loop, law=replace(cta.sampled_loop.law, first=law.first), rate_noise=F("1e-6"))
     assert held.loop(cta.task).start == ((F(0), F(0), F("1e-6"), *[F(0)] * 3),)
     noisy = guarantee(cta.task, held)
     assert (
@@ -313,7 +313,7 @@ def test_an_implicit_step_begins_with_the_slip_rate_that_it_is_told_noise_includ
 @pytest.mark.parametrize("bound", ["initial_slip", "initial_slip_rate"])
 def test_a_bound_has_no_sign(bound):
     with pytest.raises(ParameterError, match="bounds of the initial slip and slip rate errors must be 0 or more"):
-        replace(stored().held, **{bound: F(-1)})
+        replace(stored().sampled_loop, **{bound: F(-1)})
 
 
 def followed(loop, periods):
@@ -336,8 +336,8 @@ def test_through_rock_and_late_both_bound_what_is_seen_of_the_free_response(arou
     law = family_of(task, step, "slip-and-rate", ExactSetup(**around)).law(np.array(THROUGH_ROCK[0]))
     held = SampledLoop(law=law, step=step, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"), **around)
     loop = held.loop(task)
-    raw = json.loads(guarantee_text(TrackingProof(task=task, held=held, claims=stored().claims)))
-    plain = checker.read_loop(raw["loop"], checker.read_task(raw), held.start)
+    raw = json.loads(guarantee_text(TrackingProof(task=task, sampled_loop=held, claims=stored().claims)))
+    plain = checker.read_loop(raw["loop"], checker.read_task(raw), held.initial_errors)
     theirs = checker.start_gains(checker.without_area(plain, sum(task.beta) / 2)[0])
     ours = [max(peaks) for peaks in free_peaks(loop).values()]
     assert np.allclose(np.array(ours, float), [float(max(peaks)) for peaks in theirs], rtol=1e-9)

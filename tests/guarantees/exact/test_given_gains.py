@@ -32,7 +32,7 @@ def test_a_pid_from_a_matrix_of_python_control_is_proved_by_both_checkers(placed
     gains = np.append(placed, [[0.0]], axis=1)
     found = qd.guarantee(LAB, gains=gains)
     assert found.proved
-    assert found.proof.held.law.states == ("xi1",)
+    assert found.proof.sampled_loop.law.states == ("xi1",)
     path = tmp_path / "pid.json"
     save_guarantee(found.proof, path)
     assert check_files([path], "lab-fault")[str(path)][0] == "proved"
@@ -43,7 +43,7 @@ def test_a_pid_from_a_matrix_of_python_control_is_proved_by_both_checkers(placed
 def test_numbers_lists_and_rows_are_the_same_gains(placed):
     row = [*placed[0], 0.0]
     texts = tuple(str(Fraction(repr(float(v)))) for v in row)
-    laws = [qd.guarantee(LAB, gains=given).proof.held.law for given in (row, texts, np.array([row]))]
+    laws = [qd.guarantee(LAB, gains=given).proof.sampled_loop.law for given in (row, texts, np.array([row]))]
     assert laws[0] == laws[1] == laws[2]
 
 

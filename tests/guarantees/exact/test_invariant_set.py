@@ -22,7 +22,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_g
 from quakedesign.guarantees.exact.invariant_set import _SampleMap, reduced
 from quakedesign.guarantees.exact.norms import matrix
 from quakedesign.guarantees.exact.sampled_loop import channels_of
-from quakedesign.guarantees.exact.small_gain import SlowGain
+from quakedesign.guarantees.exact.small_gain import VaryingGain
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
 
@@ -268,7 +268,7 @@ def test_what_is_wrong_with_a_set_is_said():
 
 
 def test_a_law_with_an_implicit_step_needs_a_clock():
-    held = parse_guarantee((FILE.parent / "guarantee_cta_real-fault.json").read_text()).held
+    held = parse_guarantee((FILE.parent / "guarantee_cta_real-fault.json").read_text()).sampled_loop
     plain = replace(held, law=replace(held.law, first=()))
     with pytest.raises(ParameterError, match="or an implicit step"):
         replace(plain, longest_step=2 * held.step)
@@ -286,13 +286,13 @@ def test_a_set_is_for_samples_by_no_clock_alone():
     assert "for that alone" in standalone(raw)
     assert package(raw) == "invalid"
     known = claim()
-    assert isinstance(guarantee(known.task, known.held), NoProof)
+    assert isinstance(guarantee(known.task, known.sampled_loop), NoProof)
 
 
 @pytest.mark.parametrize("more", [{"delay": F(1, 1000)}, {"longest_step": F(1, 1000)}, {"initial_slip": F(1)}])
 def test_a_loop_by_no_clock_has_nothing_else_around(more):
     with pytest.raises(ParameterError, match="longest"):
-        replace(claim().held, **more)
+        replace(claim().sampled_loop, **more)
 
 
 def test_a_sample_keeps_what_its_reduced_map_sees():
@@ -308,13 +308,13 @@ def test_a_sample_keeps_what_its_reduced_map_sees():
 def test_states_at_samples_stay_in_the_set_and_come_near_its_sides():
     """By matrix exponentials of floats, pushes that follow one side at a time."""
     known = claim()
-    loop, reach = known.loop, known.reach
+    loop, reach = known.loop, known.invariant_set
     facets, inputs = (np.array(v, dtype=float) for v in (reach.facets, reach.inputs))
     seen = np.array([[float(F(int(v.p), int(v.q))) for v in row] for row in reduced(loop.segments[0].jump)[0].tolist()])
     jump, flow = np.array(loop.segments[0].jump, dtype=float), np.array(loop.flow, dtype=float)
     entries = np.array(list(loop.inputs.values()), dtype=float) * inputs[:, None]
     random, largest = np.random.default_rng(4), np.zeros(len(facets))
-    lengths = np.linspace(float(known.held.step), float(known.held.longest_step), 5)
+    lengths = np.linspace(float(known.sampled_loop.step), float(known.sampled_loop.longest_step), 5)
     part = [expm(flow * length / 8) for length in lengths]
     for row in (facets @ seen)[::4]:
         order, states = random.integers(5, size=40), np.zeros(len(flow))
@@ -338,17 +338,17 @@ def rows_of(raw, count):
     known, task = parse_guarantee(json.dumps(raw)), checker.read_task(raw)
     loop, (soonest, latest) = (
         checker.read_loop(raw["loop"], task, [F(0)] * 2),
-        (known.held.step, known.held.longest_step),
+        (known.sampled_loop.step, known.sampled_loop.longest_step),
     )
     read = checker.read_reach(raw["reach"], loop)
     theirs = checker.Between(loop, read)
-    pieces = len(known.reach.at_samples[0]) - 1
+    pieces = len(known.invariant_set.at_samples[0]) - 1
     ends = [soonest * i / 4 for i in range(4)] + [soonest + (latest - soonest) * i / pieces for i in range(pieces + 1)]
     found = []
     with ctx.workprec(128):
-        channels = channels_of(known.task, None, soonest, known.held.noise)
-        ours = _SampleMap.of(known.loop, channels, known.reach)
-        for facet, bases in list(zip(known.reach.facets, known.reach.at_samples, strict=True))[:count]:
+        channels = channels_of(known.task, None, soonest, known.sampled_loop.noise)
+        ours = _SampleMap.of(known.loop, channels, known.invariant_set)
+        for facet, bases in list(zip(known.invariant_set.facets, known.invariant_set.at_samples, strict=True))[:count]:
             row = matrix((facet,)) * ours.seen
             other = theirs.largest(checker.fixed([list(facet)]) * theirs.seen, ends, bases)
             found.append((float(ours._largest(row, ends, bases)), float(other)))
@@ -363,13 +363,15 @@ def test_both_bound_every_side_alike(raw):
 
 def test_bounds_of_sides_lie_a_little_above_what_linear_programmes_and_fine_sums_give():
     known = claim()
-    loop, facets = known.loop, np.array(known.reach.facets, dtype=float)
+    loop, facets = known.loop, np.array(known.invariant_set.facets, dtype=float)
     seen, kept = (
         np.array([[float(F(int(v.p), int(v.q))) for v in row] for row in part.tolist()])
         for part in reduced(loop.segments[0].jump)
     )
     flow, scale = np.array(loop.flow, dtype=float), np.abs(np.linalg.inv(facets[:3])).sum(axis=1)
-    inputs = np.array(list(loop.inputs.values()), dtype=float) * np.array(known.reach.inputs, dtype=float)[:, None]
+    inputs = (
+        np.array(list(loop.inputs.values()), dtype=float) * np.array(known.invariant_set.inputs, dtype=float)[:, None]
+    )
     step, both = expm(flow * 2e-5), np.vstack([facets, -facets]) * scale
     for facet, (bound, _) in zip(facets, rows_of(json.loads(text()), 3), strict=False):
         row, area, highest = facet @ seen, 0.0, 0.0
@@ -415,7 +417,7 @@ def test_an_implicit_step_and_an_interval_no_longer_than_the_step_are_refused_fo
     assert "must have a linear law from rest" in standalone(raw)
     assert "must be longer than step" in standalone(changed(("loop", "longest"), "1/1000"))
     with pytest.raises(ParameterError, match="must exceed the step"):
-        replace(claim().held, longest_step=claim().held.step)
+        replace(claim().sampled_loop, longest_step=claim().sampled_loop.step)
 
 
 @pytest.mark.parametrize(
@@ -434,18 +436,18 @@ def test_an_implicit_step_and_an_interval_no_longer_than_the_step_are_refused_fo
 )
 def test_what_a_set_does_not_know_of_is_refused_before_its_size_is_looked_at(more):
     with pytest.raises(ParameterError, match="aperiodic sampling needs a linear law"):
-        replace(claim().held, **more)
+        replace(claim().sampled_loop, **more)
 
 
 def test_a_law_that_starts_from_what_it_measures_needs_a_clock():
-    law = claim().held.law
+    law = claim().sampled_loop.law
     with pytest.raises(ParameterError, match="aperiodic sampling needs a linear law"):
-        replace(claim().held, law=replace(law, first=((F(0), F(1)), (F(0), F(0)))))
+        replace(claim().sampled_loop, law=replace(law, first=((F(0), F(1)), (F(0), F(0)))))
 
 
 def test_intervals_are_said_on_their_inner_side():
-    held = replace(claim().held, step=F("0.0010000001"), longest_step=F("0.0019999999"))
-    assert "intervals from 0.00100001 s to 0.00199999 s in any order" in replace(claim(), held=held).sentence()
+    held = replace(claim().sampled_loop, step=F("0.0010000001"), longest_step=F("0.0019999999"))
+    assert "intervals from 0.00100001 s to 0.00199999 s in any order" in replace(claim(), sampled_loop=held).sentence()
 
 
 def test_sizes_that_others_hide_are_invalid_too():
@@ -474,17 +476,17 @@ def test_limits_of_a_set_are_said(place, new, said):
 
 
 def test_a_slow_gain_which_is_of_a_clock_proves_nothing_without_one():
-    known, slow = claim(), SlowGain(parts=4, growth=F(1, 2))
-    for longest in (known.held.longest_step, F(1000)):
-        found = guarantee(known.task, replace(known.held, longest_step=longest), slow)
+    known, slow = claim(), VaryingGain(parts=4, growth=F(1, 2))
+    for longest in (known.sampled_loop.longest_step, F(1000)):
+        found = guarantee(known.task, replace(known.sampled_loop, longest_step=longest), slow)
         assert isinstance(found, NoProof)
-    assert replace(known, slow_gain=slow).check() is Verdict.UNDECIDED
-    assert replace(known, slow_gain=slow, reach=None).check() is Verdict.UNDECIDED
+    assert replace(known, varying_gain=slow).check() is Verdict.UNDECIDED
+    assert replace(known, varying_gain=slow, invariant_set=None).check() is Verdict.UNDECIDED
 
 
 def test_with_a_clock_no_set_is_looked_at():
     known = claim()
-    found = guarantee(known.task, replace(known.held, longest_step=F(0)), reach=known.reach)
+    found = guarantee(known.task, replace(known.sampled_loop, longest_step=F(0)), invariant_set=known.invariant_set)
     assert "needs no invariant set" in found.reason
 
 
@@ -525,7 +527,7 @@ _ROW = (F(1),) * 7
     ],
 )
 def test_the_condition_that_a_set_misses_is_named(wrong, said):
-    found = claim().reach
+    found = claim().invariant_set
     with pytest.raises(ParameterError, match=said):
         replace(found, **wrong(found))
 
@@ -533,7 +535,7 @@ def test_the_condition_that_a_set_misses_is_named(wrong, said):
 @pytest.mark.parametrize("wrong", [{"inputs": (0.5,)}, {"facets": ((None,),)}, {"between": (((1.5,),),)}])
 def test_a_set_is_made_of_rationals_and_whole_numbers(wrong):
     with pytest.raises(ParameterError, match=f"{next(iter(wrong))} of InvariantPolytope must be a tuple of"):
-        replace(claim().reach, **wrong)
+        replace(claim().invariant_set, **wrong)
 
 
 # ---------------------------------------------------------------- what the standalone checker reads

@@ -14,7 +14,7 @@ from quakedesign.guarantees.exact.guarantee_files import guarantee_document, rea
 from quakedesign.guarantees.exact.invariant_set import InvariantPolytope
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.tracking_proof import ContinuousProof, sentence_of
-from quakedesign.laws import ImplicitRoot, Power, compensated, summed_integrals
+from quakedesign.laws import ImplicitStep, Power, compensated, summed_integrals
 from quakedesign.loop.loop_setup import LoopSetup, Pump
 from quakedesign.plant import uncertain_plant
 
@@ -23,7 +23,7 @@ BOUNDS = Bounds(slip_error=F(1, 8), slip_rate_error=F(1, 7), push=3 * TASK.autho
 STEPPED = replace(BOUNDS, stepped=5 * TASK.authority)
 LAW = summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10))
 HELD = SampledLoop(law=LAW, step=F(1, 10))
-SIGN = ImplicitRoot(
+SIGN = ImplicitStep(
     pull=(Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip"),), slopes=(F(0), F(0)), remainder=F(0)
 )
 ROOTED = compensated(SIGN, F(1, 2), F(1))
@@ -107,7 +107,7 @@ def test_claims_with_a_largest_step_do_not_follow_from_claims_without():
 
 
 def proof(**changes):
-    return TrackingProof(task=TASK, held=replace(HELD, **changes), claims=CLAIMS)
+    return TrackingProof(task=TASK, sampled_loop=replace(HELD, **changes), claims=CLAIMS)
 
 
 def test_the_text_of_a_proof_gives_the_intervals():
@@ -159,7 +159,7 @@ def test_a_file_states_a_pump_with_its_limits_and_the_ramp_of_its_rate():
 def test_a_pump_of_a_file_has_a_ramp_if_and_only_if_it_has_a_rate(pump):
     raw = guarantee_document(proof(pump=Pump(rate=F(5)), ramp=F(1, 50), delay_jitter=F(1, 300)))
     raw["claims"]["largest_step"] = "1"
-    assert read_guarantee(raw).held.ramp == F(1, 50)
+    assert read_guarantee(raw).sampled_loop.ramp == F(1, 50)
     raw["loop"]["pump"] = pump
     with pytest.raises(CertificateError, match="must be given together" if pump else "must have limits or a rate"):
         read_guarantee(raw)
@@ -188,18 +188,18 @@ def test_a_guarantee_with_aperiodic_sampling_is_that_of_its_set(bounds, kind, mo
     monkeypatch.setattr(tracking_proof, "_bounds", lambda *_: bounds)
     held = replace(HELD, longest_step=F(1, 5))
     reach = InvariantPolytope(inputs=(F(1),), facets=((F(1),),), at_samples=(((0,),) * 2,), between=(((0,),) * 2,))
-    found = guarantee(TASK, held, reach=reach)
+    found = guarantee(TASK, held, invariant_set=reach)
     assert isinstance(found, kind)
-    if found.found:
-        assert (found.held, found.reach, found.claims) == (held, reach, CLAIMS.rounded())
+    if found.available:
+        assert (found.sampled_loop, found.invariant_set, found.claims) == (held, reach, CLAIMS.rounded())
 
 
 def test_a_pump_without_a_rate_limit_and_a_given_ramp_need_no_search(monkeypatch):
     monkeypatch.setattr(tracking_proof, "certified_bounds", lambda *_: STEPPED)
     limited = replace(HELD, pump=Pump(least=F(-(10**9)), largest=F(10**9)))
-    assert guarantee(TASK, limited).held == limited
+    assert guarantee(TASK, limited).sampled_loop == limited
     given = replace(HELD, pump=Pump(rate=F(10**9)), ramp=F(1, 30))
-    assert guarantee(TASK, given).held == given
+    assert guarantee(TASK, given).sampled_loop == given
 
 
 @pytest.mark.parametrize(

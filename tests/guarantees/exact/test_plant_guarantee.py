@@ -106,7 +106,7 @@ def proved(request):
     make, setup = PLANTS[request.param]
     plant, K = make()
     found = qd.guarantee(plant, gains=K, **setup).proof
-    assert found.found, found
+    assert found.available, found
     return request.param, plant, K, found
 
 
@@ -403,7 +403,7 @@ def test_a_dynamic_law_with_a_load_holds_it():
     plant = qd.UncertainPlant(A=A, B=B, loads={"weight": ([1], None, 0.5)}, outputs={"x": [1]})
     law = control.ss([[1]], [[0.1]], [[-2]], [[-1.5]], 0.1)
     found = qd.guarantee(plant, law=law).proof
-    assert found.found
+    assert found.available
     x, z, reached = 0.0, 0.0, 0.0
     for k in range(400):
         u = -2 * z - 1.5 * x
@@ -541,7 +541,7 @@ def friction_run(found, law, blocks, seed):
 def test_several_blocks_stay_inside_and_both_checkers_decide(wells, checker):
     plant = qd.UncertainPlant.from_blocks(REAL, 2, wells=wells)
     found = qd.guarantee(plant, step="0.184").proof
-    assert found.found
+    assert found.available
     document = guarantee_document(found)
     assert checker.check(json.dumps(document)).verdict == "proved"
     document["claims"]["output_3"] = str(Fraction(document["claims"]["output_3"]) * Fraction(98, 100))

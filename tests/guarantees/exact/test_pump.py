@@ -21,7 +21,7 @@ STORED = Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_real
 
 def stored(**changes):
     known = parse_guarantee(STORED.read_text())
-    return replace(known, held=replace(known.held, **changes))
+    return replace(known, sampled_loop=replace(known.sampled_loop, **changes))
 
 
 @pytest.mark.parametrize(("least", "largest"), [("1", "2"), ("-2", "-1"), ("0", "0"), ("1/1000000000", "5")])
@@ -46,7 +46,7 @@ def test_a_claim_may_touch_a_limit_and_not_pass_it(name, off):
     assert "whose limits are never reached, for every" in proved.sentence()
     narrow = replace(tight, **{name: getattr(tight, name) + F(off, 10**9)})
     assert stored(pump=narrow).check() is Verdict.UNDECIDED
-    found = guarantee(proved.task, replace(proved.held, pump=narrow))
+    found = guarantee(proved.task, replace(proved.sampled_loop, pump=narrow))
     assert isinstance(found, NoProof)
     assert found.reason.startswith("pressures from -14.3 MPa to 14.2 MPa may be commanded, but the pump supplies")
 
@@ -57,14 +57,14 @@ def test_behind_a_lag_the_pressure_at_the_valve_counts():
     assert not limits.exceeded(LowerBound(F(-5)), UpperBound(F(5)))
     task, around = stored().task, {"lag": F("0.2")}
     law = family_of(task, F("0.184"), "slip-and-rate", ExactSetup(**around)).law([-2.4, -6.0, 0.3])
-    lagging = replace(stored(law=law, **around), slow_gain=None)
-    found = guarantee(task, lagging.held)
+    lagging = replace(stored(law=law, **around), varying_gain=None)
+    found = guarantee(task, lagging.sampled_loop)
     (_, fault), (_, valve) = found.claims.pressures
     assert fault < valve
     for most, verdict in ((valve, Verdict.PROVED), ((valve + fault) / 2, Verdict.UNDECIDED)):
-        pumped = replace(found.held, pump=Pump(least=-10 * valve, largest=F(most)))
-        assert replace(found, held=pumped).check() is verdict
-    pumped = replace(found, held=replace(found.held, pump=Pump(least=-10 * valve, largest=10 * valve)))
+        pumped = replace(found.sampled_loop, pump=Pump(least=-10 * valve, largest=F(most)))
+        assert replace(found, sampled_loop=pumped).check() is verdict
+    pumped = replace(found, sampled_loop=replace(found.sampled_loop, pump=Pump(least=-10 * valve, largest=10 * valve)))
     raw = json.loads(guarantee_text(pumped))
     assert parse_guarantee(json.dumps(raw)) == pumped
     for name in ("least_asked", "largest_asked"):
@@ -77,8 +77,8 @@ def test_behind_a_lag_the_pressure_at_the_valve_counts():
 def test_a_pump_is_blamed_for_what_it_does_not_do_within_a_whole_period(rate, slow):
     """From one sample to the next the loop asks for some MPa; 0.2 MPa/s for T_s = 184 ms makes 37 kPa of them."""
     known = stored()
-    found = guarantee(known.task, replace(known.held, pump=Pump(rate=F(rate))))
+    found = guarantee(known.task, replace(known.sampled_loop, pump=Pump(rate=F(rate))))
     assert isinstance(found, NoProof) is slow
     if slow:
-        step, said = known.held.step, found.reason
+        step, said = known.sampled_loop.step, found.reason
         assert said.endswith(f"which a pump of 200 kPa/s does not make in {LowerBound(step).quantity('s')}")

@@ -69,9 +69,9 @@ def test_no_guarantee_contradicts_the_limits():
     path = Path(__file__).parents[3] / "proofs" / "certificates" / "sliding_crustal-patch.json"
     proved = parse_guarantee(path.read_text())
     push = SlidingPush(model=PUSH.model, amplitude=proved.task.stress)
-    assert push.smallest_rate_error(proved.held.step) < proved.peak_slip_rate - proved.task.rate
-    assert smallest_withdrawal(push, proved.held.step) < proved.claims.push
-    assert longest_diffusion(push, F(50 * 10**6), proved.held.step) > proved.held.diffusion
+    assert push.smallest_rate_error(proved.sampled_loop.step) < proved.peak_slip_rate - proved.task.rate
+    assert smallest_withdrawal(push, proved.sampled_loop.step) < proved.claims.push
+    assert longest_diffusion(push, F(50 * 10**6), proved.sampled_loop.step) > proved.sampled_loop.diffusion
 
 
 def test_a_fault_that_creeps_has_a_smallest_rate_error_and_no_other_limit():

@@ -288,7 +288,7 @@ def test_a_file_of_a_sliding_mode_keeps_its_implicit_step_and_has_no_controller(
     raw = json.loads((CERTIFICATES / "stick_slip_cta_real-fault.json").read_text())
     proof = read_guarantee(raw)
     assert guarantee_document(proof) == raw
-    assert proof.root.pull == proof.held.law.pull != ()
+    assert proof.implicit_step.pull == proof.sampled_loop.law.pull != ()
     with pytest.raises(UnsupportedError, match="states its implicit step, not the gains"):
         _ = proof.controller
 

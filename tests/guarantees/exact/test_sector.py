@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.small_gain import holds
-from quakedesign.laws import ImplicitRoot, Power
+from quakedesign.laws import ImplicitStep, Power
 
 STEP = F("0.2")
 
@@ -57,7 +57,7 @@ LAWS = {
 def test_what_is_shown_is_true_of_all_roots_and_what_is_true_by_a_margin_is_shown(name, slopes, remainder, size):
     pull, q = LAWS[name]
     (low, high), rate = map(F, slopes), 2 * F(size)
-    root = ImplicitRoot(pull=pull, slopes=(low, high), remainder=F(remainder))
+    root = ImplicitStep(pull=pull, slopes=(low, high), remainder=F(remainder))
     u = np.linspace(0, float(F(size) / STEP), 400)
     above, below = (roots(q, u * float(STEP), sign * float(rate)) for sign in (1, -1))
     room = np.min([float(F(remainder)) - float(low) * u - above, below + float(high) * u + float(F(remainder))])
@@ -70,18 +70,18 @@ def test_what_is_shown_is_true_of_all_roots_and_what_is_true_by_a_margin_is_show
 
 def test_a_deadbeat_root_is_exact_where_the_sign_holds_it():
     """c3 ≥ R + u + c2·√u + c4 up to E/T keeps e1 + T·w at 0: for all smaller errors and, just beyond, no longer."""
-    root = ImplicitRoot(pull=twisting())
+    root = ImplicitStep(pull=twisting())
     last = F("0.001")  # 0.001 + 1.1·√0.001 = 0.0357854 of the 0.05 that both signs leave
     assert holds(root, STEP, last * STEP, F("0.0142"))
     assert not holds(root, STEP, last * STEP, F("0.0143"))
 
 
 def test_a_factor_is_taken_at_the_end_that_hurts():
-    root = ImplicitRoot(pull=twisting())
+    root = ImplicitStep(pull=twisting())
     wide = tuple(Power(factor=(t.factor[0], t.factor[1] * F(3, 2)), exponent=t.exponent, argument=t.argument)
                  for t in root.pull)  # fmt: skip
-    assert not holds(ImplicitRoot(pull=wide), STEP, F("0.001") * STEP, F("0.0142"))
-    assert holds(ImplicitRoot(pull=wide), STEP, F("0.0001") * STEP, F("0.0005"))
+    assert not holds(ImplicitStep(pull=wide), STEP, F("0.001") * STEP, F("0.0142"))
+    assert holds(ImplicitStep(pull=wide), STEP, F("0.0001") * STEP, F("0.0005"))
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_a_factor_is_taken_at_the_end_that_hurts():
 )
 def test_impossible_lines_and_long_sums_are_refused(wrong):
     with pytest.raises(ParameterError, match="implicit step"):
-        ImplicitRoot(**{"pull": twisting()} | wrong)
+        ImplicitStep(**{"pull": twisting()} | wrong)
 
 
 @pytest.mark.parametrize(

@@ -266,7 +266,7 @@ def nonlinear_run(law, shares, weights, stress, signs, plan=K / MU):
 def test_nonlinear_blocks_stay_within_what_is_proved_and_both_checkers_decide(wells, stress, step, most, kind, checker):
     chain = replace(CHAIN, wells=wells)
     found = qd.guarantee(chain, kind, stress=stress, lag="800", step=step).proof
-    assert found.found
+    assert found.available
     for part in (found.law.update, found.law.measured, found.law.output, found.law.feedback):
         apart = all(not v or i % 3 == j % 3 for i, row in enumerate(part) for j, v in enumerate(row))
         assert apart is (kind == "decentralised")

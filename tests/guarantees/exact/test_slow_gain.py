@@ -11,7 +11,7 @@ import pytest
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, SlowGain, TrackingProof, guarantee
+from quakedesign.guarantees import Bounds, Claims, NoProof, SampledLoop, TrackingProof, VaryingGain, guarantee
 from quakedesign.guarantees.exact import small_gain as module
 from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
@@ -22,7 +22,7 @@ from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import uncertain_plant
 from quakedesign.plant.fault_plant import FaultPlant, Friction
 
-SLOW = SlowGain(parts=2, growth=F(1, 9))
+SLOW = VaryingGain(parts=2, growth=F(1, 9))
 FRICTION = Friction(static=F(4), least=F(4), largest=F(4), weakening=F(5), strengthening=F(2), rate_slope=F(0))
 BY_HAND = FaultPlant(  # N̂ from 1/2 to 3/2, b = 2, β from 1 to 3, r′ up to 2
     name="by hand", density=F(1), shear_modulus=F(1), length=F(1), damping=F(0), normal_stress=F(1),
@@ -39,14 +39,14 @@ GAINS = {("slip_error", "aged"): (F(1),)}
 @pytest.mark.parametrize(("parts", "growth"), [(0, 1), (17, 1), (-1, 1), (2, 0), (2, F(-1, 9))])
 def test_other_parts_and_growths_are_refused(parts, growth):
     with pytest.raises(ParameterError, match="needs 1 to 16 parts and a positive growth"):
-        SlowGain(parts=parts, growth=F(growth))
+        VaryingGain(parts=parts, growth=F(growth))
 
 
 @pytest.mark.parametrize(("parts", "gains"), [(1, ["4"]), (2, ["3", "5"]), (3, ["8/3", "4", "16/3"])])
 def test_parts_have_their_middles(parts, gains):
     found = replace(SLOW, parts=parts).models(BY_HAND)
     assert found == tuple(replace(BY_HAND.model, gain=F(gain)) for gain in gains)
-    assert SlowGain(parts=16, growth=F(1, 9)).models(BY_HAND)[15].gain == 2 * (3 - F(1, 16))
+    assert VaryingGain(parts=16, growth=F(1, 9)).models(BY_HAND)[15].gain == 2 * (3 - F(1, 16))
 
 
 def test_friction_of_the_rate_has_no_slow_gain():
@@ -80,7 +80,7 @@ def test_gains_of_one_part_follow_those_of_the_other(monkeypatch):
     for rates in ([-3], [-3, -5]):
         parts = [(F(rate), rate + F(1, 2)) for rate in rates]
         expected = {("y", name): tuple(v for part in parts for v in (name, part[name == "aged"])) for name in whole}
-        assert module.slow_gains([loop_of(F(rate)) for rate in rates], F(1, 2)) == expected
+        assert module.varying_gain_norms([loop_of(F(rate)) for rate in rates], F(1, 2)) == expected
 
 
 def test_a_spread_takes_the_place_of_the_half_range_and_brings_an_input_of_the_past():
@@ -118,7 +118,7 @@ def claims_of(slip_error, kept=BOUNDS):
 def test_bounds_are_asked_for_the_spread_of_the_slip_error_that_is_claimed(asked):
     answers, questions = asked
     answers.append(BOUNDS)
-    claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1, 3)), slow_gain=SLOW)
+    claim = TrackingProof(task=TASK, sampled_loop=HELD, claims=claims_of(F(1, 3)), varying_gain=SLOW)
     assert claim.recomputed() is BOUNDS
     spread = SLOW.spread(TASK, F(1, 3))
     assert questions == [(TASK, {key: 2 * v for key, v in GAINS.items()}, None, F(1, 10), HELD.noise, spread, F(0))]
@@ -136,7 +136,7 @@ def test_bounds_are_asked_for_the_spread_of_the_slip_error_that_is_claimed(asked
 def test_the_claim_on_which_the_spread_rests_exceeds_the_bound(asked, monkeypatch, slow, claimed, verdict):
     asked[0].append(BOUNDS)
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: BOUNDS)
-    assert TrackingProof(task=TASK, held=HELD, claims=claims_of(claimed), slow_gain=slow).check() is verdict
+    assert TrackingProof(task=TASK, sampled_loop=HELD, claims=claims_of(claimed), varying_gain=slow).check() is verdict
     assert len(asked[1]) == (slow is not None)
 
 
@@ -158,7 +158,7 @@ def test_claims_are_those_that_their_own_spread_gives(asked, found):
     assert claims[-1] <= tried[-1]
     assert [given[5] for given in questions] == [SLOW.spread(TASK, slip) for slip in tried]
     assert result == TrackingProof(
-        task=TASK, held=HELD, slow_gain=SLOW,
+        task=TASK, sampled_loop=HELD, varying_gain=SLOW,
         claims=replace(Claims.of(TASK, BOUNDS).rounded(), slip_error=UpperBound(claims[-1])),
     )  # fmt: skip
 
@@ -181,7 +181,7 @@ def test_loops_that_are_not_stable_have_no_bounds(asked, monkeypatch):
         raise ParameterError("not stable.")
 
     monkeypatch.setattr(module, "norms", refuse)
-    claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1)), slow_gain=SLOW)
+    claim = TrackingProof(task=TASK, sampled_loop=HELD, claims=claims_of(F(1)), varying_gain=SLOW)
     for found in (claim.recomputed(), guarantee(TASK, HELD, SLOW)):
         assert (
             found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or decays too slowly"
@@ -190,7 +190,7 @@ def test_loops_that_are_not_stable_have_no_bounds(asked, monkeypatch):
 
 
 def test_the_file_names_a_slow_gain_where_there_is_one():
-    claim = TrackingProof(task=TASK, held=HELD, claims=claims_of(F(1)))
+    claim = TrackingProof(task=TASK, sampled_loop=HELD, claims=claims_of(F(1)))
     assert "slow_gain" not in json.loads(guarantee_text(claim))
-    written = json.loads(guarantee_text(replace(claim, slow_gain=SLOW)))
+    written = json.loads(guarantee_text(replace(claim, varying_gain=SLOW)))
     assert written["slow_gain"] == {"parts": 2, "growth": "1/9"}

@@ -71,7 +71,7 @@ def claims(log_rate="1/2", log_state="1/18", slip_error="4e-5", push=380000, ask
     return SlidingClaims(**{name: UpperBound(F(value)) for name, value in given.items()})
 
 
-CLAIM = SlidingProof(task=task(), held=LAGGED, cuts=(None,), claims=claims())
+CLAIM = SlidingProof(task=task(), sampled_loop=LAGGED, cuts=(None,), claims=claims())
 
 
 @pytest.mark.parametrize("chords", [small_gain.chords, standalone.sector], ids=["package", "standalone"])
@@ -120,7 +120,7 @@ def test_the_ranges_that_are_said_lie_inside_those_that_are_proved(half):
 
 def paired(one, held, given):
     """Bounds of both checkers for one cell."""
-    document = json.loads(guarantee_text(replace(CLAIM, task=one, held=held, claims=given)))
+    document = json.loads(guarantee_text(replace(CLAIM, task=one, sampled_loop=held, claims=given)))
     fault, numbers = standalone.read_fault(document), {name: F(v) for name, v in document["claims"].items()}
     loop, path = standalone.read_path(document["loop"])
     cell = standalone.Cell(fault, path, numbers, fault.normal(numbers["push"]))
@@ -149,7 +149,7 @@ UNSURE = {
 def alone(one, held=LAGGED, given=None):
     """The standalone checker's cell of a task."""
     given = given or claims()
-    document = json.loads(guarantee_text(replace(CLAIM, task=one, held=held, claims=given)))
+    document = json.loads(guarantee_text(replace(CLAIM, task=one, sampled_loop=held, claims=given)))
     fault, numbers = standalone.read_fault(document), {name: F(v) for name, v in document["claims"].items()}
     return standalone.Cell(fault, standalone.read_path(document["loop"])[1], numbers, fault.normal(numbers["push"]))
 
@@ -191,7 +191,7 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction, swing):
     one = task(ranges=UNSURE, ramp=F(14), damping=F(5 * 10**20), swing=swing, **friction)
     held = SampledLoop(law=STIFF, step=F(200), **path)
     cell, model = alone(one, held), small_gain.model_of(one, claims())
-    plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, held=held)))["loop"])
+    plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, task=one, sampled_loop=held)))["loop"])
     theirs, ours = standalone.around(plain, cell), small_gain.loop_of(held, model, one)
     assert [list(row) for row in ours.flow] == theirs.flow
     assert [list(row) for row in ours.inputs.values()] == theirs.inputs[: len(ours.inputs)]
@@ -227,7 +227,7 @@ def test_both_checkers_make_the_same_of_gains(path, friction, monkeypatch):
         return [list(made_up[output, name]) for output in OUTPUTS[: len(ours.outputs)]]
 
     monkeypatch.setattr(standalone, "gains", gains)
-    plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, held=held)))["loop"])
+    plain, _ = standalone.read_path(json.loads(guarantee_text(replace(CLAIM, sampled_loop=held)))["loop"])
     theirs, small = standalone.bounds(plain, alone(one, held))
     found = small_gain.bounds_from(one, held, claims(), ours, made_up, phases)
     assert set(names) >= {"drift", "reference"}
@@ -461,7 +461,7 @@ def test_the_state_that_ages_fastest_counts():
 @pytest.mark.parametrize("delay", [0, 20, 50, 70])
 def test_what_is_asked_is_read_at_the_valve(delay):
     held = replace(LAGGED, delay=F(delay))
-    document = json.loads(guarantee_text(replace(CLAIM, held=held)))
+    document = json.loads(guarantee_text(replace(CLAIM, sampled_loop=held)))
     loop = small_gain.loop_of(held, small_gain.model_of(task(), claims()), task())
     read = standalone.read_path(document["loop"])[0].outputs[-1]
     assert read == [int(state == "valve") for state in loop.states]
@@ -630,7 +630,7 @@ PATHS["through a diffusion path of L^2/D = 40 s"] = {"diffusion": F(40)}
 
 @pytest.mark.parametrize("given", PATHS)
 def test_a_sentence_names_what_lies_between_law_and_fault_and_nothing_else(given):
-    sentence = replace(CLAIM, held=SampledLoop(law=STIFF, step=F(50), **PATHS[given])).sentence()
+    sentence = replace(CLAIM, sampled_loop=SampledLoop(law=STIFF, step=F(50), **PATHS[given])).sentence()
     assert [words for words in PATHS if words in sentence] == [given]
     assert " 0 s" not in sentence
 
@@ -820,12 +820,15 @@ def test_half_a_pascal_of_normal_stress_does_not_open_the_fault():
 def test_the_statement_has_the_conditions_inward_and_the_bounds_outward(changes, noise, monkeypatch):
     wide = task(name="a patch", **changes)
     wide = replace(wide, ranges=wide.ranges | {"coefficient": (F(3, 10), F(3, 5))})
-    claim = replace(CLAIM, task=wide, held=replace(LAGGED, slip_noise=F(noise)))
+    claim = replace(CLAIM, task=wide, sampled_loop=replace(LAGGED, slip_noise=F(noise)))
     bounds = dict.fromkeys(standalone.CLAIMS, F(0)), F(1, 3)
     monkeypatch.setattr(standalone, "bounds", lambda *_: bounds)
     first, law, disturbance, _, _, fault, valve, *_ = standalone.verify(json.loads(guarantee_text(claim)))
     assert first.startswith('fault "a patch" (a label; ')
-    assert ("with the slip law" in first, "with the ageing law" in first) == (wide.swing > 0, wide.swing == 0)
+    assert ("with the slip law" in first, "with the ageing law" in first) == (
+        wide.swing > 0,
+        wide.swing == 0,
+    )
     assert law.endswith(" of the true one") is (noise != "0")
     assert (f"within {noise} m" in law) is (noise != "0")
     assert ("whose rate stays within (1 +- 0.05)" in disturbance) is (wide.swing > 0)
@@ -880,6 +883,6 @@ def test_the_task_is_that_of_the_fault():
 @pytest.mark.parametrize("changes", [{"jitter": F(1)}, {"delay_jitter": F(1)}, {"pump": Pump(rate=F(1)), "ramp": F(1)}])
 def test_jitter_and_the_rate_of_a_pump_are_refused_not_ignored(changes):
     known = parse_guarantee((PROOFS / "certificates" / "sliding_crustal-patch.json").read_text())
-    off = replace(known, held=replace(known.held, **changes))
+    off = replace(known, sampled_loop=replace(known.sampled_loop, **changes))
     with pytest.raises(ParameterError, match="no guarantee with jitter, averaging or the rate limit"):
         off.check()

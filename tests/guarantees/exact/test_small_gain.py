@@ -10,7 +10,7 @@ from quakedesign.fault import load_fault
 from quakedesign.guarantees import Bounds, NoProof
 from quakedesign.guarantees.exact.sampled_loop import NOISELESS, channels_of
 from quakedesign.guarantees.exact.small_gain import bounds_from, spectral_radius
-from quakedesign.laws import ImplicitRoot, Power
+from quakedesign.laws import ImplicitStep, Power
 from quakedesign.plant import uncertain_plant
 
 STEP = F("0.184")
@@ -85,7 +85,7 @@ def test_one_channel_is_the_scalar_small_gain():
 
 
 @pytest.mark.parametrize("task", [TASK, LIMITED], ids=["amplitude", "rate"])
-@pytest.mark.parametrize("root", [None, ImplicitRoot(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))])
+@pytest.mark.parametrize("root", [None, ImplicitStep(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))])
 @pytest.mark.parametrize("noise", [{}, NOISE, {"rate_noise": F(1, 10**4)}], ids=["quiet", "noisy", "noisy rate"])
 def test_the_inputs_are_the_fixed_point_of_what_the_outputs_make_of_them(task, root, noise):
     """W ← F + MW from 0, a thousand times in floats."""
@@ -111,7 +111,7 @@ def test_noise_adds_what_its_gains_make_of_it():
 
 def test_the_root_of_a_noisy_step_may_lie_wider_by_the_noise():
     """|w + γe1/T_s| ≤ δγ|e1 + n1|/T_s + ε."""
-    root = ImplicitRoot(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))
+    root = ImplicitStep(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))
     found = {c.name: c for c in channels_of(TASK, root, STEP, NOISE)}
     assert found["root"].own == F(1, 10**6) + F(1, 20) / STEP * NOISE["slip_noise"]
     assert [found[name].own for name in NOISE] == list(NOISE.values())
@@ -119,7 +119,7 @@ def test_the_root_of_a_noisy_step_may_lie_wider_by_the_noise():
 
 
 def test_a_loop_through_the_implicit_step_can_fail_by_itself():
-    root = ImplicitRoot(pull=PULL, slopes=(F(0), F(1)))
+    root = ImplicitStep(pull=PULL, slopes=(F(0), F(1)))
     found = bounds(TASK, gains(root=(F("0.4"), 2, 13)), root, STEP)
     assert isinstance(found, NoProof)
     assert found.small_gain >= 1
@@ -159,7 +159,7 @@ def test_the_reason_is_the_largest_share_in_the_worst_part_of_the_period():
 def test_what_is_measured_at_another_time_is_off_by_what_moves_until_then():
     """J = 1/50 s: J(|e2| + r′), and J(|r″| + F) with J times the largest slopes for e1, e2 and the push."""
     jitter, noise = F(1, 50), {"slip_noise": F(1, 3), "rate_noise": F(0)}
-    root = ImplicitRoot(pull=PULL, slopes=(F(1, 2), F(1)), remainder=F(1, 9))
+    root = ImplicitStep(pull=PULL, slopes=(F(1, 2), F(1)), remainder=F(1, 9))
     found = {c.name: c for c in channels_of(TASK, root, STEP, noise, None, jitter)}
     first, second = TASK.reference_rates
     force = TASK.reference_force + TASK.amplitude

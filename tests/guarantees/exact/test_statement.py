@@ -13,7 +13,7 @@ from quakedesign.guarantees.exact import tracking_proof as continuous
 from quakedesign.guarantees.exact import tracking_proof as statement
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.exact.tracking_proof import above, sentence_of
-from quakedesign.laws import ImplicitRoot, LinearLaw, Power, compensated, summed_integrals
+from quakedesign.laws import ImplicitStep, LinearLaw, Power, compensated, summed_integrals
 from quakedesign.loop import ContinuousLaw, Instants
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -33,7 +33,7 @@ CLAIMS = Claims(
 BOUNDS = Bounds(slip_error=F(0), slip_rate_error=F(1, 7), push=3 * TASK.authority, small_gain=F(1, 2))
 NONE = NoProof(reason="none")
 HELD = SampledLoop(law=summed_integrals((F(5), F(3), F(7), F(2)), F(1, 10)), step=F(1, 10))
-SIGN = ImplicitRoot(pull=(Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip"),),
+SIGN = ImplicitStep(pull=(Power(factor=(F(1, 3), F(1, 3)), exponent=F(0), argument="slip"),),
                     slopes=(F(0), F(0)), remainder=F(0))  # fmt: skip
 ROOTED = SampledLoop(law=compensated(SIGN, F(1, 2), F(1)), step=F(1))
 NAMES = tuple(Claims.__dataclass_fields__)
@@ -116,10 +116,15 @@ def test_parameters_are_said_to_be_constant_for_a_spring_that_stiffens_at_once_p
 
 def test_noise_is_said_and_must_be_of_what_is_measured():
     alone = LinearLaw(
-        states=("z",), update=((F(1),),), measured=((F(1), F(0)),), output=(F(1),), feedback=(F(1), F(0)), root=None
+        states=("z",),
+        update=((F(1),),),
+        measured=((F(1), F(0)),),
+        output=(F(1),),
+        feedback=(F(1), F(0)),
+        implicit_step=None,
     )
     both = SampledLoop(law=replace(alone, feedback=(F(1), F(1))), step=F(1), slip_noise=F(1, 3), rate_noise=F(2, 3))
-    said = TrackingProof(task=TASK, held=both, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, sampled_loop=both, claims=CLAIMS).sentence()
     told = "with zero-order hold over 1 s, with any noise of at most 0.333333 m in the measured slip, "
     assert told + "with any noise of at most 0.666666 m/s in the measured slip rate, for every" in said
     assert (both.noise, replace(both, slip_noise=F(0)).noise) == (
@@ -129,7 +134,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     quiet = SampledLoop(law=alone, step=F(1))
     assert (quiet.noise, quiet.setup) == ({}, ExactSetup())
     assert replace(quiet, lag=F(1, 2), ramp=F(1, 4)).setup == ExactSetup(lag=F(1, 2))
-    said = TrackingProof(task=TASK, held=quiet, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, sampled_loop=quiet, claims=CLAIMS).sentence()
     assert "with zero-order hold over 1 s, with the slip alone measured, for every" in said
     assert SampledLoop(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
     with pytest.raises(ParameterError, match="needs a law that measures the slip rate"):
@@ -148,10 +153,10 @@ def test_claims_are_shown_as_the_exact_numbers():
 
 def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     held = SampledLoop(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
-    said = TrackingProof(task=TASK, held=held, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, sampled_loop=held, claims=CLAIMS).sentence()
     where = "on the plant without stick, from rest, with zero-order hold over 0.1 s"
     assert said.startswith(f"{where}, with a delay of 0.02 s, through a lag of 0.03 s, for every disturbance")
-    assert TrackingProof(task=TASK, held=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
+    assert TrackingProof(task=TASK, sampled_loop=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
     assert "never exceeds 286 mm/s, the slip stays within 334 mm of the reference" in said
     assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, commanded" in said
 
@@ -176,18 +181,18 @@ def test_a_law_runs_once_a_step_without_delay_and_lag_unless_it_has_an_implicit_
 )
 def test_claims_are_proved_where_the_bounds_give_them_and_the_root_is_as_said(held, found, verdict, monkeypatch):
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: found)
-    assert TrackingProof(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS)).check() is verdict
+    assert TrackingProof(task=TASK, sampled_loop=held, claims=Claims.of(TASK, BOUNDS)).check() is verdict
 
 
 def test_a_root_beyond_its_lines_at_the_claims_is_undecided(monkeypatch):
     """w = e2 − sign(e1 + w)/3 is 0 for e1 = 0 where |e2| ≤ 1/3."""
     wide = replace(BOUNDS, slip_rate_error=F(1, 2))
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
-    assert TrackingProof(task=TASK, held=ROOTED, claims=Claims.of(TASK, wide)).check() is Verdict.UNDECIDED
-    assert TrackingProof(task=TASK, held=HELD, claims=Claims.of(TASK, wide)).check() is Verdict.PROVED
+    assert TrackingProof(task=TASK, sampled_loop=ROOTED, claims=Claims.of(TASK, wide)).check() is Verdict.UNDECIDED
+    assert TrackingProof(task=TASK, sampled_loop=HELD, claims=Claims.of(TASK, wide)).check() is Verdict.PROVED
     told = replace(BOUNDS, slip_rate_error=F(1, 3) - F(1, 10**9))
     for noise, verdict in ((F(0), Verdict.PROVED), (F(1, 10**6), Verdict.UNDECIDED)):
-        loud = TrackingProof(task=TASK, held=replace(ROOTED, rate_noise=noise), claims=Claims.of(TASK, told))
+        loud = TrackingProof(task=TASK, sampled_loop=replace(ROOTED, rate_noise=noise), claims=Claims.of(TASK, told))
         monkeypatch.setattr(statement, "certified_bounds", lambda *_: told)
         assert loud.check() is verdict
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: wide)
@@ -203,14 +208,14 @@ def test_a_root_that_is_told_another_slip_may_leave_its_line(monkeypatch):
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: bounds)
     for noise, verdict in ((F(0), Verdict.PROVED), (F(1, 3), Verdict.PROVED), (F(1, 2), Verdict.UNDECIDED)):
         held = SampledLoop(law=compensated(sign, F(1, 2), F(1)), step=F(1), slip_noise=noise)
-        assert TrackingProof(task=TASK, held=held, claims=Claims.of(TASK, bounds)).check() is verdict
+        assert TrackingProof(task=TASK, sampled_loop=held, claims=Claims.of(TASK, bounds)).check() is verdict
 
 
 def test_a_guarantee_claims_the_bounds_a_little_wider_or_has_none(monkeypatch):
     for held in (HELD, ROOTED):
         monkeypatch.setattr(statement, "certified_bounds", lambda *_: BOUNDS)
         claims = Claims.of(TASK, BOUNDS).rounded()
-        assert guarantee(TASK, held) == TrackingProof(task=TASK, held=held, claims=claims)
+        assert guarantee(TASK, held) == TrackingProof(task=TASK, sampled_loop=held, claims=claims)
         monkeypatch.setattr(statement, "certified_bounds", lambda *_: NONE)
         assert guarantee(TASK, held) is NONE
 
@@ -228,7 +233,7 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
     asked = []
     monkeypatch.setattr(statement, "certified_bounds", lambda *given: asked.append(given) or NONE)
     late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5), rate_noise=F(1, 9))
-    claim = TrackingProof(task=TASK, held=late, claims=CLAIMS)
+    claim = TrackingProof(task=TASK, sampled_loop=late, claims=CLAIMS)
     assert claim.recomputed() is NONE
     assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)}, F(0))]
     assert tuple(claim.loop.sampled) == ("root", "rate_noise")
@@ -236,10 +241,10 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
 
 
 def test_pressures_at_the_valve_are_those_in_the_fault_where_nothing_lies_between():
-    proof = TrackingProof(task=TASK, held=HELD, claims=CLAIMS)
+    proof = TrackingProof(task=TASK, sampled_loop=HELD, claims=CLAIMS)
     assert proof.valve_pressures == (CLAIMS.least_asked, CLAIMS.largest_asked)
     short = replace(CLAIMS, least_asked=None, largest_asked=None)
-    direct = TrackingProof(task=TASK, held=HELD, claims=short)
+    direct = TrackingProof(task=TASK, sampled_loop=HELD, claims=short)
     assert direct.valve_pressures == (CLAIMS.least_pressure, CLAIMS.largest_pressure)
 
 
@@ -251,7 +256,7 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
     bounds = replace(BOUNDS, push=(TASK.normal_stress - off - TASK.rest_pressure[1]) * TASK.authority)
     assert wide.follow(TASK, bounds) is proved
     monkeypatch.setattr(statement, "_bounds", lambda *_: bounds)
-    found = TrackingProof(task=TASK, held=HELD, claims=wide)
+    found = TrackingProof(task=TASK, sampled_loop=HELD, claims=wide)
     assert found.check() is (Verdict.PROVED if proved else Verdict.UNDECIDED)
     law = ContinuousLaw(states=(), rates=(), measured=(), output=(), feedback=(F(-1), F(-1)))
     monkeypatch.setattr(continuous, "_continuous_bounds", lambda *_: bounds)
@@ -263,11 +268,11 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
 
 def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     held = replace(HELD, jitter=F(1, 300), delay_jitter=F(1, 150))
-    said = TrackingProof(task=TASK, held=held, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, sampled_loop=held, claims=CLAIMS).sentence()
     told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s"
     assert told in said
     assert "5.67 Pa, commanded changes of at most 1.67 Pa a sample" in said
-    late = TrackingProof(task=TASK, held=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
+    late = TrackingProof(task=TASK, sampled_loop=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
     assert "with zero-order hold over 0.1 s, each pressure within 0.00666666 s of its due time, for every" in late
     assert (held.noise, HELD.noise) == ({"slip_noise": 0, "rate_noise": 0}, {})
     assert tuple(held.loop(TASK).sampled) == ("slip_noise", "rate_noise")
@@ -278,12 +283,12 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     assert (HELD.instants, replace(HELD, pump=Pump(least=F(-1), largest=F(1))).instants) == (None, None)
     assert (
         "with a pump of 5 Pa/s, whose limits are never"
-        in TrackingProof(task=TASK, held=paced, claims=CLAIMS).sentence()
+        in TrackingProof(task=TASK, sampled_loop=paced, claims=CLAIMS).sentence()
     )
     mean = replace(HELD, averaging=F(1, 30), jitter=F(1, 300))
-    assert (mean.off, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
+    assert (mean.timing_error, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
     assert tuple(mean.noise) == ("slip_noise", "rate_noise")
-    said = TrackingProof(task=TASK, held=mean, claims=CLAIMS).sentence()
+    said = TrackingProof(task=TASK, sampled_loop=mean, claims=CLAIMS).sentence()
     assert "hold over 0.1 s, each measurement averaged over 0.0333333 s around its instant, each measurement" in said
     for name in ("jitter", "delay_jitter", "averaging", "ramp"):
         with pytest.raises(ParameterError, match="jitter, delay jitter, averaging and ramp must be 0 or more"):
@@ -301,14 +306,14 @@ def test_what_comes_late_may_leave_a_root_its_lines(monkeypatch):
     told = replace(BOUNDS, slip_rate_error=F(1, 3) - F(1, 10**12))
     monkeypatch.setattr(statement, "certified_bounds", lambda *_: told)
     for jitter, verdict in ((F(0), Verdict.PROVED), (F(1, 10), Verdict.UNDECIDED)):
-        late = TrackingProof(task=TASK, held=replace(ROOTED, jitter=jitter), claims=Claims.of(TASK, told))
+        late = TrackingProof(task=TASK, sampled_loop=replace(ROOTED, jitter=jitter), claims=Claims.of(TASK, told))
         assert late.check() is verdict
 
 
 @pytest.mark.parametrize("changes", [{"jitter": F(1, 50)}, {"delay_jitter": F(1, 50)}, {"ramp": F(1, 50)}])
 def test_a_limit_at_rest_waits_for_what_is_late(changes):
     held = replace(HELD, law=replace(HELD.law, applied=(F(0), F(0))))
-    plain = TrackingProof(task=TASK, held=held, claims=Claims.of(TASK, BOUNDS))
-    later = replace(plain, held=replace(plain.held, **changes))
+    plain = TrackingProof(task=TASK, sampled_loop=held, claims=Claims.of(TASK, BOUNDS))
+    later = replace(plain, sampled_loop=replace(plain.sampled_loop, **changes))
     moved = later.rest_limit.width - plain.rest_limit.width
     assert float(moved) == pytest.approx(float(plain.rest_limit.per_slip * TASK.reference_rates[0]) / 50, rel=0.01)

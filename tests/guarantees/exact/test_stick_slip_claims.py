@@ -40,7 +40,7 @@ def proof():
 
 @pytest.fixture(scope="module")
 def bounds(proof):
-    return stick_slip_bounds(proof.task, proof.held, proof.reach)
+    return stick_slip_bounds(proof.task, proof.sampled_loop, proof.invariant_set)
 
 
 def test_the_stored_certificate_holds_and_reaches_what_was_asked(proof, bounds):
@@ -59,15 +59,15 @@ def test_no_claim_may_be_one_percent_sharper(proof, bounds, name):
 
 def test_the_largest_entry_of_each_facet_is_needed(proof):
     """A polytope whose facets all lie 2 % further inside is left; one facet further out is another set."""
-    facets = proof.reach.facets
-    smaller = replace(proof.reach, facets=tuple(tuple(v * F(102, 100) for v in row) for row in facets))
-    assert not stick_slip_guarantee(proof.task, proof.held, smaller).found
+    facets = proof.invariant_set.facets
+    smaller = replace(proof.invariant_set, facets=tuple(tuple(v * F(102, 100) for v in row) for row in facets))
+    assert not stick_slip_guarantee(proof.task, proof.sampled_loop, smaller).available
 
 
 @pytest.mark.parametrize("name", ["rate_gain", "target_gain", "return_rate", "level_gain", "slip_gain"])
 def test_the_set_is_that_of_the_law(proof, name):
-    law = replace(proof.held.law, **{name: getattr(proof.held.law, name) * F(11, 10)})
-    assert not stick_slip_guarantee(proof.task, replace(proof.held, law=law), proof.reach).found
+    law = replace(proof.sampled_loop.law, **{name: getattr(proof.sampled_loop.law, name) * F(11, 10)})
+    assert not stick_slip_guarantee(proof.task, replace(proof.sampled_loop, law=law), proof.invariant_set).available
 
 
 @pytest.mark.parametrize(
@@ -81,8 +81,8 @@ def test_the_set_is_that_of_the_law(proof, name):
     ],
 )
 def test_what_the_theorem_needs_of_the_fault_is_checked(proof, changed, reason):
-    found = stick_slip_guarantee(replace(proof.task, **changed), proof.held, proof.reach)
-    assert not found.found
+    found = stick_slip_guarantee(replace(proof.task, **changed), proof.sampled_loop, proof.invariant_set)
+    assert not found.available
     assert any(part in found.reason for part in reason.split("|"))
 
 
@@ -99,13 +99,13 @@ def test_backward_slip_is_excluded_by_the_shear_stress(proof):
 
 def test_a_period_that_is_long_against_the_plant_is_refused(proof):
     with pytest.raises(ParameterError, match="T_s is too long"):
-        stick_slip_bounds(proof.task, replace(proof.held, step=F(3)), proof.reach)
+        stick_slip_bounds(proof.task, replace(proof.sampled_loop, step=F(3)), proof.invariant_set)
 
 
 def test_the_slip_until_a_stop_is_below_its_bound_and_not_by_far(proof):
     """Greedy courses of y' = -wy - G + phi with G <= -H: coast as long as possible, then brake hardest."""
     found = ranges(proof.task, F(1, 1000), (F(0), F(0)), F(0))
-    pairs, step, amplitude = stop_bounds(proof.task, proof.held, found), float(proof.held.step), 3.2e-4
+    pairs, step, amplitude = stop_bounds(proof.task, proof.sampled_loop, found), float(proof.sampled_loop.step), 3.2e-4
     damping, steps = float(found.damping[0]), 4000
     for start in (1e-5, 3e-5, 8e-5, 1.1e-4):
         largest = 0.0
@@ -127,10 +127,10 @@ def test_the_slip_until_a_stop_is_below_its_bound_and_not_by_far(proof):
 
 def test_the_bounds_of_exponentials_lie_above_them(proof):
     found = ranges(proof.task, F(1, 1000), (F(0), F(0)), F(0))
-    w, step = float(found.damping[0]), float(proof.held.step)
+    w, step = float(found.damping[0]), float(proof.sampled_loop.step)
     room = 1 + float(found.slope[0]) * step**2 / 2
     least = 0.5 + w * step / 24
-    for i, (g, h) in enumerate(stop_bounds(proof.task, proof.held, found)):
+    for i, (g, h) in enumerate(stop_bounds(proof.task, proof.sampled_loop, found)):
         share = least + (1 - least) * i / 5
         m, x = share * step, (1 - share) * step
         exact = (1 - exp(-w * m)) / w / room, 2 * 3.2e-4 * (exp(w * x) - 1 - w * x) / w**2 / room
@@ -202,18 +202,18 @@ def test_numbers_that_no_float_holds_decide_nothing(proof, place, value):
 
 
 def test_facets_of_two_lengths_are_no_polytope(proof):
-    rows = proof.reach.facets
+    rows = proof.invariant_set.facets
     with pytest.raises(ParameterError, match="facets of 3 entries"):
-        replace(proof.reach, facets=(*rows[:-1], rows[-1][:2]))
+        replace(proof.invariant_set, facets=(*rows[:-1], rows[-1][:2]))
 
 
 def test_a_sampling_time_must_be_positive(proof):
     with pytest.raises(ParameterError, match="T_s must be positive, got 0 s"):
-        replace(proof.held, step=F(0))
+        replace(proof.sampled_loop, step=F(0))
 
 
 def test_noise_is_at_most_half_of_what_the_law_takes_for_rest(proof):
-    law = replace(proof.held.law, rest_slip=F("2e-6"))
+    law = replace(proof.sampled_loop.law, rest_slip=F("2e-6"))
     assert SampledStickSlip(law=law, step=F(1), slip_noise=F("1e-6")).noise == {"slip_noise": F("1e-6")}
     for noise in (F("1.01e-6"), F("-1e-9")):
         with pytest.raises(ParameterError, match="slip_noise must be from 0 to half of rest_slip, 2e-06 m"):
@@ -230,15 +230,17 @@ def test_noise_of_the_slip_is_part_of_the_statement():
     assert bounds.peak_slip_rate < F("1.93e-4")  # 3e-4 and 6e-5 m were asked for, with noise of the slip rate besides
     assert max(bounds.slip_behind, bounds.slip_ahead) < F("4.2e-5")
     assert "slip measured within 1 µm and slip rate measured exactly" in noisy.sentence()
-    assert noisy.held.noise == {"slip_noise": F("1e-6")}
-    more = replace(noisy.held, law=replace(noisy.held.law, rest_slip=F("2.4e-6")), slip_noise=F("1.2e-6"))
-    assert not stick_slip_guarantee(noisy.task, more, noisy.reach).found
+    assert noisy.sampled_loop.noise == {"slip_noise": F("1e-6")}
+    more = replace(
+        noisy.sampled_loop, law=replace(noisy.sampled_loop.law, rest_slip=F("2.4e-6")), slip_noise=F("1.2e-6")
+    )
+    assert not stick_slip_guarantee(noisy.task, more, noisy.invariant_set).available
 
 
 def test_the_loop_is_in_its_set_at_first_whatever_the_first_error_is(proof):
     """The set of exact measurements is left at once by an error of 5 cm, before any period."""
-    held = replace(proof.held, law=replace(proof.held.law, rest_slip=F(1, 10)), slip_noise=F(1, 20))
-    assert "first measurement" in stick_slip_guarantee(proof.task, held, proof.reach).reason
+    held = replace(proof.sampled_loop, law=replace(proof.sampled_loop.law, rest_slip=F(1, 10)), slip_noise=F(1, 20))
+    assert "first measurement" in stick_slip_guarantee(proof.task, held, proof.invariant_set).reason
 
 
 def test_without_a_disturbance_the_answer_says_what_is_needed():
@@ -247,13 +249,13 @@ def test_without_a_disturbance_the_answer_says_what_is_needed():
 
 
 def test_bases_that_name_no_constraint_decide_nothing(proof):
-    reach = replace(proof.reach, sliding=(((0, 1, 9999),), *proof.reach.sliding[1:]))
-    assert "by their numbers" in stick_slip_guarantee(proof.task, proof.held, reach).reason
+    reach = replace(proof.invariant_set, sliding=(((0, 1, 9999),), *proof.invariant_set.sliding[1:]))
+    assert "by their numbers" in stick_slip_guarantee(proof.task, proof.sampled_loop, reach).reason
 
 
 def test_pressures_are_those_of_the_farthest_states(proof, bounds):
     """U = 1/b-scaled push by linear programs of another solver; p* from the balance of forces at both ends of mu."""
-    law, rows = proof.held.law, np.array(proof.reach.facets, dtype=float)
+    law, rows = proof.sampled_loop.law, np.array(proof.invariant_set.facets, dtype=float)
     size = 1 / np.abs(rows[:5].sum(axis=1))[[0, 1, 2]]
     push = np.array([float(law.target_gain * law.return_rate), float(law.rate_gain), 1.0]) * size
     low, high = (
@@ -273,16 +275,19 @@ def test_pressures_are_those_of_the_farthest_states(proof, bounds):
 @pytest.mark.parametrize(("kind", "reason"), [("sliding", "in a period that slides"), ("resting", "that ends at rest")])
 def test_each_map_is_decided(proof, kind, reason):
     """One vertex a polytope bounds no facet well, in the map whose vertices are missing."""
-    few = tuple(line[:1] for line in getattr(proof.reach, kind))
+    few = tuple(line[:1] for line in getattr(proof.invariant_set, kind))
     # U is bounded by the vertices of the slices as well, so that these keep theirs but for the first slice
-    lines = few if kind == "resting" else (few[0], *proof.reach.sliding[1:])
-    assert reason in stick_slip_guarantee(proof.task, proof.held, replace(proof.reach, **{kind: lines})).reason
+    lines = few if kind == "resting" else (few[0], *proof.invariant_set.sliding[1:])
+    assert (
+        reason
+        in stick_slip_guarantee(proof.task, proof.sampled_loop, replace(proof.invariant_set, **{kind: lines})).reason
+    )
 
 
 @pytest.mark.slow
 def test_a_vertex_of_dependent_constraints_is_left_out(proof, bounds):
-    more = tuple((*line, (0, 0, 0)) for line in proof.reach.sliding)
-    assert stick_slip_bounds(proof.task, proof.held, replace(proof.reach, sliding=more)) == bounds
+    more = tuple((*line, (0, 0, 0)) for line in proof.invariant_set.sliding)
+    assert stick_slip_bounds(proof.task, proof.sampled_loop, replace(proof.invariant_set, sliding=more)) == bounds
 
 
 def test_a_disturbance_must_outweigh_the_range_of_the_input_gain(proof, monkeypatch):
@@ -290,21 +295,25 @@ def test_a_disturbance_must_outweigh_the_range_of_the_input_gain(proof, monkeypa
     found = ranges(proof.task, F(1, 1000), (F(0), F(0)), F(0))
     width, growth = (1.3786 + 0.48) / 2, 1 / (1 - 1.3786 * 0.184**2 / 2)
     size = width * growth * 0.184**2 / 2 * 1.8824e-8 * 0.425 * 40_000
-    assert float(stick_slip_set._bracket(proof.task, proof.held, found, F(40_000))) == pytest.approx(size, rel=2e-3)
-    assert stick_slip_set._bracket(proof.task, proof.held, found, F(-1)) == 0
+    assert float(stick_slip_set._bracket(proof.task, proof.sampled_loop, found, F(40_000))) == pytest.approx(
+        size, rel=2e-3
+    )
+    assert stick_slip_set._bracket(proof.task, proof.sampled_loop, found, F(-1)) == 0
     monkeypatch.setattr(stick_slip_set, "sliding_rows", lambda *_: iter(()))
     monkeypatch.setattr(stick_slip_set, "resting_rows", lambda *_: iter(()))
-    stick_slip_bounds(proof.task, proof.held, proof.reach)
+    stick_slip_bounds(proof.task, proof.sampled_loop, proof.invariant_set)
     monkeypatch.setattr(stick_slip_set, "_bracket", lambda *_: proof.task.amplitude + F(1, 10**9))
     with pytest.raises(ParameterError, match="range of the input gain"):
-        stick_slip_bounds(proof.task, proof.held, proof.reach)
+        stick_slip_bounds(proof.task, proof.sampled_loop, proof.invariant_set)
 
 
 def test_a_period_that_ends_at_rest_is_bounded_for_every_reference_rate(proof):
     """n·z after the period, written out, for r' at both ends of each slice and sign of the target rate."""
-    task, held, facets = proof.task, proof.held, proof.reach.facets
+    task, held, facets = proof.task, proof.sampled_loop, proof.invariant_set.facets
     found = ranges(task, F(1, 1000), (F(0), F(0)), F(0))
-    given = [stick_slip_set._exact_array([list(row) for row in rows]) for rows in (facets, proof.reach.multipliers)]
+    given = [
+        stick_slip_set._exact_array([list(row) for row in rows]) for rows in (facets, proof.invariant_set.multipliers)
+    ]
     rows = list(stick_slip_set.resting_rows(stick_slip_set.EXACT, task, held, found, *given))
     law, step, fastest = held.law, held.step, task.reference_rates[0]
     turn, rng = fastest / law.return_rate, np.random.default_rng(4)

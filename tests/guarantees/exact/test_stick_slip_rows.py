@@ -45,11 +45,11 @@ def pair(request):
     law, reach = checker.read_law(document["loop"]), checker.read_reach(document["set"])
     period = checker.Period(rock, task, target, growths, law, reach)
     with ctx.workprec(package.BITS):
-        push = package.pushes(proof.task, proof.held, proof.reach)
-        ahead, rate = proof.reach.box[:2]
-        moved = proof.task.reference_rates[0] * proof.held.longest
-        plant = package.ranges(proof.task, ahead + moved, push, rate * proof.held.longest)
-        periods = package.Period.deciding(package.BALLS, proof.task, proof.held, plant, rate, push)
+        push = package.feedback_range(proof.task, proof.sampled_loop, proof.invariant_set)
+        ahead, rate = proof.invariant_set.box[:2]
+        moved = proof.task.reference_rates[0] * proof.sampled_loop.longest
+        plant = package.ranges(proof.task, ahead + moved, push, rate * proof.sampled_loop.longest)
+        periods = package.Period.deciding(package.BALLS, proof.task, proof.sampled_loop, plant, rate, push)
     return proof, period, periods, push
 
 
@@ -70,9 +70,9 @@ def test_pressures_and_ranges_of_the_plant_agree(pair):
 def test_slips_before_a_stop_and_polytopes_agree(pair):
     proof, period, periods, _ = pair
     plant = periods[0].plant
-    stops = package.stop_bounds(proof.task, proof.held, plant)
+    stops = package.stop_bounds(proof.task, proof.sampled_loop, plant)
     assert all(close(*two) for a, b in zip(stops, period.stops(), strict=True) for two in zip(a, b, strict=True))
-    lines = package.polytopes(proof.task, proof.held, proof.reach.facets, plant)
+    lines = package.polytopes(proof.task, proof.sampled_loop, proof.invariant_set.facets, plant)
     for ours, other in zip(lines, period.slices, strict=False):
         assert [(tuple(row), end) for row, end in ours] == [(tuple(row), end) for row, end in other]
     resting = [lines[package.SLICES + place] for place in (0, 2, 4, 5)]
@@ -92,7 +92,7 @@ def test_images_of_facets_after_a_sliding_period_agree(pair):
     proof, period, periods, _ = pair
     sizes = period.sizes[2]
     sizes = [max(period.ahead, period.behind), *sizes[1:]]
-    facets, multipliers = proof.reach.facets[SOME], proof.reach.multipliers[SOME]
+    facets, multipliers = proof.invariant_set.facets[SOME], proof.invariant_set.multipliers[SOME]
     for ours, interval in ((periods[0], period.law.intervals[0]), (periods[-1], period.law.intervals[-1])):
         period.respond(interval)
         found = {(facet, cut): [] for facet in range(len(facets)) for cut in (False, True)}
@@ -114,10 +114,10 @@ def test_images_of_facets_after_a_sliding_period_agree(pair):
 def test_images_of_facets_after_a_period_that_ends_at_rest_agree(pair):
     proof, period, periods, _ = pair
     sizes = [max(period.ahead, period.behind), *period.sizes[2][1:], period.longest]
-    facets, multipliers = proof.reach.facets[SOME], proof.reach.multipliers[SOME]
+    facets, multipliers = proof.invariant_set.facets[SOME], proof.invariant_set.multipliers[SOME]
     found = {facet: set() for facet in range(len(facets))}
     arrays = [package._exact_array([list(row) for row in rows]) for rows in (facets, multipliers)]
-    for rows in package.resting_rows(package.EXACT, proof.task, proof.held, periods[0].plant, *arrays):
+    for rows in package.resting_rows(package.EXACT, proof.task, proof.sampled_loop, periods[0].plant, *arrays):
         for facet, row, constant in zip(rows.which, rows.factors, rows.constants, strict=True):
             first = package.COMBINATIONS[rows.place - package.SLICES]
             found[facet].add((first[:2], *(f"{v:.9e}" for v in scaled(sizes, row, constant))))
@@ -137,12 +137,12 @@ def test_the_loss_to_the_range_of_the_input_gain_agrees(pair):
     step, least = period.law.longest_interval, 0 if period.law.longest else 1
     share = period.per_slip * step**2 / 2 + period.per_rate * step * (1 + period.slope[1] * period.growth * step**2)
     loss = share * period.task.b * (period.task.beta[1] - least) * max(period.push[1], F(0))
-    assert close(package._bracket(proof.task, proof.held, periods[0].plant, push[1]), loss)
+    assert close(package._bracket(proof.task, proof.sampled_loop, periods[0].plant, push[1]), loss)
 
 
 def test_the_pressure_before_a_stop_counts_only_where_it_is_positive(pair):
     proof, _, periods, _ = pair
-    assert package._bracket(proof.task, proof.held, periods[0].plant, F(-1)) == 0
+    assert package._bracket(proof.task, proof.sampled_loop, periods[0].plant, F(-1)) == 0
 
 
 def test_margins_between_intervals_agree(pair):

@@ -56,7 +56,7 @@ class Moved:
 
 def numbers(claim, force=None):
     """What a guarantee says of its loop; a bound of φ of its own in place of amplitude and reference."""
-    held, law, task = claim.held, claim.held.law, claim.task
+    held, law, task = claim.sampled_loop, claim.sampled_loop.law, claim.task
     floats = lambda m: np.array(m, dtype=float)  # noqa: E731
     return Held(
         F=floats(law.update),
@@ -188,7 +188,7 @@ class _Schedule:
     """Measurements and pressures of courses that differ in when they happen."""
 
     def __init__(self, held, off, pieces, late, courses):
-        self.held, self.off, self.pieces, self.late = held, off, pieces, late
+        self.sampled_loop, self.off, self.pieces, self.late = held, off, pieces, late
         self.z, self.v = np.zeros((len(held.C), courses)), np.zeros(courses)
         self.asked = np.zeros((len(off.measured), courses))
         self.target = np.zeros(courses)
@@ -206,10 +206,10 @@ class _Schedule:
         for n in range(max(k // self.pieces - 1, 0), min(k // self.pieces + 2, len(self.asked))):
             now = self.measured(n) == k
             if now.any():
-                y = e if self.held.ends is None else np.vstack([e, self.held.ends(e[0], e[1])])
-                asked = self.held.b * (self.held.C @ self.z + self.held.D @ y)
+                y = e if self.sampled_loop.ends is None else np.vstack([e, self.sampled_loop.ends(e[0], e[1])])
+                asked = self.sampled_loop.b * (self.sampled_loop.C @ self.z + self.sampled_loop.D @ y)
                 self.asked[n] = np.where(now, asked, self.asked[n])
-                self.z = np.where(now, self.held.F @ self.z + self.held.G @ y, self.z)
+                self.z = np.where(now, self.sampled_loop.F @ self.z + self.sampled_loop.G @ y, self.z)
         first = (k - self.late) // self.pieces
         for n in range(max(first - 1, 0), min(first + 2, len(self.asked))):
             due = np.maximum(n * self.pieces + self.late + self.off.arrived[n], self.measured(n))

@@ -38,7 +38,7 @@ ROWS = {
 def proved(row):
     name, changes, _ = ROWS[row]
     known = parse_guarantee((PROOFS / f"guarantee_{name}.json").read_text())
-    return guarantee(known.task, replace(known.held, **changes), known.slow_gain)
+    return guarantee(known.task, replace(known.sampled_loop, **changes), known.varying_gain)
 
 
 def deadbeat(e1, e2):
@@ -46,7 +46,7 @@ def deadbeat(e1, e2):
 
 
 def numbers(claim):
-    return replace(attacker.numbers(claim), ends=deadbeat if claim.held.law.root else None)
+    return replace(attacker.numbers(claim), ends=deadbeat if claim.sampled_loop.law.implicit_step else None)
 
 
 def moved(claim, held, periods, courses, seed, along=None):
@@ -55,9 +55,9 @@ def moved(claim, held, periods, courses, seed, along=None):
     pace = np.where(np.arange(courses) % 2, 0.5, 0.1)
     signs = 1 - 2 * (np.cumsum(random.random(count) < pace, axis=0) % 2)
     grain = held.step / PIECES
-    off, more = (round(float(v) / grain) for v in (claim.held.jitter, claim.held.delay_jitter))
+    off, more = (round(float(v) / grain) for v in (claim.sampled_loop.jitter, claim.sampled_loop.delay_jitter))
     others = np.where(random.random(courses) < 0.5, signs, 1 - 2 * random.integers(2, size=count))
-    mean = round(float(claim.held.averaging) / grain)
+    mean = round(float(claim.sampled_loop.averaging) / grain)
     return attacker.Moved(
         measured=off * signs + mean // 2, arrived=off * signs + more * others, rate=_rate(claim), mean=mean
     )
@@ -65,7 +65,7 @@ def moved(claim, held, periods, courses, seed, along=None):
 
 def _rate(claim):
     """How fast b·p changes in the pump [m/s³]; None for at once."""
-    pump = claim.held.pump
+    pump = claim.sampled_loop.pump
     return None if pump is None else float(pump.rate * claim.task.authority)
 
 
@@ -95,7 +95,7 @@ def test_no_course_leaves_the_claims_and_some_come_near(row):
 def test_no_mixed_course_of_ten_thousand_leaves_the_claims(row):
     claim, periods, courses = proved(row), 40, 10_000
     held = numbers(claim)
-    held = held if claim.slow_gain else replace(held, slope=0.0)
+    held = held if claim.varying_gain else replace(held, slope=0.0)
     choose, _ = attacker.mixed(held, PIECES, courses, seed=4, memory=20)
     off = moved(claim, held, periods, courses, seed=6)
     slip, rate = attacker.run(held, periods, PIECES, choose, courses, off=off)[0].max(axis=1)
@@ -106,7 +106,7 @@ def test_no_mixed_course_of_ten_thousand_leaves_the_claims(row):
 @few("row", ["jitter", "of the delay", "sliding mode"], every=3)
 def test_the_search_stays_inside_and_finds_more_than_on_time(row):
     claim = proved(row)
-    on_time = replace(claim, held=replace(claim.held, jitter=F(0), delay_jitter=F(0)))
+    on_time = replace(claim, sampled_loop=replace(claim.sampled_loop, jitter=F(0), delay_jitter=F(0)))
     seen, before = map(worst_tracking, (claim, on_time))
     assert 1.002 * before.slip_error < seen.slip_error <= claim.claims.slip_error
     assert before.slip_rate_error < seen.slip_rate_error <= claim.claims.slip_rate_error
@@ -135,7 +135,7 @@ def test_the_search_with_stick_stays_inside():
 )
 def test_events_are_moved_as_far_as_they_may_be_and_keep_their_order(changes, delay, off, early):
     known = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
-    held = replace(known.held, **{name: F(v) for name, v in changes.items()})
+    held = replace(known.sampled_loop, **{name: F(v) for name, v in changes.items()})
     plain, samples, pressures = _on_time(held)
     assert (plain.delay, samples, pressures) == tuple(map(F, (delay, off, early)))
     assert (plain.jitter, plain.delay_jitter, plain.instants) == (0, 0, None)
@@ -148,18 +148,20 @@ def test_events_are_moved_as_far_as_they_may_be_and_keep_their_order(changes, de
 
 def test_the_floats_of_a_design_know_of_jitter():
     claim = proved("jitter")
-    anyhow = guarantee(claim.task, claim.held)
-    bounds, guessed = anyhow.recomputed(), estimated(claim.task, claim.held).bounds
+    anyhow = guarantee(claim.task, claim.sampled_loop)
+    bounds, guessed = anyhow.recomputed(), estimated(claim.task, claim.sampled_loop).bounds
     assert float(guessed.slip_rate_error) == pytest.approx(float(bounds.slip_rate_error), rel=0.04)
     assert float(guessed.stepped) == pytest.approx(float(bounds.stepped), rel=0.04)
 
 
 def test_a_pump_is_as_slow_as_it_may_be_where_it_has_a_ramp_that_closes():
     claim = proved("slow pump")
-    assert claim.held.pump.rate * claim.held.ramp >= claim.claims.largest_step
-    slower = replace(claim.held, pump=Pump(rate=F(1_000_000)), ramp=F(0))
-    none = guarantee(claim.task, slower, claim.slow_gain)
+    assert claim.sampled_loop.pump.rate * claim.sampled_loop.ramp >= claim.claims.largest_step
+    slower = replace(claim.sampled_loop, pump=Pump(rate=F(1_000_000)), ramp=F(0))
+    none = guarantee(claim.task, slower, claim.varying_gain)
     assert isinstance(none, NoProof)
     assert "jitter, or the duration of a pressure change contributes" in none.reason
-    narrow = replace(claim, held=replace(claim.held, pump=Pump(rate=claim.held.pump.rate * F(9, 10))))
+    narrow = replace(
+        claim, sampled_loop=replace(claim.sampled_loop, pump=Pump(rate=claim.sampled_loop.pump.rate * F(9, 10)))
+    )
     assert narrow.check() is Verdict.UNDECIDED

@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import expm
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_compensated, design_held, tightened
+from quakedesign.guarantees import design_compensated, design_sampled_law, tightened
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.tracking_result import with_worst_case as beside_searches
@@ -64,10 +64,10 @@ def designed(row):
         claim = tightened(made.proof)
         held = attacker.sliding(made.controller, made.weight, made.authority, claim, float(task.authority))
     else:
-        claim = design_held(task, step, setup=setup, **wanted)
+        claim = design_sampled_law(task, step, setup=setup, **wanted)
         claim = beside_searches(fault, claim).proof if kind == "rate" else claim  # claims with room for stick
         held = attacker.numbers(claim, force=task.amplitude if kind == "rate" else None)
-    return claim, held if claim.slow_gain else replace(held, slope=0.0)  # any course of the gain where none is slow
+    return claim, held if claim.varying_gain else replace(held, slope=0.0)  # any course of the gain where none is slow
 
 
 def attacked(of, times, courses, seed, sticks=False):
@@ -85,8 +85,8 @@ def shipped(name):
     """A guarantee among the shipped proofs and the numbers of its loop."""
     claim = parse_guarantee((PROOFS / f"guarantee_{name}.json").read_text())
     held = attacker.numbers(claim)
-    ends = (lambda e1, e2: -e1 / held.step) if claim.held.law.root else None
-    return claim, replace(held, ends=ends, slope=held.slope if claim.slow_gain else 0.0)
+    ends = (lambda e1, e2: -e1 / held.step) if claim.sampled_loop.law.implicit_step else None
+    return claim, replace(held, ends=ends, slope=held.slope if claim.varying_gain else 0.0)
 
 
 @pytest.mark.parametrize("sticks", [False, True])

@@ -31,7 +31,7 @@ def numbers(rows):
 @cache
 def flows():
     """For every length and vertex of (β, s), a part of an interval on e1, e2, p, p* and pushes of size 1."""
-    task, step = claim().task, float(claim().held.step)
+    task, step = claim().task, float(claim().sampled_loop.step)
     b, force = float(task.authority), float(task.reference_force + task.amplitude)
     found = np.empty((len(LENGTHS), 4, 4, 6))
     for vertex, (beta, slip) in enumerate(product(map(float, task.beta), map(float, task.slip_chord))):
@@ -119,10 +119,10 @@ def test_intervals_that_change_do_more_than_the_longest_or_the_shortest_alone():
 
 @pytest.mark.slow
 def test_the_search_stays_inside_and_finds_more_than_by_a_clock():
-    held = claim().held
+    held = claim().sampled_loop
     seen = worst_tracking(claim())
     clocks = [replace(held, step=v, longest_step=F(0)) for v in (held.step, held.longest_step)]
-    before = [worst_tracking(replace(claim(), held=clock, reach=None)) for clock in clocks]
+    before = [worst_tracking(replace(claim(), sampled_loop=clock, reach=None)) for clock in clocks]
     assert max(v.slip_error for v in before) < seen.slip_error <= claim().claims.slip_error
     assert max(v.slip_rate_error for v in before) < seen.slip_rate_error <= claim().claims.slip_rate_error
     stuck = worst_tracking(claim(), sticks=True)

@@ -11,7 +11,7 @@ import pytest
 from thinned import few
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_held
+from quakedesign.guarantees import design_sampled_law
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
@@ -26,7 +26,7 @@ WELLS = {1: (1.2e-4, 1.5), 2: (2.0e-4, 1.5), 5: (6e-4, 2)}  # L²/D [s]: certifi
 
 @cache
 def through(rock):
-    return design_held(uncertain_plant(REAL), STEP, objective="peak", setup=ExactSetup(diffusion=F(rock)))
+    return design_sampled_law(uncertain_plant(REAL), STEP, objective="peak", setup=ExactSetup(diffusion=F(rock)))
 
 
 def worst(held, periods, pieces, *chosen):
@@ -91,12 +91,12 @@ LAGS = {("0.184", "0.2"): 2.3e-4, ("0.05", "0.2"): 6.6e-5, ("0.184", "0.001"): 1
 @few("times", LAGS, every=3)
 def test_no_course_violates_a_guarantee_behind_a_lag(times, count):
     step, lag = map(F, times)
-    claim = design_held(uncertain_plant(REAL), step, setup=ExactSetup(lag=lag))
+    claim = design_sampled_law(uncertain_plant(REAL), step, setup=ExactSetup(lag=lag))
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= LAGS[times]
     held, periods, pieces = attacker.numbers(claim), 60, 6
     random = attacker.switching(held, count, periods * pieces, seed=3)
-    slowed = (lambda choose: attacker.slowly(held, pieces, choose)) if claim.slow_gain else lambda choose: choose
+    slowed = (lambda choose: attacker.slowly(held, pieces, choose)) if claim.varying_gain else lambda choose: choose
     ends = attacker.responses(held, periods, pieces)
     aligned = [(slowed(attacker.aligned(held, response)), 4) for response in ends]
     slip, rate = worst(held, periods, pieces, (slowed(random), count), *aligned)
@@ -114,14 +114,14 @@ SLIP_ALONE = {
 @pytest.mark.parametrize("behind", ["lag", "rock"])
 def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
     around, step, most, count = SLIP_ALONE[behind]
-    claim = design_held(
+    claim = design_sampled_law(
         uncertain_plant(REAL), step, measured="slip", setup=ExactSetup(slip_noise=F(1, 10**6), **around)
     )
-    assert claim.held.law.of_slip_alone
+    assert claim.sampled_loop.law.of_slip_alone
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= most
     held, periods, pieces = attacker.numbers(claim), 60, 6
-    slowed = (lambda choose: attacker.slowly(held, pieces, choose)) if claim.slow_gain else lambda choose: choose
+    slowed = (lambda choose: attacker.slowly(held, pieces, choose)) if claim.varying_gain else lambda choose: choose
     hear = attacker.noisy(held, count, periods * pieces, seed=5)
     random = slowed(attacker.switching(held, count, periods * pieces, seed=3))
     seen = [attacker.run(held, periods, pieces, random, count, hear=hear)[0].max(axis=1)]
@@ -136,7 +136,7 @@ def test_no_course_with_noise_violates_a_guarantee_of_the_slip_alone(behind):
 @pytest.mark.slow
 def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
     task, step = uncertain_plant(REAL), F("0.184")
-    short, none = design_held(task, step, setup=ExactSetup(lag=F("0.001"))), design_held(task, step)
+    short, none = design_sampled_law(task, step, setup=ExactSetup(lag=F("0.001"))), design_sampled_law(task, step)
     for name in ("slip_error", "slip_rate_error"):
         assert getattr(short.claims, name) == pytest.approx(getattr(none.claims, name), rel=0.1)
 
@@ -145,7 +145,7 @@ def test_behind_a_short_lag_a_design_holds_as_well_as_behind_none():
 @pytest.mark.parametrize("objective", ["peak", "tracking"])
 def test_no_course_of_ten_thousand_violates_a_guarantee_of_the_class_rate(objective):
     task = uncertain_plant(REAL, rate_limited=True)
-    claim = design_held(task, F("0.184"), objective=objective)
+    claim = design_sampled_law(task, F("0.184"), objective=objective)
     assert claim.check() is Verdict.PROVED
     held, periods, pieces = attacker.numbers(claim, task.amplitude), 60, 6
     drifts = lambda choose: attacker.drifting(held, float(task.change), pieces, choose)  # noqa: E731

@@ -75,10 +75,12 @@ ROWS = {"cta": (3e-4, 4.2e-5), "dia": (3e-4, 4.2e-5), "1/10": (3.6e-4, 5e-5), "1
 )
 def test_an_implicit_step_is_deadbeat_with_slopes_1_and_no_remainder(slopes, remainder, end):
     claim = load_guarantee(Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_cta_real-fault.json")
-    root = replace(claim.root, slopes=slopes, remainder=remainder)
-    held = replace(claim.held, law=replace(claim.held.law, root=root))
+    root = replace(claim.implicit_step, slopes=slopes, remainder=remainder)
+    held = replace(claim.sampled_loop, law=replace(claim.sampled_loop.law, implicit_step=root))
     sampling = Sampling(step=STEP, scheme="compensated", settings=(("weight", F(1)), ("authority", F(1))))
-    found = Compensation(controller=replace(law("cta", CTA, 1), sampling=sampling), proof=replace(claim, held=held))
+    found = Compensation(
+        controller=replace(law("cta", CTA, 1), sampling=sampling), proof=replace(claim, sampled_loop=held)
+    )
     assert found.deadbeat == ("deadbeat" in end)
     assert end in found.sentence()
 
@@ -91,7 +93,7 @@ def test_sliding_modes_are_guaranteed_within_the_targets(row):
     assert claim.check() is Verdict.PROVED
     assert claim.claims.slip_rate_error <= rate
     assert claim.claims.slip_error <= slip
-    assert (claim.held.law.root.slopes == (1, 1)) is (row in ("cta", "dia"))
+    assert (claim.sampled_loop.law.implicit_step.slopes == (1, 1)) is (row in ("cta", "dia"))
 
 
 def numbers(row):
@@ -182,7 +184,7 @@ def test_a_smaller_peak_is_an_objective_too():
     assert peak.claims.slip_rate_error < tracking.claims.slip_rate_error <= peak.claims.slip_rate_error * F(126, 100)
     with pytest.raises(ParameterError, match="tracking, peak"):
         design_compensated(TASK, law("cta", CTA, 1), STEP, objective="speed")
-    with pytest.raises(ParameterError, match=r"step must be of a size between 1e-40 and 1e\+40 in SI units\."):
+    with pytest.raises(ParameterError, match=r"step must have a magnitude between 1e-40 and 1e\+40 in SI units\."):
         design_compensated(TASK, law("cta", CTA, 1), F(10) ** 400)
 
 

@@ -168,7 +168,7 @@ def test_limits_count_only_where_the_pressure_reaches_them(real, designed, peaks
 def test_what_is_not_covered_is_refused(real, designed):
     with pytest.raises(UnknownNameError, match=r"amplitude, rate\. Received 'any'"):
         certified_peaks(real, designed, disturbance_class="any")
-    with pytest.raises(ParameterError, match="law with p = 0 at the start"):
+    with pytest.raises(ParameterError, match="needs p = 0 initially"):
         certified_peaks(real, replace(designed, offset=F(10)))
 
 

@@ -14,7 +14,7 @@ from quakedesign.cli.design_commands import positive
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import Disturbance, load_fault
-from quakedesign.guarantees import NoProof, TrackingProof, design_held, guarantee
+from quakedesign.guarantees import NoProof, TrackingProof, design_sampled_law, guarantee
 from quakedesign.guarantees.search.linear_design import reached
 from quakedesign.lyapunov import Verdict
 from quakedesign.plant import uncertain_plant
@@ -54,7 +54,7 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     found = design.guarantee
     assert (design.verdict, found.check()) == (Verdict.PROVED, Verdict.PROVED)
     assert design.certificate is None
-    assert design.controller.step == found.held.step == F("0.184")
+    assert design.controller.step == found.sampled_loop.step == F("0.184")
     assert design.controller.rest_limit == found.rest_limit
     assert found.rest_limit is not None
     assert found.claims.slip_rate_error < F(3, 10**4)
@@ -66,8 +66,8 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
 @pytest.mark.slow
 def test_a_law_has_one_bound_however_it_is_asked_for(monkeypatch):
     found = designed("real").guarantee
-    assert found.slow_gain is not None
-    assert found.claims.slip_rate_error < guarantee(found.task, found.held).claims.slip_rate_error * F(3, 4)
+    assert found.varying_gain is not None
+    assert found.claims.slip_rate_error < guarantee(found.task, found.sampled_loop).claims.slip_rate_error * F(3, 4)
     monkeypatch.setattr("quakedesign.guarantees.tracking_result.worst_tracking", lambda *_, **__: None)
     proved = qd.guarantee(REAL, plant="printed").proof
     assert proved == assess(REAL, designed("real").controller).guarantee == found
@@ -86,7 +86,7 @@ def test_both_objectives_are_what_they_are_called(unreached):
 @pytest.mark.slow
 def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_works(monkeypatch):
     design = designed("slow")
-    assert not isinstance(design_held(uncertain_plant(SLOW), F(1, 10)), TrackingProof)
+    assert not isinstance(design_sampled_law(uncertain_plant(SLOW), F(1, 10)), TrackingProof)
     step = design.controller.step
     assert F(2, 100) < step < F(1, 10)
     assert design.guarantee.check() is Verdict.PROVED
@@ -116,13 +116,16 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert account.badge(real) == "guaranteed as it runs"
     assert grade(real).startswith("guaranteed: slip rate <= ")
     # the same law held over the fault's own T_s has none
-    assert guarantee(uncertain_plant(SLOW), replace(design.guarantee.held, step=F(1, 10))).check() is Verdict.UNDECIDED
+    assert (
+        guarantee(uncertain_plant(SLOW), replace(design.guarantee.sampled_loop, step=F(1, 10))).check()
+        is Verdict.UNDECIDED
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("step", ["0.01", pytest.param("0.02", marks=pytest.mark.slow)])
 def test_sampled_faster_that_fault_is_guaranteed(step):
-    claim = design_held(uncertain_plant(SLOW), F(step))
+    claim = design_sampled_law(uncertain_plant(SLOW), F(step))
     assert claim.check() is Verdict.PROVED
     assert claim.claims.peak_slip_rate < 1e-5  # its natural earthquake: 0.31 m/s
 
@@ -139,7 +142,7 @@ def test_an_independent_simulator_does_not_leave_the_guarantee_of_the_shorter_st
 
 def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
     fails = NoProof(reason="small gain 1.2")
-    monkeypatch.setattr("quakedesign.guarantees.search.default_designs.design_held", lambda *_, **__: fails)
+    monkeypatch.setattr("quakedesign.guarantees.search.default_designs.design_sampled_law", lambda *_, **__: fails)
     monkeypatch.setattr("quakedesign.guarantees.search.default_designs.longest_step", lambda *_, **__: None)
     design = qd.design(REAL, "elqr", plant="printed")
     assert (design.verdict, design.controller) == (Verdict.UNDECIDED, None)
@@ -157,7 +160,7 @@ def test_a_time_that_nothing_holds_is_undecided_with_a_reason(monkeypatch):
     ],
 )
 def test_unusual_faults_are_designed_or_refused_with_a_reason(fault):
-    found = design_held(uncertain_plant(fault), F(repr(fault.sampling_time)))
+    found = design_sampled_law(uncertain_plant(fault), F(repr(fault.sampling_time)))
     if isinstance(found, TrackingProof):
         assert found.check() is Verdict.PROVED
     else:
@@ -173,10 +176,10 @@ def searched(longest, first, most=None):
         asked.append(time)
         if time > longest:
             return NoProof(reason="too long")
-        return replace(claim, held=replace(claim.held, step=time))
+        return replace(claim, sampled_loop=replace(claim.sampled_loop, step=time))
 
     found = reached(attempt, first, most=most)
-    return asked, found[-1].held.step if found else None
+    return asked, found[-1].sampled_loop.step if found else None
 
 
 @pytest.mark.slow

@@ -64,12 +64,12 @@ def run(controller, **options):
 
 def recursion(run, claim):
     """Pressure [Pa] of the matrices that the guarantee is about, with a deadbeat step w = -e1/T_s."""
-    law = claim.held.law
+    law = claim.sampled_loop.law
     assert law.root.slopes == (1, 1)
     F_, G, C, D = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output, law.feedback))
     state, found = np.zeros(len(C)), []
     for e1, e2 in zip(run.slip - run.reference, run.slip_rate - run.reference_rate, strict=True):
-        seen = np.array([e1, e2, -e1 / float(claim.held.step)])
+        seen = np.array([e1, e2, -e1 / float(claim.sampled_loop.step)])
         found.append(C @ state + D @ seen)
         state = F_ @ state + G @ seen
     return np.array(found)
@@ -81,7 +81,7 @@ def test_the_default_of_the_real_fault_is_guaranteed_as_asked_for():
     assert (design.verdict, found.check()) == (Verdict.PROVED, Verdict.PROVED)
     assert found.claims.slip_rate_error <= F(4, 10**4)
     assert found.claims.slip_error <= F(6, 10**5)
-    assert design.controller.sampling.step == found.held.step == STEP
+    assert design.controller.sampling.step == found.sampled_loop.step == STEP
     assert design.compensation.proof is found
     settings = dict(design.controller.sampling.settings)
     limit = {f"rest_{part.name}": getattr(found.rest_limit, part.name) for part in fields(found.rest_limit)}
@@ -105,7 +105,7 @@ def test_its_base_gains_stay_proved_in_continuous_time():
 def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for():
     design = qd.design(REAL, "cta", slip_noise="1e-6", rate_noise="1e-5", plant="printed")
     claim, told = design.guarantee, {"slip_noise": F(1, 10**6), "rate_noise": F(1, 10**5)}
-    assert (design.verdict, claim.check(), claim.held.noise) == (Verdict.PROVED, Verdict.PROVED, told)
+    assert (design.verdict, claim.check(), claim.sampled_loop.noise) == (Verdict.PROVED, Verdict.PROVED, told)
     assert replace(design, runs=None).guarantee == claim
     assert designed().guarantee.claims.slip_rate_error < claim.claims.slip_rate_error <= F(26, 10**5)
     assert {name: design.details[name] for name in told} == {name: str(bound) for name, bound in told.items()}
@@ -213,7 +213,9 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert isinstance(design_compensated(uncertain_plant(SLOW), base, F(1, 10)).proof, NoProof)
     step = design.controller.sampling.step
     assert F(2, 100) < step < F(1, 10)
-    assert (design.verdict, design.guarantee.check(), design.guarantee.held.step) == (Verdict.PROVED,) * 2 + (step,)
+    assert (design.verdict, design.guarantee.check(), design.guarantee.sampled_loop.step) == (Verdict.PROVED,) * 2 + (
+        step,
+    )
     assert design.details["reason"]
     found = {p.name: p for p in design.premises}["sampling_time"]
     assert (found.holds, found.certified) == (False, step)

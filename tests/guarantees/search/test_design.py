@@ -14,7 +14,14 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingGuarantee, TrackingProof, design_held, guarantee, worst_tracking
+from quakedesign.guarantees import (
+    NoProof,
+    TrackingGuarantee,
+    TrackingProof,
+    design_sampled_law,
+    guarantee,
+    worst_tracking,
+)
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import linear_design
@@ -46,7 +53,7 @@ DELAYS = {"real one period late": F("0.184")}
 @cache
 def designed(row):
     name, step, objective, *_ = ROWS[row]
-    return design_held(
+    return design_sampled_law(
         uncertain_plant(load_fault(name)), step, objective=objective, setup=ExactSetup(delay=DELAYS.get(row, F(0)))
     )
 
@@ -82,7 +89,9 @@ def test_designs_are_guaranteed_within_the_targets(row):
 
 @pytest.mark.slow
 def test_the_class_rate_is_guaranteed_far_lower():
-    claim = guarantee(uncertain_plant(load_fault("real-fault"), rate_limited=True), designed("real tracking").held)
+    claim = guarantee(
+        uncertain_plant(load_fault("real-fault"), rate_limited=True), designed("real tracking").sampled_loop
+    )
     assert claim.claims.slip_rate_error <= F(7, 10**5)
     assert claim.claims.slip_error <= F(5, 10**5)
 
@@ -90,7 +99,9 @@ def test_the_class_rate_is_guaranteed_far_lower():
 @pytest.mark.slow
 @pytest.mark.parametrize("objective", [pytest.param("tracking", marks=pytest.mark.slow), "peak"])
 def test_a_law_for_the_class_rate_is_chosen_for_that_class(objective):
-    claim = design_held(uncertain_plant(load_fault("real-fault"), rate_limited=True), F("0.184"), objective=objective)
+    claim = design_sampled_law(
+        uncertain_plant(load_fault("real-fault"), rate_limited=True), F("0.184"), objective=objective
+    )
     assert claim.claims.slip_rate_error <= F(7, 10**5)
     assert claim.claims.slip_error <= F(1, 10**5)
 
@@ -138,7 +149,7 @@ def test_where_stick_leaves_the_bounds_the_answer_says_so():
 @few("row", ROWS, every=5)
 def test_a_designed_law_left_to_itself_settles_but_for_its_integral(row):
     """On a fault that rests whatever the pressure, the pressure that is asked for grows evenly, and no faster."""
-    law = designed(row).held.law
+    law = designed(row).sampled_loop.law
     rows, seen, output = (np.array(m, dtype=float) for m in (law.update, law.measured, law.output))
     states, asked = np.zeros(len(output)), []
     for _ in range(260):
@@ -173,7 +184,7 @@ def test_the_worst_found_is_below_the_bound_and_no_less_than_the_attacker_s(row)
 @pytest.mark.parametrize("delay", [F("0.03"), F("0.1")])
 def test_a_delay_is_attacked_too(delay):
     task = uncertain_plant(load_fault("real-fault"))
-    claim = guarantee(task, replace(designed("real peak").held, delay=delay))
+    claim = guarantee(task, replace(designed("real peak").sampled_loop, delay=delay))
     if delay == F("0.03"):
         assert isinstance(claim, TrackingProof)
     if isinstance(claim, NoProof):
@@ -195,13 +206,13 @@ def test_sharper_claims_are_not_proved():
 
 
 def test_a_step_far_too_long_has_no_guarantee_and_says_why():
-    found = design_held(uncertain_plant(load_fault("real-fault")), F(2), objective="peak")
+    found = design_sampled_law(uncertain_plant(load_fault("real-fault")), F(2), objective="peak")
     assert isinstance(found, NoProof)
     assert "is not stable" in found.reason
 
 
 def test_a_step_beyond_all_sizes_is_refused():
-    for search in (closest, design_held):
+    for search in (closest, design_sampled_law):
         with pytest.raises(ParameterError, match=r"step must be positive, between 1e-9 s and 1e9 s\."):
             search(uncertain_plant(load_fault("real-fault")), F(10) ** 400)
 
@@ -209,14 +220,14 @@ def test_a_step_beyond_all_sizes_is_refused():
 def test_a_step_in_which_errors_outgrow_all_numbers_has_none_either():
     """The pole (√(w² + 4s) − w)/2 with s = 0.4493 1/s² and w = 1.6 1/s is 0.2437 1/s, for an hour: e^877."""
     task = uncertain_plant(load_fault("real-fault"))
-    for found in (design_held(task, F(3600)), closest(task, F(3600))):
+    for found in (design_sampled_law(task, F(3600)), closest(task, F(3600))):
         assert isinstance(found, NoProof)
-        assert found.reason == "errors grow by e^877 within T_s = 3600 s"
+        assert found.reason == "errors grow by a factor of e^877 within T_s = 3600 s"
 
 
 def test_another_objective_is_refused():
     with pytest.raises(ParameterError, match="tracking, peak"):
-        design_held(uncertain_plant(load_fault("real-fault")), F(1), objective="speed")
+        design_sampled_law(uncertain_plant(load_fault("real-fault")), F(1), objective="speed")
 
 
 def test_designs_say_what_is_guaranteed_of_them_as_they_run():
@@ -282,7 +293,7 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
     found = _with_noise(without, bounds)
     assert isinstance(found, TrackingProof) is proved
     if proved:
-        assert found.held.noise == bounds | {"rate_noise": F(0)} or found.held.noise == bounds
+        assert found.sampled_loop.noise == bounds | {"rate_noise": F(0)} or found.sampled_loop.noise == bounds
         return
     assert found.reason.startswith("with slip noise of 5 m and rate noise of 0.1 m/s the pressure may rise to ")
     assert found.reason.endswith(": the fault may open; without it a law is proved")
@@ -293,13 +304,15 @@ def test_a_design_that_noise_leaves_without_a_proof_is_designed_without_noise(mo
 
     def laws(task, step, measured, setup):
         noises.append(setup.slip_noise)
-        held = replace(stored.held, slip_noise=setup.slip_noise)
+        held = replace(stored.sampled_loop, slip_noise=setup.slip_noise)
         family = SimpleNamespace(starts=[np.zeros(3)])
-        best = {"least_peak": lambda x: (0.5, x), "seen": lambda x: None, "held": lambda x: held}
+        best = {"least_peak": lambda x: (0.5, x), "seen": lambda x: None, "sampled_loop": lambda x: held}
         return SimpleNamespace(template=held, family=family, **best)
 
     monkeypatch.setattr(linear_design._Laws, "of", laws)
-    found = design_held(stored.task, stored.held.step, objective="peak", setup=ExactSetup(slip_noise=F(5)))
+    found = design_sampled_law(
+        stored.task, stored.sampled_loop.step, objective="peak", setup=ExactSetup(slip_noise=F(5))
+    )
     assert noises == [5, 0]
     assert found.reason.startswith("with slip noise of 5 m the pressure may rise to ")
     assert found.reason.endswith("; without it a law is proved")
@@ -310,7 +323,7 @@ def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_ask
     """Where a design for a shorter one is: it comes second."""
     shorter = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text())
     none = NoProof(reason="small gain 2")
-    monkeypatch.setattr(state_feedback, "design_held", lambda *_, **__: none)
+    monkeypatch.setattr(state_feedback, "design_sampled_law", lambda *_, **__: none)
     monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: shorter)
     monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)
     for search in ("continued", "nearest_setup"):

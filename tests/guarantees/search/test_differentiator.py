@@ -12,7 +12,7 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingGuarantee, design_held
+from quakedesign.guarantees import NoProof, TrackingGuarantee, design_sampled_law
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import measured_by
@@ -37,7 +37,7 @@ ROWS = {("peak", F(0)): (2.0e-4, 9e-5), ("tracking", F(0)): (2.6e-4, 7e-5), ("pe
 @cache
 def designed(row):
     objective, noise = row
-    return design_held(
+    return design_sampled_law(
         uncertain_plant(REAL), STEP, objective=objective, measured="differentiator", setup=ExactSetup(slip_noise=noise)
     )
 
@@ -49,7 +49,7 @@ def designed(row):
 )
 def test_no_course_leaves_what_is_proved_nor_what_the_differentiator_can_follow(row, courses):
     claim = designed(row)
-    assert (claim.check(), measured_by(claim.held.law)) == (Verdict.PROVED, "differentiator")
+    assert (claim.check(), measured_by(claim.sampled_loop.law)) == (Verdict.PROVED, "differentiator")
     assert claim.claims.slip_rate_error <= ROWS[row][0]
     assert claim.claims.slip_error <= ROWS[row][1]
     assert checker.check(guarantee_text(claim)).verdict == "proved"

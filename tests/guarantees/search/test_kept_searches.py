@@ -30,24 +30,24 @@ def test_what_a_search_proposes_is_decided_each_time(task, monkeypatch):
     monkeypatch.setattr(design, "search_once", told)
     longest = longest_times.longest_step(task)
     assert longest is None or longest.guarantee.check() is Verdict.PROVED
-    found = design.design_held(task, STEP)
+    found = design.design_sampled_law(task, STEP)
     assert isinstance(found, TrackingProof)
     assert found.check() is Verdict.PROVED
     monkeypatch.setattr(design, "search_once", lambda _search, *question: [-1.0, [-3.0 for _ in question[-2]]])
     assert longest_times.longest_step(task) is None
-    found = design.design_held(task, STEP)
+    found = design.design_sampled_law(task, STEP)
     assert isinstance(found, NoProof) or found.check() is Verdict.PROVED
 
 
 def test_a_design_is_searched_once(task, tmp_path, monkeypatch):
     monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
-    first = design.design_held(task, STEP)
+    first = design.design_sampled_law(task, STEP)
     near = design.closest(task, STEP)
     monkeypatch.setattr(design, "_search", None)
-    again = design.design_held(task, STEP)
-    assert design.closest(task, STEP).held == near.held
+    again = design.design_sampled_law(task, STEP)
+    assert design.closest(task, STEP).sampled_loop == near.sampled_loop
     assert (again, again.rest_limit) == (first, first.rest_limit)
-    assert again.held.law.applied == first.held.law.applied != ()
+    assert again.sampled_loop.law.applied == first.sampled_loop.law.applied != ()
     with pytest.raises(TypeError):
         design.closest(task, STEP / 2)
     worst = adversary.worst_tracking(first)

@@ -119,7 +119,7 @@ def test_a_family_models_what_is_between_law_and_fault(around, names):
     kept = names[:-1] if "diffusion" in around else names  # a state more, a mode less
     assert law.states == ("predicted_slip", "predicted_rate", "disturbance", *kept)
     assert law.of_slip_alone
-    assert (both.room, observed.room, both.period) == (1.6, 1.4, STEP + setup.diffusion)
+    assert (both.allowance, observed.allowance, both.period) == (1.6, 1.4, STEP + setup.diffusion)
     assert all(both.admits(np.array(x)) for x in both.starts)
     assert all(observed.admits(np.array(x)) for x in observed.starts)
 

@@ -18,7 +18,13 @@ from quakedesign.guarantees.search import linear_design
 from quakedesign.guarantees.search.compensated_search import design_compensated
 from quakedesign.guarantees.search.default_designs import deadbeat, sampled_sliding_mode
 from quakedesign.guarantees.search.float_bounds import closeness
-from quakedesign.guarantees.search.linear_design import Linear, design_held, longest_delay, longest_step, nearest_setup
+from quakedesign.guarantees.search.linear_design import (
+    Linear,
+    design_sampled_law,
+    longest_delay,
+    longest_step,
+    nearest_setup,
+)
 from quakedesign.laws import control_law
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.lyapunov import Verdict
@@ -51,10 +57,12 @@ def test_the_smallest_pump_that_will_do_is_named(controller):
     assert not found.proved
     name, near = found.nearest
     assert (name, near.check()) == ("saturation", Verdict.PROVED)
-    low, high = near.held.pump.limits
+    low, high = near.sampled_loop.pump.limits
     assert low == asked.least  # which was not too little
     assert asked.largest < high <= F(101, 100) * REAL_REST
-    tighter = replace(near, held=replace(near.held, pump=replace(near.held.pump, largest=high * F(999, 1000))))
+    tighter = replace(
+        near, sampled_loop=replace(near.sampled_loop, pump=replace(near.sampled_loop.pump, largest=high * F(999, 1000)))
+    )
     assert tighter.check() is Verdict.UNDECIDED
     assert "a pump from -20 MPa or less to 14." in lines(found)[0]
     assert found.to_dict()["nearest"]["value"] == [str(low), str(high)]
@@ -72,7 +80,7 @@ def test_the_pressure_is_the_reason_where_it_alone_fails(pressed, monkeypatch, t
         NoProof(reason="small gain 2"),
         NoProof(reason="opens", pressed=True) if pressed else NoProof(reason="1"),
     )
-    monkeypatch.setattr(linear_design, "slow_gain", lambda task, held: "slow")
+    monkeypatch.setattr(linear_design, "varying_gain", lambda task, held: "slow")
     monkeypatch.setattr(linear_design, "guarantee", lambda task, held, gain=None: slow if gain else plain)
     found = best_guarantee(task, Linear().leanest(task, F(1, 2)))
     assert found is (plain if pressed else slow)
@@ -86,7 +94,7 @@ def test_the_largest_disturbance_that_does_not_open_the_fault_is_named():
     name, near = found.nearest
     assert (name, near.check()) == ("amplitude", Verdict.PROVED)
     assert 0 < near.task.amplitude < uncertain_plant(pushed).amplitude
-    more = best_guarantee(replace(near.task, amplitude=near.task.amplitude * F(9, 8)), near.held)
+    more = best_guarantee(replace(near.task, amplitude=near.task.amplitude * F(9, 8)), near.sampled_loop)
     assert isinstance(more, NoProof)
     assert more.pressed
     assert lines(found)[0].startswith("with a disturbance of at most 0.")
@@ -97,13 +105,13 @@ def test_the_largest_disturbance_that_does_not_open_the_fault_is_named():
 def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_much(task):
     """What the usual one asks for is more than it needs at this T_s."""
     step = F("0.5")
-    usual = design_held(task, step)
+    usual = design_sampled_law(task, step)
     low, high = usual.claims.pressures[-1]
     leaner = best_guarantee(task, Linear().leanest(task, step)).claims.pressures[-1]
     assert low < leaner[0] <= leaner[1] < high
     pump = Pump(least=(low + leaner[0]) / 2, largest=(high + leaner[1]) / 2)
-    assert isinstance(best_guarantee(task, replace(usual.held, pump=pump)), NoProof)
-    assert design_held(task, step, setup=ExactSetup(pump=pump)).check() is Verdict.PROVED
+    assert isinstance(best_guarantee(task, replace(usual.sampled_loop, pump=pump)), NoProof)
+    assert design_sampled_law(task, step, setup=ExactSetup(pump=pump)).check() is Verdict.PROVED
 
 
 @pytest.mark.parametrize(
@@ -123,7 +131,7 @@ def test_a_nearest_value_is_a_bound_only_where_smaller_values_are_covered(name, 
     """A guarantee is of one delay, lag or path; a jitter and a time of averages are bounds of what may happen."""
     law = qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184").law
     stored = parse_guarantee((PROOFS / "guarantee_real-fault.json").read_text(encoding="utf-8"))
-    near = replace(stored, held=SampledLoop(law=law, step=STEP, **{name: value}))
+    near = replace(stored, sampled_loop=SampledLoop(law=law, step=STEP, **{name: value}))
     found = TrackingGuarantee(fault=REAL, proof=NoProof(reason="x"), nearest=(name, near), given=given)
     assert found.lines()[1].startswith(f"{'this law ' if given else ''}{said}")
 
@@ -147,7 +155,7 @@ def test_the_longest_interval_that_will_do_is_named():
     assert not found.proved
     name, near = found.nearest
     assert (name, near.check()) == ("longest_step", Verdict.PROVED)
-    assert F("0.4") < near.held.longest_step < F("0.9")
+    assert F("0.4") < near.sampled_loop.longest_step < F("0.9")
     assert lines(found)[0].startswith("with a longest interval of at most")
 
 
@@ -156,29 +164,29 @@ def test_a_sliding_mode_that_is_late_is_told_the_longest_delay(sliding, task):
     found = qd.guarantee(REAL, controller="cta", step=STEP, delay=F("0.3"))
     name, near = found.nearest
     assert (found.proved, name, near.check()) == (False, "delay", Verdict.PROVED)
-    assert near.held.delay >= F(9, 10) * longest_delay(task, STEP, kind=sliding).held.delay
+    assert near.sampled_loop.delay >= F(9, 10) * longest_delay(task, STEP, kind=sliding).sampled_loop.delay
     assert found.shorter is None or found.shorter.check() is Verdict.PROVED
 
 
 @pytest.mark.slow
 def test_the_longest_step_of_sliding_modes_is_within_a_tenth_of_the_best_of_all_weights(sliding, task):
     """No weight and B0 of a fine grid come near to a guarantee at a T_s a tenth longer."""
-    step = longest_step(task, kind=sliding).guarantee.held.step
+    step = longest_step(task, kind=sliding).guarantee.sampled_loop.step
     ratios = np.linspace(0.5, 1.2, 15)
     longer = step * F(10, 9)
     for weight, ratio in product(np.linspace(0.02, 0.6, 30), ratios):
-        held = sliding.held(task, np.array([weight, ratio]), longer)
+        held = sliding.sampled_loop(task, np.array([weight, ratio]), longer)
         assert closeness(task, held)[0] >= 1
     assert isinstance(design_compensated(task, sliding.controller, longer).proof, NoProof)
 
 
 @pytest.mark.slow
 def test_every_command_says_the_same_longest_step_of_sliding_modes(sliding, task):
-    longest = longest_step(task, kind=sliding).guarantee.held.step
+    longest = longest_step(task, kind=sliding).guarantee.sampled_loop.step
     for step in (STEP, F(2)):
         assert sampled_sliding_mode(task, sliding.controller, step)[1].longest_step == longest
     found = qd.guarantee(REAL, controller="cta", step=F(2))
-    assert (found.proved, found.shorter.held.step) == (False, longest)
+    assert (found.proved, found.shorter.sampled_loop.step) == (False, longest)
     assert found.lines()[0].startswith("not guaranteed at T_s = 2 s")
     between = qd.guarantee(REAL, controller="cta", step=F("0.7"))  # which the usual weights miss
     assert isinstance(design_compensated(task, sliding.controller, F("0.7")).proof, NoProof)

@@ -13,7 +13,7 @@ from thinned import few
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, worst_tracking
+from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_sampled_law, guarantee, worst_tracking
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.linear_design import Longest, closest, design_at
 from quakedesign.loop.loop_setup import LoopSetup
@@ -37,7 +37,7 @@ def designed(name):
         "slip alone": {"measured": "slip", "setup": ExactSetup(slip_noise=NOISE)},
         "both": {"setup": ExactSetup(slip_noise=NOISE, rate_noise=F(1, 10**5))},
     }[name]
-    return design_held(uncertain_plant(REAL), STEP, objective="peak", **around)
+    return design_sampled_law(uncertain_plant(REAL), STEP, objective="peak", **around)
 
 
 def within(largest, claim):
@@ -47,8 +47,8 @@ def within(largest, claim):
 def test_the_slip_alone_is_enough_for_the_target():
     claim = designed("slip alone")
     assert isinstance(claim, TrackingProof)
-    assert claim.held.law.of_slip_alone
-    assert (claim.held.slip_noise, claim.check()) == (NOISE, Verdict.PROVED)
+    assert claim.sampled_loop.law.of_slip_alone
+    assert (claim.sampled_loop.slip_noise, claim.check()) == (NOISE, Verdict.PROVED)
     assert claim.claims.slip_rate_error <= F(4, 10**4)
     assert claim.claims.slip_error <= F(12, 10**5)
 
@@ -100,7 +100,7 @@ def test_noise_along_the_nominal_response_comes_close_and_the_worst_found_is_no_
 @pytest.mark.slow
 def test_the_search_uses_the_noise():
     claim = designed("slip alone")
-    quiet = replace(claim, held=replace(claim.held, slip_noise=F(0)))
+    quiet = replace(claim, sampled_loop=replace(claim.sampled_loop, slip_noise=F(0)))
     loud, still = worst_tracking(claim), worst_tracking(quiet)
     assert loud.slip_error > 1.02 * still.slip_error
     assert loud.slip_rate_error > 1.02 * still.slip_rate_error
@@ -116,7 +116,7 @@ def test_with_stick_no_course_is_found_that_leaves_the_bounds():
 
 def test_more_noise_is_guaranteed_less():
     claim = designed("slip alone")
-    more = guarantee(uncertain_plant(REAL), replace(claim.held, slip_noise=2 * NOISE))
+    more = guarantee(uncertain_plant(REAL), replace(claim.sampled_loop, slip_noise=2 * NOISE))
     assert more.claims.slip_rate_error > claim.claims.slip_rate_error
     assert more.claims.slip_error > claim.claims.slip_error
 
@@ -143,7 +143,7 @@ MODULE = "quakedesign.guarantees.search.default_designs"
 def asked(monkeypatch):
     """What is asked of the searches of a design, which answer with one that is known."""
     found = {}
-    answers = {"design_held": designed("slip alone"), "longest_step": None, "longest_delay": None}
+    answers = {"design_sampled_law": designed("slip alone"), "longest_step": None, "longest_delay": None}
     for name, known in answers.items():
         monkeypatch.setattr(f"{MODULE}.{name}", lambda *_, n=name, a=known, **told: found.__setitem__(n, told) or a)
     return found
@@ -152,7 +152,7 @@ def asked(monkeypatch):
 def test_a_design_is_guaranteed_and_run_with_the_noise_that_it_is_made_for(asked, monkeypatch):
     design = qd.design(REAL, "elqr", measured="slip", slip_noise="1e-6")
     claim, told = design.guarantee, {"measured": "slip", "setup": ExactSetup(slip_noise=NOISE)}
-    assert asked["design_held"] == told | {"objective": "tracking"}
+    assert asked["design_sampled_law"] == told | {"objective": "tracking"}
     assert (asked["longest_step"], asked["longest_delay"]) == (told, told)
     assert (design.verdict, claim) == (Verdict.PROVED, designed("slip alone"))
     assert (design.details["measured"], design.details["slip_noise"]) == ("slip", "1/1000000")
@@ -168,7 +168,7 @@ def test_the_noisy_run_of_a_design_stays_within_its_guarantee():
     claim = designed("slip alone")
     noise = Measurement(slip_noise=1e-6, bounded=True)
     for measurement in (None, noise):
-        seen = qd.simulate(REAL, claim.held.controller, duration=18400.0, measurement=measurement).metrics
+        seen = qd.simulate(REAL, claim.sampled_loop.controller, duration=18400.0, measurement=measurement).metrics
         assert 0 < seen.max_slip_error <= claim.claims.slip_error
         assert 0 < seen.max_slip_rate_error <= claim.claims.slip_rate_error
 
@@ -176,10 +176,10 @@ def test_the_noisy_run_of_a_design_stays_within_its_guarantee():
 def test_a_delay_is_designed_for_with_the_slip_alone():
     near = closest(uncertain_plant(REAL), STEP, measured="slip", setup=ExactSetup(slip_noise=NOISE, delay=F("0.1")))
     assert near.closeness < 1
-    found = best_guarantee(uncertain_plant(REAL), near.held)
-    assert found.held.law.of_slip_alone
-    assert (found.held.slip_noise, found.held.delay) == (NOISE, F("0.1"))
-    assert found.held.law.states[-1] == "asked_1_ago"
+    found = best_guarantee(uncertain_plant(REAL), near.sampled_loop)
+    assert found.sampled_loop.law.of_slip_alone
+    assert (found.sampled_loop.slip_noise, found.sampled_loop.delay) == (NOISE, F("0.1"))
+    assert found.sampled_loop.law.states[-1] == "asked_1_ago"
     assert found.check() is Verdict.PROVED
 
 

@@ -13,11 +13,11 @@ from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import sliding_design
 from quakedesign.guarantees.search.sliding_design import (
     LOG_RATES,
-    WellReach,
+    FarthestWell,
+    admissible_step,
     farthest,
+    possible_remedy,
     searched_sliding,
-    suitable,
-    what_would_do,
 )
 from quakedesign.guarantees.sliding_result import _beyond
 from quakedesign.laws import LinearLaw
@@ -55,7 +55,7 @@ def held(noise):
 
 
 def proved(task, held, log_rate):
-    return SlidingProof(task=task, held=held, cuts=WHOLE, claims=CLAIMS)
+    return SlidingProof(task=task, sampled_loop=held, cuts=WHOLE, claims=CLAIMS)
 
 
 @pytest.mark.slow
@@ -65,32 +65,32 @@ def test_a_law_for_a_far_well_is_found_from_nearer_ones_on():
     assert searched_sliding(TASK, STEP, LOG_RATES[-1], setup)[0] is None
     reach = farthest(TASK, STEP, setup, stressed=False)
     assert reach.share == 1
-    assert (reach.held.diffusion, reach.held.step) == (2531, 33)
+    assert (reach.sampled_loop.diffusion, reach.sampled_loop.step) == (2531, 33)
 
 
 def test_where_a_well_is_too_far_a_slower_task_and_a_nearer_well_are_named():
     setup = ExactSetup(diffusion=Fraction(20000))
     reach = farthest(TASK, STEP, setup, stressed=False, most=Fraction(1, 40))
     assert reach.share == Fraction(1, 40)
-    said = what_would_do(FAULT, TASK, reach, setup, proved, spread=Fraction(0))
+    said = possible_remedy(FAULT, TASK, reach, setup, proved, spread=Fraction(0))
     assert "at this V for L^2/D = 500 s with T_s = 33 s under a stress of at most 1 Pa" in said
     # 40 times slower with 5 % spare: 552000 s · 42 = 2.3e7 s, D_c/(20 V) = 6e-5 · 2.3e7/(20 · 0.05) s
     assert "operation_time = '2.3e+07 s', sampling_time = '1300 s'" in said
     assert "for V = 2.17e-09 m/s" in said
     assert "extrapolated" not in said
     known = replace(FAULT, friction=replace(GOUGE, slowest_rate=1e-8, reference_rate=1e-8))
-    said = what_would_do(known, TASK, reach, setup, proved, spread=Fraction(0))
+    said = possible_remedy(known, TASK, reach, setup, proved, spread=Fraction(0))
     assert "(but V = 2.17e-09 m/s is below the rates for which friction is known" in said
 
     def unproved(task, held, log_rate):
         return NoProof(reason="")
 
-    assert what_would_do(FAULT, TASK, reach, setup, unproved, spread=Fraction(0)).startswith("a smaller spread")
+    assert possible_remedy(FAULT, TASK, reach, setup, unproved, spread=Fraction(0)).startswith("a smaller spread")
 
 
 def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
     """Found at a hundredth: a tenth is tried before, and none after that."""
-    reach = WellReach(share=Fraction(1, 40), held=held(Fraction(1, 10**7)), numbers=np.zeros(9))
+    reach = FarthestWell(share=Fraction(1, 40), sampled_loop=held(Fraction(1, 10**7)), numbers=np.zeros(9))
     monkeypatch.setattr(sliding_design, "searched_sliding", lambda *_, **__: (None, np.zeros(9)))
     setup = ExactSetup(diffusion=Fraction(20000), slip_noise=Fraction(1, 10**7))
     for most, said in (
@@ -105,14 +105,14 @@ def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
             tried.append(held.slip_noise)
             return proved(task, held, log_rate) if held.slip_noise <= most else NoProof(reason="")
 
-        assert what_would_do(FAULT, TASK, reach, setup, up_to, spread=Fraction(0)).startswith(said)
+        assert possible_remedy(FAULT, TASK, reach, setup, up_to, spread=Fraction(0)).startswith(said)
         assert tried[0] == Fraction(1, 10**7)
 
 
 def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
     reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, ExactSetup(lag=Fraction(600)), stressed=False)
-    assert (reach.share, reach.held) == (0, None)
-    assert what_would_do(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith(
+    assert (reach.share, reach.sampled_loop) == (0, None)
+    assert possible_remedy(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith(
         "no guarantee was found with a well"
     )
 
@@ -128,4 +128,4 @@ def test_a_well_that_no_controller_reaches_the_fault_through_is_said_to_be_one()
 
 @pytest.mark.parametrize(("step", "suits"), [(20, 20), (60, 60), (15, 33), (120, 33)])
 def test_a_sampling_time_is_kept_within_twice_what_suits(step, suits):
-    assert suitable(TASK, Fraction(step)) == suits
+    assert admissible_step(TASK, Fraction(step)) == suits

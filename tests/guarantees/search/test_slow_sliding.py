@@ -61,7 +61,7 @@ def test_claims_are_followed_down_to_what_both_checkers_still_prove(half):
     assert found.check() is Verdict.PROVED
     assert checker.check(guarantee_text(found)).verdict == "proved"
     assert found.claims.log_rate < F(1, 4)
-    every = [cell_bounds(cell, found.held, found.claims) for cell in found.cells]
+    every = [cell_bounds(cell, found.sampled_loop, found.claims) for cell in found.cells]
     reached = {name: max(bounds[name] for bounds in every) for name in NAMES}
     assert all(reached[name] > F(9, 10) * v for name, v in sizes(found.claims).items())  # there is not much left
     smaller = SlidingClaims(**{name: UpperBound(F(9, 10) * v) for name, v in sizes(found.claims).items()})

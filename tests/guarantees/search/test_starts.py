@@ -31,8 +31,8 @@ BOXES = {"near": ("1e-5", "4e-5"), "slip": ("1e-4", "0"), "fast": ("0", "1e-3")}
 def started(box, name="real-fault", slow=True):
     known = parse_guarantee((PROOFS / f"guarantee_{name}.json").read_text())
     slip, rate = map(F, BOXES[box])
-    held = replace(known.held, initial_slip=slip, initial_slip_rate=rate)
-    return guarantee(known.task, held, known.slow_gain if slow else None)
+    held = replace(known.sampled_loop, initial_slip=slip, initial_slip_rate=rate)
+    return guarantee(known.task, held, known.varying_gain if slow else None)
 
 
 def deadbeat(e1, e2):
@@ -40,14 +40,14 @@ def deadbeat(e1, e2):
 
 
 def numbers(claim):
-    law = claim.held.law
+    law = claim.sampled_loop.law
     first = np.array(law.first, dtype=float) if law.first else None
-    return replace(attacker.numbers(claim), ends=deadbeat if law.root else None, first=first)
+    return replace(attacker.numbers(claim), ends=deadbeat if law.implicit_step else None, first=first)
 
 
 def corners(claim, courses):
     """Half of the box's corners, again and again; the courses have the signs of all."""
-    slip, rate = map(float, claim.held.start)
+    slip, rate = map(float, claim.sampled_loop.initial_errors)
     signs = np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])[np.arange(courses) // 4 % 4]
     return (signs * [slip, rate]).T
 
@@ -64,7 +64,7 @@ def along(claim, periods):
 
 def course(claim, held, choose):
     """As it is, or with an input gain of the slip alone where the proof needs that."""
-    return choose if claim.slow_gain is None else attacker.slowly(held, PIECES, choose)
+    return choose if claim.varying_gain is None else attacker.slowly(held, PIECES, choose)
 
 
 @pytest.mark.parametrize("slow", [True, False])
@@ -100,7 +100,7 @@ def test_a_sliding_mode_begins_with_the_slip_rate_that_it_is_told():
 def test_a_run_from_a_corner_stays_within_the_claims_of_its_law():
     claim, fault = started("near"), load_fault("real-fault")
     start = {"initial_slip": 1e-5, "initial_slip_rate": 4e-5}
-    run = simulate(fault, claim.held.controller, duration=0.184 * 50, samples=51, compiled=False, **start)
+    run = simulate(fault, claim.sampled_loop.controller, duration=0.184 * 50, samples=51, compiled=False, **start)
     assert (run.slip_error[0], run.slip_rate_error[0]) == pytest.approx((1e-5, 4e-5))
     assert np.abs(run.slip_error).max() <= claim.claims.slip_error
     assert np.abs(run.slip_rate_error).max() <= claim.claims.slip_rate_error
@@ -114,7 +114,7 @@ def test_a_search_leaves_from_the_corners_and_the_floats_of_a_design_know_the_st
         assert claim.claims.slip_rate_error / 1.6 <= seen.slip_rate_error <= claim.claims.slip_rate_error
         assert seen.slip_error <= claim.claims.slip_error
     assert claim.claims.slip_error <= 1.6 * errors[False].slip_error
-    guessed, bounds = estimated(claim.task, claim.held).bounds, started("fast", slow=False).recomputed()
+    guessed, bounds = estimated(claim.task, claim.sampled_loop).bounds, started("fast", slow=False).recomputed()
     assert float(guessed.slip_rate_error) == pytest.approx(float(bounds.slip_rate_error), rel=0.01)
     assert float(guessed.slip_error) == pytest.approx(float(bounds.slip_error), rel=0.01)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_held, guarantee, tightened
+from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_sampled_law, guarantee, tightened
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import aperiodic_search as unclocked
@@ -28,7 +28,7 @@ def stored():
 
 def found(rate_limited=False, **changes):
     task = replace(uncertain_plant(load_fault("lab-fault"), rate_limited=rate_limited))
-    return aperiodic_guarantee(task, replace(stored().held, **changes))
+    return aperiodic_guarantee(task, replace(stored().sampled_loop, **changes))
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +38,7 @@ def few(monkeypatch):
 
 
 def test_a_set_is_found_that_both_prove_a_little_more_than_the_stored_one():
-    claim = best_guarantee(stored().task, stored().held)
+    claim = best_guarantee(stored().task, stored().sampled_loop)
     assert claim.check() is Verdict.PROVED
     assert parse_guarantee(guarantee_text(claim)).check() is Verdict.PROVED
     assert (
@@ -48,7 +48,7 @@ def test_a_set_is_found_that_both_prove_a_little_more_than_the_stored_one():
 
 
 def test_a_narrow_range_comes_near_what_is_proved_by_a_clock():
-    held, step = stored().held, F(1, 500)
+    held, step = stored().sampled_loop, F(1, 500)
     clock = guarantee(stored().task, replace(held, step=step, longest_step=F(0)))
     near = found(step=step * F(99, 100), longest_step=step)
     assert F("0.98") * clock.claims.slip_rate_error <= near.claims.slip_rate_error
@@ -72,13 +72,13 @@ def test_a_range_that_is_too_wide_has_none_with_its_small_gain():
     none = found(longest_step=F(1, 200))
     assert isinstance(none, NoProof)
     assert "small gain" in none.reason or "no set" in none.reason
-    assert unclocked_estimate(stored().task, replace(stored().held, longest_step=F(1, 20))) is None
+    assert unclocked_estimate(stored().task, replace(stored().sampled_loop, longest_step=F(1, 20))) is None
 
 
 def test_the_estimate_of_a_search_is_near_what_is_proved():
-    guessed = unclocked_estimate(stored().task, stored().held).bounds
+    guessed = unclocked_estimate(stored().task, stored().sampled_loop).bounds
     assert float(guessed.slip_rate_error) == pytest.approx(float(stored().claims.slip_rate_error), rel=0.3)
-    none = unclocked_estimate(stored().task, replace(stored().held, longest_step=F(1, 250)))
+    none = unclocked_estimate(stored().task, replace(stored().sampled_loop, longest_step=F(1, 250)))
     assert none is None or isinstance(none.bounds, NoProof)
 
 
@@ -86,16 +86,18 @@ def test_the_estimate_of_a_search_is_near_what_is_proved():
 def test_a_design_has_a_law_for_the_middle_of_the_range(monkeypatch):
     monkeypatch.setattr(design, "_FEWER", 12)
     task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
-    claim = design_held(task, F(1, 1000), objective="peak", setup=ExactSetup(**around))
+    claim = design_sampled_law(task, F(1, 1000), objective="peak", setup=ExactSetup(**around))
     assert isinstance(claim, TrackingProof)
     assert claim.claims.slip_rate_error < F("1.6") * stored().claims.slip_rate_error
-    assert claim.held.longest_step == F(1, 500)
+    assert claim.sampled_loop.longest_step == F(1, 500)
 
 
 def test_a_law_of_the_slip_alone_has_too_many_states():
     task, around = uncertain_plant(load_fault("lab-fault")), {"longest_step": F(1, 500)}
-    assert "slip and slip rate" in design_held(task, F(1, 1000), measured="slip", setup=ExactSetup(**around)).reason
-    held = replace(stored().held, law=longer(stored().held.law))
+    assert (
+        "slip and slip rate" in design_sampled_law(task, F(1, 1000), measured="slip", setup=ExactSetup(**around)).reason
+    )
+    held = replace(stored().sampled_loop, law=longer(stored().sampled_loop.law))
     assert "too many states" in aperiodic_guarantee(task, held).reason
     assert unclocked_estimate(task, held) is None
 

@@ -11,7 +11,16 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.laws import Sampling, control_law
 from quakedesign.loop import discrete_law, schemes, simulation_scheme
-from quakedesign.loop.discrete_law import DiscreteLaw, acceleration, authority, held, rate_error, slip, slip_error, step
+from quakedesign.loop.discrete_law import (
+    DiscreteLaw,
+    acceleration,
+    applied_pressure,
+    authority,
+    rate_error,
+    slip,
+    slip_error,
+    step,
+)
 from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.loop.schemes.explicit import Explicit
@@ -19,7 +28,16 @@ from quakedesign.loop.schemes.implicit import end_rate, end_slip
 
 ONE, TWO = sp.symbols("xi_1 xi_2", real=True)
 LAW = DiscreteLaw(-2 * slip_error - 3 * rate_error - 5 * ONE, (slip_error + 4 * ONE,), (ONE,))
-KNOWN = {slip_error: 1.0, rate_error: 3.0, ONE: 0.5, step: 0.5, authority: 4.0, held: 7.0, acceleration: 6.0, slip: 9.0}
+KNOWN = {
+    slip_error: 1.0,
+    rate_error: 3.0,
+    ONE: 0.5,
+    step: 0.5,
+    authority: 4.0,
+    applied_pressure: 7.0,
+    acceleration: 6.0,
+    slip: 9.0,
+}
 
 
 def known(**own):

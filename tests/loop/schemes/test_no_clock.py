@@ -51,7 +51,7 @@ def test_samples_come_one_to_two_shortest_intervals_after_the_last_each_as_often
 
 
 def test_the_law_of_the_file_asks_for_every_pressure_of_the_run():
-    law, run = claim().held.law, seen().to_pandas()
+    law, run = claim().sampled_loop.law, seen().to_pandas()
     update, measured = (np.array(rows, dtype=float) for rows in (law.update, law.measured))
     output, feedback = (np.array(row, dtype=float) for row in (law.output, law.feedback))
     errors = np.column_stack(

@@ -39,8 +39,8 @@ def recursion(law, step, seen, reference):
 @pytest.mark.parametrize("size", [1.0, 1e3], ids=["deadbeat", "far"])
 def test_exported_c_computes_the_pressures_of_the_recursion(claim, size):
     """Within the claims, where the step is deadbeat, and a thousand times as far, where it is not; with rests."""
-    law, controller = claim.held.law, recovered(claim).controller
-    random, step = np.random.default_rng(0), float(claim.held.step)
+    law, controller = claim.sampled_loop.law, recovered(claim).controller
+    random, step = np.random.default_rng(0), float(claim.sampled_loop.step)
     rates = size * random.uniform(0, 1e-4, 60) * (random.random(60) < 0.6)
     seen = np.column_stack([np.cumsum(rates) * 0.184 / 8, rates])
     found, end = controller_step(REAL, controller), REAL.reference.operation_time
@@ -78,7 +78,7 @@ def test_its_certificate_gives_a_controller_that_runs_and_stays_within_the_claim
     """Under the disturbance of the fault, for 1600 periods on the stick-slip plant."""
     controller = recovered(claim).controller
     assert controller.sampling.scheme == "stick-slip"
-    assert controller.numbers["weight"] == claim.held.law.level_gain / claim.held.law.target_gain
+    assert controller.numbers["weight"] == claim.sampled_loop.law.level_gain / claim.sampled_loop.law.target_gain
     run = qd.simulate(REAL, controller, duration=300)
     assert run.provenance["scheme"] == "stick-slip"
     assert 0 < np.max(run.slip_rate) <= float(claim.claims.peak_slip_rate)
