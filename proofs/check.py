@@ -65,7 +65,7 @@ Refused, need = numbers.Refused, numbers.need
 
 
 class Outdated(Exception):
-    """The file is of a kind that is no longer read."""
+    """The file is of a kind that is no longer supported."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def check_guarantee(document: dict[str, Any]) -> Result:
 def read_file(name: str) -> str:
     """Read a regular file of bounded size as UTF-8."""
     if Path(name).exists() and not Path(name).is_file():
-        raise OSError("it is no regular file")
+        raise OSError("it is not a regular file")
     most = numbers.MAX_BYTES
     with open(name, "rb") as stream:
         content = stream.read(most + 1)
@@ -149,12 +149,12 @@ def report(name: str) -> int:
         print(f"{ascii(name)[1:-1]}: invalid: {error}")
         return 1
     except MemoryError:  # no verdict on the file
-        print(f"FILE must fit into memory. Received {name!a}. Raise the limit.", file=sys.stderr)
+        print(f"FILE must fit into memory. Received {name!a}. Raise the memory limit.", file=sys.stderr)
         return 4
     except Outdated:
         expected = "FILE must be a proof, a refutation or of the kind guarantee"
         remedy = "Make the new file with quakedesign certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE"
-        print(f"{expected}. Received {name!a}, of an older kind: no longer read. {remedy}.", file=sys.stderr)
+        print(f"{expected}. Received {name!a}, of an older kind: no longer supported. {remedy}.", file=sys.stderr)
         return 2
     except (OSError, ValueError) as error:
         reason = ascii(getattr(error, "strerror", None) or str(error))

@@ -30,13 +30,13 @@ _WORDS = {
     "float": "a number",
     "SX": "an expression of CasADi",
     "int": "a whole number",
-    "str": "a text",
+    "str": "a string",
     "bool": "True or False",
     "NoneType": "None",
 }
 _REMEDIES = {
     "Fault": "Write load_fault('real-fault'), say.",
-    "Controller": "Take that of design(fault, 'cta') or published('real-fault')['cta'], say.",
+    "Controller": "Use design(fault, 'cta').controller or published('real-fault')['cta'], say.",
     "Fraction": "Write Fraction('0.1'), say.",
     "float": "Give it in SI units.",
 }

@@ -70,7 +70,7 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
     except (OSError, ValueError):
         known = False
     if not known:
-        raise CertificateError(f"certificate must be a file. Received {path}, which is none. Check the path.")
+        raise CertificateError(f"certificate must be a file. Received {path}, which is not a file. Check the path.")
     try:
         raw = read_json(path)
         kind = kind_of(raw)

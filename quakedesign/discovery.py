@@ -45,7 +45,7 @@ def user_code() -> Iterator[None]:
     except BaseException as error:
         if (module := _raised_by(error)) is None:
             raise
-        raise UserCodeError(f"{module} fails with {type(error).__name__}: {error}. Mend its code.") from error
+        raise UserCodeError(f"{module} fails with {type(error).__name__}: {error}. Fix its code.") from error
 
 
 def _raised_by(error: BaseException) -> str | None:

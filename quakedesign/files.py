@@ -234,7 +234,7 @@ def _locked(folder: Path) -> int:
         When another process holds it, or the file system has no locks.
     """
     if sys.platform == "win32":
-        raise OSError("folders have no locks here")
+        raise OSError("folders cannot be locked on this system")
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

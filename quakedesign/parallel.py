@@ -174,7 +174,7 @@ class _Ending:
         number = self._number or signal.SIGINT
         if not self._said:
             self._said = True
-            kept = "nothing was written" if number_placed() == self._before else "what was written is whole"
+            kept = "nothing was written" if number_placed() == self._before else "all files written so far are complete"
             _say(one_line(f"quakedesign: {SIGNALS[number]}; {self.remedy or kept}."))
         return 128 + number
 
@@ -338,7 +338,7 @@ class Crew(ABC):
                 self.renew()
         raise SimulationError(
             f"workers must live until their tasks are done. They died {_LIVES} times, with {len(waiting)} tasks left. "
-            "Ask for fewer workers, or make room in memory."
+            "Use fewer workers, or free memory."
         )
 
     def __enter__(self) -> Self:

@@ -63,7 +63,7 @@ def has_memory() -> bool:
 
 def lack_memory() -> NoReturn:
     """End a command that has too little memory."""
-    print("quakedesign: out of memory. Raise the limit, or make the problem smaller.", file=sys.stderr)
+    print("quakedesign: out of memory. Raise the memory limit, or reduce the problem.", file=sys.stderr)
     sys.exit(LACKS_MEMORY)
 
 

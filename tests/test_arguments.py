@@ -87,17 +87,17 @@ def methods(kind):
 WRONG = {
     "a name of a law": (
         lambda: qd.simulate(LAB, "cta"),
-        "controller of simulate .* Received 'cta'. Take that of design",
+        "controller of simulate .* Received 'cta'. Use design",
     ),
     "a name of a fault": (lambda: qd.simulate("lab-fault"), "fault of simulate must be a Fault.*load_fault"),
     "a text as density": (lambda: dataclasses.replace(LAB, density="2600 kg/m^3"), "density of Fault must be a number"),
     "a float in a box": (lambda: UncertaintyBox(name="x", stiffness=0.2), "stiffness .* Fraction.* Received 0.2"),
     "a logical number": (lambda: Disturbance(constant=True), "constant of Disturbance must be a number"),
-    "no text": (lambda: qd.load_fault(None), "source of load_fault must be a text or a Path"),
+    "no text": (lambda: qd.load_fault(None), "source of load_fault must be a string or a Path"),
     "missing": (lambda: Reference(target_slip=1.0), "Reference cannot be called like this: missing .*operation_time"),
     "unknown": (lambda: qd.derive(LAB, colour=1), "derive cannot be called like this: .*colour"),
     "too few gains": (lambda: summed_integrals((), Fraction(1)), "gains of summed_integrals must be four"),
-    "no path": (lambda: qd.load_certificate(3), "path of load_certificate must be a text or a Path. Received 3"),
+    "no path": (lambda: qd.load_certificate(3), "path of load_certificate must be a string or a Path. Received 3"),
     "no entry": (lambda: headline(None), "entry of headline must be an Entry. Received None"),
     "no task": (lambda: guarantee(3, 3), "task of guarantee must be a FaultPlant. Received 3"),
     "no campaign": (lambda: run_campaign(None, 3, "x"), "must be a CampaignProblem. Received None"),
@@ -106,17 +106,17 @@ WRONG = {
         lambda: qd.guarantee(LAB, controller=3),
         "a class derived from a Controller or a Controller. Received 3",
     ),
-    "a number as a box": (lambda: LAB.with_box(3), "name of Fault.with_box must be a text. Received 3"),
+    "a number as a box": (lambda: LAB.with_box(3), "name of Fault.with_box must be a string. Received 3"),
     "a text as slip": (lambda: LAB.moment_of("x"), "slip of Fault.moment_of must be a number. Received 'x'"),
     "no premise": (lambda: DESIGN.with_premise(3), "premise of Design.with_premise must be a Premise. Received 3"),
     "no factors": (lambda: qd.Scales(factors=None), "factors of Scales must be .* Received None"),
     "no fault to scale": (lambda: qd.scaled_fault(3, None), "of scaled_fault must be .* Received 3"),
     "a number as a class": (
         lambda: DESIGN.certified_peaks(3),
-        "disturbance_class of Design.certified_peaks must be a text. Received 3",
+        "disturbance_class of Design.certified_peaks must be a string. Received 3",
     ),
     "no law to check": (lambda: CERTIFICATE.check(3), "law of Certificate.check must be .* Received 3"),
-    "nowhere to save": (lambda: CERTIFICATE.save(None), "path of Certificate.save must be a text or a Path"),
+    "nowhere to save": (lambda: CERTIFICATE.save(None), "path of Certificate.save must be a string or a Path"),
     "no values": (lambda: ExtendedLQR.from_values(3), "values of Law.from_values must be a tuple.* Received 3"),
     "no time": (lambda: Diffusion.of_time("1 s"), "time of Diffusion.of_time must be a number. Received '1 s'"),
     "a fraction as a claim": (
@@ -189,7 +189,7 @@ def test_what_differs(value, hint):
 
 def test_of_a_wrong_run_nothing_else_is_said(tmp_path):
     run = qd.simulate(LAB, qd.published("lab-fault")["elqr"], scheme="explicit", duration=0.01)
-    with pytest.raises(ParameterError, match=r"path of Trajectory.save must be a text or a Path. Received 3"):
+    with pytest.raises(ParameterError, match=r"path of Trajectory.save must be a string or a Path. Received 3"):
         run.save(3)
 
 

@@ -120,7 +120,7 @@ def test_what_was_written_is_not_denied(capsys, tmp_path):
         write_whole(tmp_path / "result", "x")
         raise KeyboardInterrupt
 
-    assert ended(block, capsys) == (130, "quakedesign: interrupted; what was written is whole.\n")
+    assert ended(block, capsys) == (130, "quakedesign: interrupted; all files written so far are complete.\n")
 
 
 def test_a_command_may_say_how_to_go_on(capsys):

@@ -188,7 +188,7 @@ def test_no_command_runs_code_that_a_file_names(command, law, code, capsys):
 def test_code_that_is_allowed_does_not_decide_the_exit_code(law, code, capsys):
     path = with_law(f"ends:{law}")
     assert answered("fault", path, "--quiet", "--allow-code") == 2
-    assert re.fullmatch(r"quakedesign: .*ends fails with \w+: .*Mend its code\.\n", capsys.readouterr().err)
+    assert re.fullmatch(r"quakedesign: .*ends fails with \w+: .*Fix its code\.\n", capsys.readouterr().err)
     assert answered("fault", path, "--quiet") == 2, "what one call allows, the next does not"
     assert "add --allow-code" in capsys.readouterr().err
 

@@ -36,7 +36,7 @@ def test_a_verdict_that_nobody_wants_told_is_the_exit_code(closed):
 def test_what_cannot_be_told_is_one_line_and_no_verdict(line):
     code, out, err = run(*COMMAND, *line, closed="1")
     assert (code, out) == (2, "")
-    assert err == "quakedesign: stdout cannot be written: it is closed. Choose another place, or make room.\n"
+    assert err == "quakedesign: stdout cannot be written: it is closed. Choose another folder, or free disk space.\n"
 
 
 def test_the_checker_of_the_standard_library_tells_its_verdict_or_says_that_it_cannot():
@@ -90,7 +90,7 @@ def test_too_little_memory_is_no_verdict(megabytes):
 
     code, out, err = run(*COMMAND, "check", PROVED, "--quiet", preexec_fn=lower)
     assert (code, out) == (streams.LACKS_MEMORY, "")
-    assert err == "quakedesign: out of memory. Raise the limit, or make the problem smaller.\n"
+    assert err == "quakedesign: out of memory. Raise the memory limit, or reduce the problem.\n"
 
 
 LACKING = [

@@ -312,7 +312,7 @@ def test_a_folder_that_is_swept_at_every_trial_is_not_had_without_a_lock(tmp_pat
 @pytest.mark.usefixtures("nothing_left")
 def test_windows_has_no_locks_of_folders(tmp_path, monkeypatch):
     monkeypatch.setattr(files.sys, "platform", "win32")
-    with pytest.raises(OSError, match="folders have no locks here"):
+    with pytest.raises(OSError, match="folders cannot be locked on this system"):
         files._locked(tmp_path)
 
 

@@ -83,7 +83,7 @@ def prove(document: dict[str, Any], positive: Statement, decrease: Statement) ->
     for part, statement in (("positive", positive), ("decrease", decrease)):
         prove_squares(document[part], statement)
         check_powers(document[part], len(statement.variables), part)
-    where = "that starts where V < level remains there and" if decrease.inequalities else "from everywhere"
+    where = "that starts where V < level remains there and" if decrease.inequalities else "from any initial state"
     return [
         f"multiplier: {terms_text(decrease.multiplier, positive)}",
         f"conclusion: every solution {where} tends to the origin, which is asymptotically stable",

@@ -48,7 +48,7 @@ def check_equalities(functional: Coded, statement: Statement) -> set[int]:
         budget.spend(comb(size + max(room, 0), size) * len(factor), 0)
         for m in monomials(size, room):
             zero = apply(functional, m, factor) == 0
-            need(zero, "the functional", "zero on all multiples of the equalities", "another number")
+            need(zero, "the functional", "zero on all multiples of the equalities", "a nonzero value")
             covered.update(m + t for t in factor)
     return covered
 
@@ -116,7 +116,7 @@ def refute_by_functional(value: Any, statement: Statement) -> list[str]:
     left = add_product({}, statement.multiplier, statement.polynomial)
     functional, target = coded(values, "functional"), coded(left, "multiplier times polynomial")
     negative = apply(functional, 0, target) < 0
-    need(negative, "the functional", "negative at multiplier times polynomial", "another number")
+    need(negative, "the functional", "negative at multiplier times polynomial", "a value that is not negative")
     kept = check_equalities(functional, statement) | set(target)
     for chosen, factor, basis in survivors(statement, kept):
         upper = [[0] * i + [apply(functional, b + c, factor) for c in basis[i:]] for i, b in enumerate(basis)]
@@ -124,6 +124,6 @@ def refute_by_functional(value: Any, statement: Statement) -> list[str]:
         need(valid, f"the moment matrix of product {list(chosen)}", "non-negative definite", "another one")
     return [
         f"functional, zero on all other monomials: {terms_text(values, statement, 'L({1}) = {0}', ', ')}",
-        "conclusion: multiplier times polynomial is no sum, of terms up to the degree, of products times sums of "
+        "conclusion: multiplier times polynomial is not a sum, with terms up to the degree, of products times sums of "
         "squares and multiples of the equalities",
     ]

@@ -70,9 +70,9 @@ def main(arguments: list[str] | None = None) -> None:
             raise
         if isinstance(error, OSError) and (error.errno in _PLACES or error.filename == "stdout"):
             where = error.filename or "the output"
-            _reject(f"{where} cannot be written: {error.strerror}. Choose another place, or make room.")
+            _reject(f"{where} cannot be written: {error.strerror}. Choose another folder, or free disk space.")
         defect = one_line(f"{type(error).__name__}: {error}")
-        print(f"quakedesign: defect: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.", file=sys.stderr)
+        print(f"quakedesign: internal error: {defect}. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.", file=sys.stderr)
         sys.exit(3)
     finally:
         release()
@@ -82,7 +82,7 @@ def _with_help(error: CycloptsError) -> str:
     """Error message of a command line, with a pointer to the help unless it is about a value and states a remedy."""
     if isinstance(error, CoercionError):
         return str(error)
-    hyphen = " A value that begins with - is joined by =." if isinstance(error, MissingArgumentError) else ""
+    hyphen = " Join a value that begins with - by =." if isinstance(error, MissingArgumentError) else ""
     return f"{error}{hyphen} See {' '.join(('quakedesign', *(error.command_chain or ())))} --help."
 
 

@@ -58,7 +58,7 @@ def blocks(
     least
         Smallest number of blocks.
     wells
-        one: one well for all blocks, whose law measures the means of slip and slip rate; each: a well for each block.
+        one: one well for all blocks (its law measures mean slip and mean slip rate); each: a well for each block.
     coupling
         Stiffness of the springs between blocks divided by the mass of a block, in 1/s^2; by default that of elastic
         strips, G·blocks²/(ρL²).
@@ -255,16 +255,16 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
             runs.append(run_sliding_chain(chain, law, sliding=sliding) if chain.has_state else run_of_chain(chain, law))
     rows = [list(_HEADS), ["", "slip rate", "slip", "slip rate", "slip", "from", "to"], *(one.row() for one in runs)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    about = "its balance" if len(chain.wells) < len(chain.blocks) else "the reference"
+    about = "its equilibrium" if len(chain.wells) < len(chain.blocks) else "the reference"
     meant = [
-        f"(box {chain.fault.box.name}; slip of a block from {about} in what is proved,",
-        "from the reference in the run)",
+        f"(box {chain.fault.box.name}; slip of a block: proved relative to {about},",
+        "in the run relative to the reference)",
     ]
-    last = "proved without stick; run with stick, where an error may pass its bound"
+    last = "proved on the plant without stick; run on the stick-slip plant, where errors may exceed the bounds"
     if chain.has_state:
-        meant = ["(largest slip rate, slip from the reference, pressure from the plan)"]
+        meant = ["(largest slip rate, slip relative to the reference, pressure relative to the plan)"]
         stress = LowerBound(sliding["stress"]).quantity("Pa")
-        last = f"proved for any shear stress of up to {stress}; run without inertia under a sine"
+        last = f"proved for any shear stress of up to {stress}; run without inertia, under a sinusoidal stress"
     lines = [
         f"{chain.name}: largest errors of {len(chain.blocks)} blocks under {counted(len(chain.wells), 'well')}",
         *meant,
@@ -281,7 +281,10 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
 def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
     """Reject lag and stress of friction without a state."""
     if not chain.has_state and any(sliding.values()):
-        raise ParameterError("--lag and --stress of several blocks need friction with a state. Omit these options.")
+        raise ParameterError(
+            "--lag and --stress of several blocks need friction with a state. Received "
+            f"{chain.fault.friction.name}. Omit these options."
+        )
 
 
 def _run_values(one: "ChainRun | SlidingChainRun") -> Json:

@@ -74,8 +74,8 @@ class DesignOptions(WellOptions):
         plant, without stick). By default the runs are on stick-slip, and so is the guarantee if one is found there;
         otherwise, and with --class rate, the guarantee is on printed. Not for rate-and-state faults, which never rest.
     whole_task
-        Rate-and-state faults: simulate the whole task instead of 500 D_c/V of it. The proof covers the whole task in
-        either case.
+        Rate-and-state faults: simulate the whole task instead of its first 500 D_c/V. The proof covers the whole task
+        in either case.
     accept_poor_fit
         Continue although the laboratory record does not support the friction law of the fault; results are labelled.
     """

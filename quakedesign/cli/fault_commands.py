@@ -249,7 +249,7 @@ def identify(
         Rates of the load point one after the other, such as '1 um/s, 10 um/s', where they are known; from its
         displacement by default.
     states
-        Number of friction states; 2 may explain a record that 1 does not, but a fault file contains one only.
+        Number of friction states; 2 may explain a record that 1 does not, but a fault file can have only 1.
     trend
         Drift of friction, linear in displacement or time, or none; by default kept if significant (F test at 1 %).
     seed

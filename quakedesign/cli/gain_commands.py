@@ -53,8 +53,8 @@ def synthesise(
     fault
         Objective sampled: preset or path of a .toml file.
     objective
-        norm: smallest norm of the gains, scaled to a bound of one on |h'|. decay: shortest certified settling time from
-        all |e_i| ≤ L̄ (the number of --lipschitz). beta: widest certified range of the input gain β. sampled: smallest
+        norm: smallest norm of the gains after scaling to |h'| <= 1. decay: shortest certified settling time from
+        all |e_i| ≤ L̄ (the value of --lipschitz). beta: widest certified range of the input gain β. sampled: smallest
         simulated error of proved gains on a fault.
     lipschitz
         Bound on |h'|, the rate of change of the matched disturbance h, in the unit of the control ν per second; by
@@ -179,7 +179,7 @@ def _print(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> 
 # ----------------------------------------------------------------------
 # The command that maps certified gains.
 
-Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
+Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
 
 
 @app.command(name="map")

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # Values of options: numbers with units, exact numbers, whole numbers, gains.
 
 # Negative decimals are accepted anyway. With leading hyphens allowed, later options would be read as values.
-Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
+Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
 
 
 def _gains(_type: object, tokens: Sequence[Token]) -> tuple[str, ...]:
@@ -47,7 +47,7 @@ def _gains(_type: object, tokens: Sequence[Token]) -> tuple[str, ...]:
     return texts
 
 
-Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains)]
+Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains, negative="")]
 
 
 def quantity(unit: str) -> Callable[[object, Sequence[Token]], float]:
@@ -163,7 +163,7 @@ Shaking = Annotated[
     str | None,
     Parameter(
         name="--disturbance",
-        help="Amplitude in place of the fault's, such as '1e-4 m/s^2', or '35 kPa' of shear stress on the fault.",
+        help="Disturbance amplitude instead of the fault's, such as '1e-4 m/s^2', or '35 kPa' of shear stress.",
     ),
 ]
 Box = Annotated[
@@ -243,7 +243,7 @@ class LawOptions:
         time), or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min the
         smallest N̂ of the box). Rate-and-state faults: designed.
     scale
-        λ of a sliding mode instead of that of the gains, decimal or p/q.
+        Scale λ of a sliding mode, decimal or p/q; replaces that of --gains.
     feedforward
         none, nominal or centred: feed-forward of a sliding mode from the known plant; not with designed gains.
     certificate
@@ -324,7 +324,7 @@ class RunOptions:
         stick). Rate-and-state faults never rest: smooth or quasi-dynamic (without inertia), by default
         smooth for one block and quasi-dynamic for several.
     step
-        Length of one step; the fault's sampling time by default.
+        Sampling time T_s, or step of the scheme continuous; the fault's T_s by default.
     duration
         Duration of the run; the operation time by default. The disturbance of the fault acts with and without control.
     substeps
@@ -424,7 +424,7 @@ class WellOptions:
         str | None,
         Parameter(
             converter=_exact_reader("m"),
-            help="Distance of the well, such as '40 m'. Give --well and --diffusivity together instead of --diffusion.",
+            help="Distance between well and fault, such as '40 m'. Give it with --diffusivity, instead of --diffusion.",
         ),
     ] = None
     diffusivity: Annotated[
@@ -453,8 +453,8 @@ class SetupOptions(WellOptions):
 # ----------------------------------------------------------------------
 # Options of the loop setup of a controller: actuator and sensors, the same for every command that runs one.
 
-_ACTUATOR = Group("Actuator, in the order of the signal (schemes that sample)")
-_SENSORS = Group("Sensors (schemes that sample)")
+_ACTUATOR = Group("Actuator stages, in signal order (sampled schemes)")
+_SENSORS = Group("Sensors (sampled schemes)")
 
 
 def _with_stage_options(options: type[Options]) -> type[Options]:
@@ -639,8 +639,8 @@ class StateOptions:
     Parameters
     ----------
     pressure
-        '5 MPa'; or pressures at times, linear in between, with a step at a repeated time: '0 s: 0 MPa, 1 day: 0 MPa,
-        1 day: 5 MPa'; or FILE.csv with columns 'time [s]' and 'pressure [Pa]' in any units.
+        Fluid pressure, such as '5 MPa'; or pressures at times, linear in between, with a step at a repeated time: '0 s:
+        0 MPa, 1 day: 0 MPa, 1 day: 5 MPa'; or FILE.csv with columns 'time [s]' and 'pressure [Pa]' in any units.
     start
         Initial state: steady (sliding; default), locked (far end of the spring at rest for --hold) or late (in the
         seismic cycle, see --share).
@@ -661,12 +661,16 @@ class StateOptions:
     stress: Pascals | None = None
     stress_period: Seconds | None = None
 
+    def free_options(self) -> list[str]:
+        """Given options that apply to a run without control alone."""
+        return [f"--{name}" for name in ("pressure", "start", "hold", "share") if getattr(self, name) is not None]
+
     def of_control(self) -> dict[str, Any]:
         """Given options of a controlled run."""
-        if any(value is not None for value in (self.pressure, self.start, self.hold, self.share)):
+        if free := self.free_options():
             raise ParameterError(
-                "--pressure, --start, --hold and --share are for runs without a controller. Received one of them with "
-                "a controller. Omit these options."
+                "--pressure, --start, --hold and --share are for runs without a controller. Received "
+                f"{', '.join(free)} with a controller. Omit these options."
             )
         return specified({"stress": self.stress, "stress_period": self.stress_period})
 

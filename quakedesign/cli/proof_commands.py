@@ -58,12 +58,12 @@ def certify(
     box
         e-LQR: uncertainty box, paper or ten-percent.
     feedback
-        e-LQR: error (k1 and k2 act on x1 - r and x2 - r', default) or state (on x1 and x2, as printed).
+        e-LQR: error (k1 and k2 act on x1 - r and x2 - r', default) or state (on x1 and x2, as in the paper).
     step
         e-LQR: sampling time of the zero-order hold, such as '140 ms' or 7/50 (s); the fault's by default.
     peaks
         e-LQR: certify peak slip and slip rate for every disturbance of a class, amplitude or rate, in continuous time
-        (the sampled loop: command guarantee).
+        (for the sampled loop use the command guarantee).
     out
         Certificate file to write. Further proofs of an e-LQR go into files beside it.
     """
@@ -205,7 +205,7 @@ def sos(
     Parameters
     ----------
     polynomial
-        Such as "x^4*y^2 + x^2*y^4 + 1 - 3*x^2*y^2": numbers, names, + - * ^ ** and parentheses.
+        Polynomial, such as "x^4 * y^2 + x^2 * y^4 + 1 - 3 * x^2 * y^2": numbers, names, + - * ^ ** and parentheses.
     on
         A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. By default all of ℝⁿ.
     multiplier
@@ -274,7 +274,7 @@ def attraction(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Prove the largest sublevel set of a Lyapunov function from which all solutions converge to the origin.
+    """Find the largest sublevel set of a Lyapunov function from which convergence to the origin is proved.
 
     Exit code 0 if a level, or with --everywhere global convergence, is proved.
 

@@ -87,7 +87,7 @@ def simulate(
     seed
         Seed of noise and jitter.
     out
-        NetCDF file to write; of a fault of several blocks, a folder.
+        NetCDF file to write; for a fault of several blocks, a folder.
     """
     options = dict(locals())
     from quakedesign.cli.block_commands import block_law, run_chain, several_blocks
@@ -100,9 +100,10 @@ def simulate(
     if (blocks := several_blocks(fault, simulate, options, accepted)) is not None:
         kind = block_law(law.controller, "none", law.certificate)
         loads = specified({"stress": state.stress, "stress_period": state.stress_period})
-        if state != StateOptions(**loads):
+        if free := state.free_options():
             raise ParameterError(
-                "several blocks have no --pressure, --start, --hold and --share. Received one of them. Omit these."
+                "--pressure, --start, --hold and --share do not apply to several blocks. Received "
+                f"{', '.join(free)}. Omit these."
             )
         if blocks.has_state and law.controller != "none":
             raise ParameterError(
@@ -385,7 +386,7 @@ def campaign(
     """Simulate many samples of the uncertainty box, disturbances, noise and initial states, and report the worst.
 
     Finished batches are kept in the folder: after an interruption the same command continues and gives the same result.
-    Exit code 0 if all samples have a result (also a diverged one), 1 if a batch failed. Give quantities with a unit,
+    Exit code 0 if all samples have a result (a diverged run is one), 1 if a batch failed. Give quantities with a unit,
     such as '20 MPa', or as numbers in SI units.
 
     Parameters
@@ -437,7 +438,7 @@ def campaign(
     folder = out or Path(f"quakedesign-{loaded.name}-campaign")
     lock_folder(folder, make=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
-    remedy(f"the same command goes on from {folder}")
+    remedy(f"run the same command again to continue from {folder}")
     with progress() as tell:
         done = run_campaign(problem, samples, folder, tell=tell, **options)
         drawn = done.plot()
@@ -465,7 +466,9 @@ def _print(problem: "CampaignProblem", done: "Campaign", result: Json, written: 
     out = console()
     happened = ", ".join(f"{len(indices)} {name.replace('_', ' ')}" for name, indices in done.events.items() if indices)
     law = problem.controller.title if problem.controller else "no control"
-    out.print(f"{problem.fault.name}, {law}: {result['samples']} samples, {result['resumed']} of them from files")
+    out.print(
+        f"{problem.fault.name}, {law}: {result['samples']} samples, {result['resumed']} of them from an earlier run"
+    )
     came_to = ", ".join(f"{len(indices)} {kind}" for kind, indices in done.kinds.items() if indices)
     out.print(f"outcomes (samples): {came_to or 'none'}")
     out.print(f"events (samples): {happened or 'none'}")

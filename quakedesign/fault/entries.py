@@ -129,7 +129,7 @@ class Table:
                 with self.problems.collected():
                     value, unit, name = self.entries[key], entry.unit, self._name(key)
                     values[entry.name] = (
-                        _of(str, value, name, "a text") if unit is None else quantity(value, unit, name)
+                        _of(str, value, name, "a string") if unit is None else quantity(value, unit, name)
                     )
             elif entry.required:
                 values[entry.name] = None

@@ -51,17 +51,17 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
         '# uncertainty = "paper"',
         "",
         f"[friction]  # {_first_paragraph(friction)}",
-        '# A law of your own, "module:Class", runs its code: such a file is read with --allow-code alone.',
+        '# A user-defined law, "module:Class", runs its code: such a file is read only with --allow-code.',
         f"law = {written(law)}  # or {', '.join(sorted(set(friction_laws()) - {law}))}",
         *_lines(entries_of(friction)),
         "",
-        f"{'' if needs_target else '# '}[task]  # what the fault shall do: slip slowly from rest to rest",
+        f"{'' if needs_target else '# '}[task]  # reference: target slip and its duration",
         *_lines(task),
         "",
         "# [disturbance]  # unmeasured acceleration; guarantees hold up to this bound",
         *_lines(DISTURBANCE),
         "",
-        "# [uncertainty]  # half-widths relative to the numbers above, from 0 up to 1, each 0 if left out",
+        "# [uncertainty]  # half-widths relative to the numbers above, from 0 to below 1; default 0",
         *_lines(WIDTHS),
     ]
     return "\n".join(lines) + "\n"
@@ -91,7 +91,7 @@ def _lines(entries: Mapping[str, FileEntry]) -> Iterator[str]:
         if entry.unit is not None:
             comment = entry.description.split("; ")[0].rstrip(".")
             if entry.default_text and not entry.required:
-                comment += f"; {entry.default_text}{',' * (', ' in entry.default_text)} if left out"
+                comment += f"; default: {entry.default_text}"
             yield f"{'' if entry.required else '# '}{key} = {written(entry.example)}{comment and f'  # {comment}'}"
 
 

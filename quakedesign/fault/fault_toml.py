@@ -299,7 +299,7 @@ def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
     try:
         raw = parse_toml(text)
     except ValueError as error:
-        remedy = "Values with a unit are in quotes, such as length = '5 km'."
+        remedy = "Put values with a unit in quotes, such as length = '5 km'."
         raise ScenarioError(f"{name} is not valid TOML: {error}. {remedy}") from None
     if {"block", "well"} & set(raw):
         raise ScenarioError(

@@ -247,7 +247,7 @@ def require_name(name: str) -> None:
     """Raise for a name that is not a valid file name on every system."""
     if not isinstance(name, str) or not _NAME.fullmatch(name) or len(name.encode()) > _MOST_BYTES:
         raise ParameterError(
-            "name must be a text of at most 60 letters, digits, spaces and _ . - (120 bytes in UTF-8), beginning "
+            "name must be a string of at most 60 letters, digits, spaces and _ . - (120 bytes in UTF-8), beginning "
             f"with a letter or digit. Received {shown(name)}."
         )
 
@@ -268,7 +268,7 @@ class Reference:
         t_op [s], positive.
     ramp : float, optional
         Rate-and-state friction: fraction of the slip that follows a smooth ramp, above 0 and below 1. The rest is
-        released at a constant rate. Omitted: a constant rate for all of it.
+        released at a constant rate.
     """
 
     target_slip: float = field(metadata=quantity("m", "5 cm", "the next rest slip", symbol="d_{max}"))
@@ -536,7 +536,10 @@ class Fault:
     reference: Reference
     sampling_time: float = field(
         metadata=quantity(
-            "s", "10 ms", "at least ten samples per e-folding time; near D_c/(20 V) with friction state", symbol="T_s"
+            "s",
+            "10 ms",
+            "at least ten samples per e-folding time, or near D_c/(20 V) if friction has a state",
+            symbol="T_s",
         )
     )
     disturbance: Disturbance = field(default_factory=Disturbance)

@@ -127,7 +127,7 @@ def si_value(quantity: object, unit: str, name: str) -> float:
         raise UnitError(f"{received}, whose unit is unknown: symbols have no plural. Write {plural[:-1]}.")
     if unit == "rad/s" and "hertz" in str(parsed.units):
         raise UnitError(
-            f"{name} must be an angular frequency in rad/s. Received {quantity!r}. Give 2π times it in rad/s."
+            f"{name} must be an angular frequency in rad/s. Received {quantity!r}. Multiply a frequency by 2π."
         )
     return float(converted.magnitude)
 

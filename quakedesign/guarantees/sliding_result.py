@@ -174,7 +174,7 @@ def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
     return (
         f"no controller whose pressure stays within {LowerBound(most).quantity('Pa')} of what the reference needs can "
         f"hold the fault through a diffusion path of L^2/D above {far.quantity('s')} (nominal parameters, linearised, "
-        "against this stress, applied from some time on)"
+        "under this stress, constant from some instant on)"
     )
 
 
@@ -183,7 +183,7 @@ def _under_less(result: SlidingGuarantee) -> str:
     if not result.proved:
         return ""
     most = LowerBound(result.task.stress).quantity("Pa")
-    return f"a proof was found for a stress of at most {most}: give --stress '{most}'; somewhat more may do"
+    return f"a proof was found for a stress of at most {most}: give --stress '{most}', or somewhat more"
 
 
 def _with_less_noise(task: SlidingPlant, step: Fraction, setup: ExactSetup, prove: Prove) -> str:

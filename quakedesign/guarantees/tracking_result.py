@@ -108,7 +108,7 @@ class TrackingGuarantee(Guarantee):
             if self.nearest is not None:
                 other = f"this law {_with_nearest(*self.nearest)}" if self.given else _with_nearest(*self.nearest)
                 if self.factor is not None:
-                    other = f"not this law, but the same law with its output times {shortly(self.factor)}"
+                    other = f"not this law, but the same law with its output multiplied by {shortly(self.factor)}"
                 lines.append(f"{other}: {self.nearest[1].sentence()}")
             if len(lines) == 1 and not self.given:
                 lines.append("no T_s was found for which a design is proved with this box, disturbance and setup")

@@ -122,7 +122,7 @@ def sign_check(
     else:
         late = ": the trend may begin with the change of rate, as slow evolution does"
         spans = {f" {what} (AIC {excess:+.3g})": other for what, (other, excess) in others.items()}
-        spans = {" in the fit that is taken" if others else "": difference, **spans}
+        spans = {" in the selected fit" if others else "": difference, **spans}
         between = ": " + ", ".join(f"from {each.low:.2g} to {each.high:.2g}{what}" for what, each in spans.items())
         text = f"the sign of a - b is open{unsteady or (late if shift is not None else between)}"
     return Check(name="sign", passed=passed, value=difference.value, limit=0.0, sentence=text)

@@ -152,7 +152,7 @@ class Identification:
     def to_try(self) -> list[str]:
         """Options that may explain a record better."""
         return [
-            "--figure, which shows where",
+            "--figure, which shows where the fit fails",
             *([_OTHER_LAW[self.law.equilibrium.name]] if self.rival is None else []),
             *(["--states 2"] if self.law.state_names == ("theta",) else []),
             *(["--stiffness of the machine, if it was measured"] if "stiffness" in self.estimates else []),
@@ -262,4 +262,4 @@ def _one_sided(estimate: ParameterEstimate) -> str:
         return f"at most {_with_unit(estimate, estimate.high)}, without a lower end"
     if math.isfinite(estimate.low):
         return f"at least {_with_unit(estimate, estimate.low)}, without an upper end"
-    return "any value fits as well"
+    return "any value fits equally well"

@@ -218,7 +218,7 @@ def prepared(record: Record, rates: Sequence[float] = (), fixed: Pieces | None =
             normal_load = replace(loading, level=None), "the normal load is followed sample by sample"
         else:
             level = float(np.mean(record.normal - normal.position(time)))
-            normal_load = replace(loading, normal=normal, level=level), "the normal load changes in straight pieces"
+            normal_load = replace(loading, normal=normal, level=level), "the normal load is piecewise linear"
         loading = replace(normal_load[0], notes=(*loading.notes, normal_load[1]))
     means = thinned(record, pieces.begins, follow=pieces.rough)
     load = means.load_point if pieces.rough else pieces.position(means.time)
@@ -229,7 +229,7 @@ def prepared(record: Record, rates: Sequence[float] = (), fixed: Pieces | None =
 
 def _in_words(pieces: Pieces) -> str:
     if pieces.rough:
-        return "the load point moves as it was measured, with its noise: --rates gives its rates"
+        return "the measured motion of the load point is used with its noise; give known rates with --rates"
     lines = [f"{rate:.4g}" for rate in pieces.rates[:6]] + ["…"] * (len(pieces.rates) > 6)
     return f"the load point moves at {', then '.join(lines)} m/s{', as given' if pieces.given else ''}"
 

@@ -94,8 +94,8 @@ def cut(record: Record) -> list[Record]:
     begins = np.empty(0) if loading is None else loading.steps
     if len(begins) < 2:
         raise RecordError(
-            f"a record that is cut into steps must have two changes of rate by a quarter. Received {len(begins)}. Name "
-            "the windows: --steps '0 s to 60 s, 60 s to 120 s'."
+            f"a record that is cut into steps must have two changes of rate of over 25 %. Received {len(begins)}. "
+            "Name the windows: --steps '0 s to 60 s, 60 s to 120 s'."
         )
     ends = [-np.inf, *((begins[1:] + begins[:-1]) / 2).tolist(), np.inf]
     inside = [(record.time >= low) & (record.time < high) for low, high in pairwise(ends)]
@@ -191,7 +191,7 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
 def _assessed(common: Identification, steps: Sequence[Identification], probability: float) -> Assessment:
     """Whether one law explains all steps, and whether a - b has one sign in it and in at least one step."""
     text = "explains" if probability >= _UNLIKELY else "does not explain"
-    sentence = f"one set of parameters {text} all steps (chance {probability:.2g})"
+    sentence = f"one set of parameters {text} all steps (p-value {probability:.2g})"
     one = Check(name="common", passed=probability >= _UNLIKELY, value=probability, limit=_UNLIKELY, sentence=sentence)
     signs = {np.sign(c.value) for step in steps for c in step.assessment.checks if c.name == "sign" and c.passed}
     sign = sign_check(common.difference, {})

@@ -305,7 +305,7 @@ class SampledLaw(SampledController):
 
 def _step(value: Any) -> Fraction:
     if not isinstance(value, str | float | int | Fraction) or isinstance(value, bool):
-        raise ParameterError(f"step of a law must be a number [s] or a text with a unit. Received {value!r:.60}.")
+        raise ParameterError(f"step of a law must be a number [s] or a string with a unit. Received {value!r:.60}.")
     step = exact_value(value, "s", "step")
     if step <= 0:
         raise ParameterError(f"step of a law must be positive. Received {shortly(step)} s.")

@@ -96,7 +96,9 @@ def uncertainty_bounds(fault: Fault, *, loading_rate: float | str = 0) -> Uncert
     """
     speed = rational(loading_rate, "loading_rate")
     if speed < 0:
-        raise ParameterError(f"loading_rate must not be negative. Received {shortly(speed)} m/s. Give its size.")
+        raise ParameterError(
+            f"loading_rate must not be negative. Received {shortly(speed)} m/s. Give its absolute value."
+        )
     needed, b, ranges = sectors(fault), least_authority(fault), plant_ranges(fault)
     values = {name: fraction_of(v) for name, v in plant.plant_values(fault).items()}
     drift = ranges[plant.k_hat][1] * speed * rational(fault.reference.operation_time)

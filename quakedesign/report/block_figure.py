@@ -54,6 +54,6 @@ def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> 
         axes[1, 1].annotate(f"{times[at]:.3g} {unit}", (edges[0], run.slip[at, 0] / factor), fontsize=SMALL - 2)
     for place in chain.wells:
         axes[1, 1].axvline(place / 1e3, color="#0072B2", linestyle="dotted", linewidth=0.8)
-    axes[1, 1].set_xlabel("along the fault [km], wells dotted", fontsize=SMALL)
+    axes[1, 1].set_xlabel("position along the fault [km] (wells: dotted)", fontsize=SMALL)
     axes[1, 1].set_ylabel(f"slip [{name}]", fontsize=SMALL)
     return finish(drawing, f"{chain.name}: {N} blocks", [], proved, legend=axes[0, 0])

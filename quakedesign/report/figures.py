@@ -77,7 +77,7 @@ def states(comparison: "Compared") -> "Figure":
                 continue
             _rate(axes[row, column], entry, comparison, divisor)
         _time_below(axes[:, column], drawing, unit)
-    note = "slip rate: band between the extremes of 40 kept samples, logarithmic beyond the largest reference rate"
+    note = "slip rate: band between the extremes of 40 stored samples, logarithmic beyond the largest reference rate"
     rates = [axis for axis in drawing.axes if axis not in axes[0]]
     return finish(
         drawing,
@@ -172,7 +172,7 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
     if close_ups:
         bottom, top = drawing.axes[0].get_ylim()
         drawing.axes[0].set_ylim(bottom, top + _ROOM * (top - bottom))
-    note = "bands between the extremes of 10 kept samples" + (
+    note = "bands between the extremes of 10 stored samples" + (
         "; insets: Δp about its mean, every step" if close_ups else ""
     )
     return finish(drawing, f"{comparison.fault.name}: fluid pressure", runs, with_diverged(comparison.entries, note))
@@ -252,7 +252,7 @@ def slow_sliding(entry: "Entry", run: "Trajectory") -> "Figure":
     state.set_xlabel(f"time [{unit}]")
     shaken = f"shear stress up to {float(np.abs(run.signals()['stress'][0]).max()) / 1e3:.3g} kPa"
     note = f"V = {first:.4g} m/s; bands between the extremes of {_width(run.time)} instants; {shaken}"
-    return finish(drawing, f"{fault.name} held in slow sliding", [run], note, legend=rate)
+    return finish(drawing, f"{fault.name}: controlled slow sliding", [run], note, legend=rate)
 
 
 def errors(entry: "Entry", run: "Trajectory") -> "Figure":
@@ -349,7 +349,7 @@ def overview(comparison: "Compared") -> "Figure":
     rate.set(yscale="log", ylabel="slip rate [m/s]", ylim=(floor, 3 * max(float(speed.max()), floor)))
     slip.set_ylabel(f"slip [{unit}]")
     slip.set(xscale="log", xlabel="time [s]", xlim=(first, last))
-    note = f"largest value in each of 25 parts of a decade; gaps: slip rate below {floor:.1g} m/s, or at rest"
+    note = f"largest value in each 1/25 of a decade; gaps: slip rate below {floor:.1g} m/s, or at rest"
     title = f"{comparison.fault.name}: with and without control"
     return finish(drawing, title, ran, with_diverged(comparison.entries, note), legend=rate)
 
@@ -420,7 +420,7 @@ def error_figure(comparison: "Compared") -> "Figure":
         axis.set_ylabel(label)
     rate.set_xlabel(f"time [{unit}]")
     title = f"{comparison.fault.name}: tracking errors"
-    return finish(drawing, title, runs, with_diverged(comparison.entries, "largest of 40 kept samples"), legend=slip)
+    return finish(drawing, title, runs, with_diverged(comparison.entries, "largest of 40 stored samples"), legend=slip)
 
 
 def _proved_bounds(slip: "Axes", rate: "Axes", entries: "Sequence[Entry]") -> None:

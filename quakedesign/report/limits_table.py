@@ -86,7 +86,7 @@ def _meaning(limits: Limits) -> list[str]:
 def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     lines = [
         "infeasible: every controller, linear or not, fails for the nominal fault linearised about slow sliding along "
-        "its task, without inertia; for the fault itself these limits are as good as the linearisation",
+        "its task, without inertia; for the fault itself these limits are approximations by linearisation",
         "slip-rate error: it holds even for a controller that knows slip, slip rate, state and stress up to each "
         "sample; the stress may jump",
     ]

@@ -101,7 +101,7 @@ ASKED = {
     "along_reference": "reference and disturbance alone change h no faster than the law withstands",
     "level_set": "a start at rest lies in the certified region, at every phase of the disturbance",
     "on_trajectory": "in the run that is shown, h changes no faster than the law withstands",
-    "constant_reference": "the reference stands still",
+    "constant_reference": "the reference is constant",
     "vanishing_disturbance": "the disturbance vanishes at the equilibrium",
     "pressure_at_rest": "the pressure that the task needs lies inside the limits of the law",
     "differentiator": "the slip rate is estimated by a differentiator that is fast enough",
@@ -187,13 +187,13 @@ def _slowly(entry: "Entry") -> list[str]:
         return []
     cells = "one cell" if len(proof.cells) == 1 else f"{len(proof.cells)} cells"
     return [
-        "The pressure at the well is p plus a planned pressure, which grows at the rate kV/(μ*A): what the nominal "
-        "fault needs along its reference.",
+        "The pressure at the well is p plus a planned pressure, which the nominal fault needs along its reference and "
+        "which grows at the rate kV/(μ* A).",
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
         "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
         "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
-        f"terms of the claimed bounds, and the claims imply themselves (small gain). They hold {proof.lasts}. The box "
-        f"of constants is divided into {cells}.",
+        "terms of the claimed bounds, and these bounds lie within the claims (small gain). They hold "
+        f"{proof.lasts}. The box of constants is divided into {cells}.",
     ]
 
 
@@ -385,18 +385,18 @@ CAPTIONS = {
     "allows. Slip and its reference, slip rate and its proved bound, fluid pressure in the fault, and friction state "
     "divided by its value in steady sliding.",
     "sliding-errors": "How far slip and slip rate are from their references in the run of slow sliding.",
-    "states": "Closed loop: slip and its reference on top, then the band that the slip rate of every law fills. The "
+    "states": "Closed loop: slip and its reference on top, then the range of the slip rate under each law. The "
     "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",
     "pressure": "Fluid pressure that every law commands; below zero fluid is withdrawn.",
     "errors": "How far slip and slip rate are from their references, the largest of every 40 stored samples. Lower is "
     "better.",
     "metrics": "Largest errors, root mean square and total variation of the pressure after a quarter of the task. "
     "Hatched: published gains.",
-    "friction-law": "Friction coefficient over slip, and the line along which the spring unloads: where friction falls "
+    "friction-law": "Friction against slip, and the line along which the spring unloads: where friction falls "
     "faster than the spring, the fault is unstable.",
     "earthquakes": "Natural earthquake and the one that a constant injection induces.",
-    "friction-coefficient": "Friction coefficient in closed loop between its smallest and largest value.",
-    "errors-and-power": "Errors and pressure over those of the e-LQR; bars to the left of one are better.",
+    "friction-coefficient": "Friction coefficient in closed loop; dotted: its smallest and largest values.",
+    "errors-and-power": "Errors and pressure divided by those of the e-LQR; values below 1 are better.",
     "peak-against-tracking": "What tracking costs: simulated errors against the guaranteed slip-rate error, one point "
     "a design.",
 }

@@ -90,7 +90,7 @@ def peak_against_tracking(study: "PaperRuns") -> "Figure":
             short = point.objective.removeprefix("tracking, ").removesuffix(" times the peak")
             axis.annotate(short, (x, value / divisor), textcoords="offset points", xytext=(4, 4), fontsize=SMALL - 1)
         axis.set(xlabel=f"guaranteed slip-rate error [{unit}]", ylim=(0, 1.15 * max(seen) / divisor))
-        axis.set_ylabel(f"{'slip' if base == 'm' else 'slip-rate'} error seen [{name}]")
+        axis.set_ylabel(f"simulated {'slip' if base == 'm' else 'slip-rate'} error [{name}]")
         axis.margins(x=0.12)
     note = "peak: smallest slip-rate error, plant without stick; numbers: allowed multiple of it for tracking"
     title = f"{study.comparison.fault.name}: peak against tracking of the e-LQR"
@@ -185,7 +185,7 @@ def _bars(axis: "Axes", shown: "list[tuple[Entry, dict[str, Any]]]", name: str, 
     axis.axvline(1, color="black", linewidth=0.8)
     axis.set_yticks(range(len(shown)), [entry.label for entry, _ in shown])
     named(axis, title)
-    axis.set_xlabel("over e-LQR [-]")
+    axis.set_xlabel("ratio to e-LQR [-]")
     if logarithmic:
         axis.set_xscale("log")
         low, high = min(*values, 1.0), max(*values, 1.0)

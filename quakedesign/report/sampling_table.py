@@ -31,12 +31,12 @@ COLUMNS = (
     "slip error [m]",
     "rate error [m/s]",
     "RMS p [MPa]",
-    "path p [GPa]",
+    "tot. var. p [GPa]",
     "at rest",
     "on tra- jectory",
 )
 FOOTNOTE = (
-    "On trajectory: largest |Δh/Δt| over what the certificate covers (λ·L̄); a dash stands for gains without one here. "
+    "On trajectory: largest |Δh/Δt| divided by the bound of the certificate (λ·L̄); a dash: no certificate here. "
     "Certificates are about continuous time: none covers the errors of a scheme, and the compensated one "
     "has an estimate in place of the law's integral state."
 )

@@ -92,7 +92,7 @@ def _hold_gaps(entry: "Entry") -> list[str]:
         return ["UNSTABLE with zero-order hold"]
     used, longest = rational(step), entry.zero_order_hold.largest_step
     if longest is None:
-        return ["zero-order hold is proved for no T_s"]
+        return ["with zero-order hold, stability is proved for no T_s"]
     own = used == entry.zero_order_hold.step and entry.zero_order_hold.runs.verdict is Verdict.PROVED
     if not (used <= longest or own):
         return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved"]
@@ -129,7 +129,7 @@ def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
     event = waiting(run, fault)
     if event is None:
         return None
-    text = f"the fault is unstable, but its event has not begun at {run.time[-1]:.4g} s"
+    text = f"the fault is unstable, but its event has not begun by {run.time[-1]:.4g} s"
     if event.onset is None:
         return f"{text}: no forward disturbance acts; without --duration the run adds one"
     return f"{text}: growing by {event.growth:.3g} 1/s it would begin at about {event.onset:.3g} s"
@@ -221,7 +221,9 @@ def margin_lines(analysis: Analysis) -> list[str]:
         lines.append(f"friction-slope margin {slope.certified:.5g} certified; unstable from {slope.limit:.5g} on")
     if span is not None:
         end = f"unstable at {span.low_limit:.4g}"
-        lines.append(f"beta down to {span.low:.4g} ({end}) or up to {span.high:.4g} is certified")
+        lines.append(
+            f"certified: beta from {span.low:.4g} ({end}) to the top of the box, and from its bottom to {span.high:.4g}"
+        )
     return lines
 
 
@@ -483,7 +485,7 @@ def state_run_lines(result: Json) -> list[str]:
         lines.append(f"slip of an event {cycle['slip']:.4g} m, magnitude {cycle['magnitude']:.2f}")
     lines += [_event_line(number, event) for number, event in enumerate(events[:_MOST_EVENTS], start=1)]
     if len(events) > _MOST_EVENTS:
-        lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json has them all)")
+        lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json lists all)")
     lines.append(f"energy error of the integration: {result['energy']['relative_residual']:.2g} of the largest energy")
     return lines
 
@@ -510,7 +512,7 @@ def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
     """Beginning of run and proof of slow sliding, and the share of an earthquake's slip in their task."""
     task = fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
-    text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; the way there from rest is not"
+    text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; the transition from rest is not"
     share = (
         ""
         if slip is None

@@ -21,7 +21,7 @@ COLUMNS = (
     "least p [Pa]",
     "largest p [Pa]",
     "RMS of p [Pa]",
-    "path of p [Pa]",
+    "total variation of p [Pa]",
     "at rest",
 )
 _METRICS = (

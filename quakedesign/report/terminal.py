@@ -150,7 +150,7 @@ def printed_lines(rows: list[Json], fault: str = "") -> list[str]:
         return ["", *LABORATORY] if fault == "lab-fault" else []
     sticks = any(row["plant"] == "stick-slip" for row in rows)
     plant = " on the stick–slip plant (--plant printed simulates the paper's plant)" if sticks else ""
-    return ["", f"printed in the paper, and found here{plant}:"] + [
+    return ["", f"printed in the paper, and computed here{plant}:"] + [
         f"  {row['run']}, {row['metric']}: {row['printed']:.3g} {row['unit']} printed ({row['place']}), "
         f"{row['found']:.3g} found, ratio {row['ratio']:.3g}. {row['note']}"
         if row["ratio"] is not None

@@ -71,8 +71,8 @@ def natural_earthquake(
     fault.require_memoryless("the natural earthquake")
     if not abs(pressure) < fault.effective_normal_stress:
         raise ParameterError(
-            f"pressure must be below the effective normal stress ({fault.effective_normal_stress!r} Pa) in size. "
-            f"Received {pressure!r} Pa."
+            f"pressure must be below the effective normal stress ({fault.effective_normal_stress!r} Pa) in absolute "
+            f"value. Received {pressure!r} Pa. Reduce it."
         )
     growth = derive(fault).eigenvalues[0].real
     nudge = event_nudge(fault) if growth > 0 else 0.0

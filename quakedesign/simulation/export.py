@@ -58,7 +58,7 @@ _USE_OF_WELLS = {
     "limited": "{plan}If pump or valve limit a pressure, the law winds up: proved pressures must be within the limits.",
 }
 _ADDED = """Add the planned pressure (below) to each, continuously in time and not in steps: the proof assumes that the
-planned pressure reaches the fault unchanged, and that the pressure written here passes the proved lag. """
+planned pressure reaches the fault unchanged, and that the pressure written here passes through the proved lag. """
 _APPLIED_INPUT = " and the pressure [Pa] applied since the last call"
 _APPLIED = """
    applied may be a null pointer: then the pressure of the last call counts as applied (0 before the first call)."""

@@ -404,13 +404,13 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
         )
     if not derive(fault).unstable:
         raise ParameterError(
-            f"late in the cycle needs a fault with repeated events. Received {fault.name}, which slides stably. "
+            f"a start late in the cycle needs repeated events. Received {fault.name}, which slides stably. "
             "Start it in steady sliding."
         )
     found = cycles(fault, rate, **settings)
     if len(found.onsets) < _CYCLES:
         raise ParameterError(
-            f"late in the cycle needs a fault with repeated events. Received {fault.name}, with {len(found.onsets)} of "
+            f"a start late in the cycle needs repeated events. Received {fault.name}, with {len(found.onsets)} of "
             f"them in {found.time[-1]:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
         )
     before, after = found.onsets[-2:]

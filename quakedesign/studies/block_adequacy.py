@@ -51,7 +51,7 @@ class BlocksResult:
             if not one.available or ends is None:
                 parts.append(f"{blocks:3} blocks: {one.sentence()}")
                 continue
-            about = "its balance" if self.wells == "one" else "the reference"
+            about = "its equilibrium" if self.wells == "one" else "the reference"
             parts.append(
                 f"{blocks:3} blocks: proved: slip-rate error at most {ends[1]:.4g} m/s, slip within {ends[0]:.4g} m of "
                 f"{about}"

@@ -220,8 +220,12 @@ def _sliding(chain: BlockChain) -> tuple[np.ndarray, ...]:
 
     The last two matrices give ln(v/V) as a function of these states and of the stresses.
     """
-    if any(block.friction.stress_exponents[0] for block in chain.blocks):
-        raise ParameterError("limits of slow sliding need stress_sensitivity 0. Received another. Simulate this fault.")
+    for place, block in enumerate(chain.blocks, start=1):
+        if block.friction.stress_exponents[0]:
+            raise ParameterError(
+                "limits of slow sliding need stress_sensitivity 0. Received "
+                f"{float(block.friction.stress_exponents[0]):g} in block {place}. Simulate this fault."
+            )
     models, N = [sliding_model(fault) for fault in chain.faults], len(chain.blocks)
     strength, weakening, aged, friction = (
         np.array([float(getattr(model, name)) for model in models])

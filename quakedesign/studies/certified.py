@@ -234,11 +234,11 @@ def _limit_lines(largest: CertifiedLimit) -> list[str]:
     value = f"{LowerBound(largest.value)} (exactly {largest.value})"
     text = f"largest {names[largest.quantity]}: {value}, V of degree {largest.degree}"
     if largest.beyond is None and largest.sharp:
-        return [text, "which is within 1e-4 of what no Lyapunov function can exceed"]
+        return [text, "this is within 1e-4 of the limit for every Lyapunov function"]
     if largest.beyond is None:
-        return [text, "the search stopped there and met no upper limit"]
-    beyond = f"at {UpperBound(largest.beyond)} the search finds none of degree {degrees}"
-    return [text, beyond if largest.sharp else f"{beyond}; in between it is not known"]
+        return [text, "the search ended there without reaching an upper limit"]
+    beyond = f"at {UpperBound(largest.beyond)} no function of degree {degrees} was found"
+    return [text, beyond if largest.sharp else f"{beyond}; between both values nothing is known"]
 
 
 def _limit_line(limit: Fraction | None) -> str:

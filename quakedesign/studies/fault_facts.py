@@ -377,7 +377,7 @@ def beyond_rest(fault: Fault) -> str:
 def sampling_sentence(adequacy: SamplingAdequacy) -> str:
     """Whether T_s is short enough for the instability, and the largest adequate T_s."""
     if adequacy.adequate_step is None:
-        return f"T_s = {adequacy.step:.4g} s: nothing grows between two samples"
+        return f"T_s = {adequacy.step:.4g} s: no unstable pole limits it"
     pole = f"at most {UpperBound(adequacy.pole):.4g}" if adequacy.over_box else f"{adequacy.pole:.4g}"
     where = "over the uncertainty box" if adequacy.over_box else "of the nominal fault"
     longest = LowerBound(Fraction(adequacy.adequate_step)).quantity("s")

@@ -238,9 +238,9 @@ class ChainRun:
         if run is not None:
             did = ", as pressures do here" if left else ""
             parts += [f"run: {lasting(float(run.times[-1]))} on the stick-slip plant, where errors and pressures may"]
-            parts += [f"exceed bounds, which are proved of the plant without stick{did}"]
+            parts += [f"exceed bounds that are proved for the plant without stick{did}"]
             if len(chain.wells) < N:
-                parts.append("slip error: proved about a block's equilibrium, in the run about the reference")
+                parts.append("slip error: proved from a block's equilibrium, in the run from the reference")
             for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
                 parts += [f"{event}: the run is outside the model"] if happened else []
         return parts
@@ -425,7 +425,7 @@ class SlidingChainRun:
             ]
             return [
                 *parts,
-                f"{'within' if self.within else 'OUTSIDE'} what is proved of slips, slip rates, states and pressures",
+                f"{'within' if self.within else 'OUTSIDE'} the proved bounds of slips, slip rates, states and pressures",
             ]
         events = self.events
         loaded = f"{self.chain.name}, loaded from afar at {quantity(self.run.loading_rate, 'm/s')}"

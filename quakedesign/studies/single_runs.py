@@ -325,7 +325,9 @@ def _start(
     if kind == "late":
         return late_in_cycle(fault, rate, 0.9 if share is None else share, **settings)
     if hold is None:
-        raise ParameterError("a locked start needs the duration of the hold. Received none. Give --hold.")
+        raise ParameterError(
+            "a locked start needs the time for which the far end is at rest. Received none. Give --hold."
+        )
     return locked(fault, rate, hold, **settings)
 
 
@@ -491,13 +493,13 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         )
     if not claim.sampled or claim.slides != (fault.friction.equilibrium is STEADY_SLIDING):
         raise CertificateError(
-            "the law of a certificate runs once per sample, and is about friction with a state where that of the fault "
-            f"has one. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
+            "the certificate must be of a sampled law, and about friction with a state only if the fault has such "
+            f"friction. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
         )
     if differences := _differences(fault, claim):
         raise CertificateError(
             f"a certificate must be about the fault. Received {path} about {claim.task.name}, and {fault.name}: "
-            f"{'; '.join(differences)}. Give the fault that it is about, or prove a new one with guarantee."
+            f"{'; '.join(differences)}. Give the fault of the certificate, or make a new certificate with guarantee."
         )
     if claim.implicit_step is not None:
         controller: Controller = recovered(claim).limited
@@ -587,7 +589,7 @@ def _with_gains(
     """Law, and its certified bound on |h'| for λ = 1."""
     law = control_law(name)
     if len(gains) == 1 and gains[0].isalpha():
-        require_known(gains[0], (*PUBLISHED, *DESIGNED, *CONTINUOUS), "gains in a word", UnknownNameError)
+        require_known(gains[0], (*PUBLISHED, *DESIGNED, *CONTINUOUS), "a name of gains", UnknownNameError)
     if gains == PUBLISHED:
         laws = published(fault.name)
         if name not in laws:
@@ -621,7 +623,11 @@ def _designed_for_path(fault: Fault, name: str, path: Mapping[str, float]) -> Co
     result: Any = guarantee(fault, name, setup)
     if not result.proved:
         text = ", ".join(f"{part} {time:g} s" for part, time in path.items())
-        sooner = f"--step '{float(result.shorter.sampled_loop.step):g} s', where it has, " if result.shorter else ""
+        sooner = (
+            f"--step '{float(result.shorter.sampled_loop.step):g} s', for which a proof was found, "
+            if result.shorter
+            else ""
+        )
         raise ParameterError(
             f"designed gains must have a proof with this delay, lag or diffusion path. Received {name} with {text}, "
             f"T_s = {fault.sampling_time:g} s: {result.proof.reason}. Give {sooner}gains as numbers, or see limits."

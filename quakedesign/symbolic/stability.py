@@ -288,7 +288,7 @@ _AT_REST = _Forms(
     jacobian=lambda names: plant.jacobian(),
     acceleration=lambda law: plant.with_law(plant.shifted_acceleration(), law),
     instability=lambda law: plant.instability(),
-    soft="the spring unloads slower than friction weakens with slip",
+    soft="the spring unloads more slowly than friction weakens with slip",
 )
 _SLIDING = _Forms(
     general=state_plant.sliding_acceleration,
@@ -371,7 +371,7 @@ class Model:
             plant.k_hat: self._forms.soft + ": stiffness {} < {} 1/s²",
             plant.eta_hat: "damping is weaker than the rate weakening of friction: {} < {} 1/s",
         }
-        other = "a condition of Routh and Hurwitz fails: {} < {}"
+        other = "a Routh–Hurwitz condition for stability fails: {} < {}"
         conditions = self.instability.args if isinstance(self.instability, sp.Or) else (self.instability,)
         sides = [(c, [sp.N(side.subs(self.values), _DIGITS) for side in c.args]) for c in conditions]
         return tuple(

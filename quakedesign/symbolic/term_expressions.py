@@ -133,7 +133,7 @@ def real_symbols(names: Iterable[str]) -> dict[str, sp.Symbol]:
     """
     listed = list(names)
     if wrong := [name for name in listed if not isinstance(name, str)]:
-        raise ParameterError(f"names must be texts. Received {shown(wrong[0])}. Write for example 'x'.")
+        raise ParameterError(f"names must be strings. Received {shown(wrong[0])}. Write for example 'x'.")
     return {name: sp.Symbol(name, real=True) for name in listed}
 
 

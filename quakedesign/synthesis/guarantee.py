@@ -1,6 +1,6 @@
 """`quakedesign.guarantee`: proved bounds of a sampled loop, for given laws or designs."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from fractions import Fraction
@@ -172,17 +172,25 @@ def guarantee(
     setup = setup.with_given(**entered)
     if plant is not None:
         require_known(plant, PLANTS, "plant")
+    chosen: dict[str, object] = {
+        f"plant {plant!r}": plant not in (None, PRINTED),
+        f"objective {objective!r}": objective != OBJECTIVES[0],
+        f"class {disturbance_class!r}": disturbance_class != CLASSES[0],
+        "gains": len(gains),
+        "scheme": scheme is not None,
+        "spread": exact_value(spread, "", "spread"),
+    }
     if isinstance(fault, BlockChain):
         fault = replace(fault, fault=with_accepted_fit(fault.fault, accept_poor_fit))
         setup = setup if law is not None or setup.step else setup.with_given(step=rational(fault.fault.sampling_time))
         if fault.has_state:
-            usual = (law, tuple(gains), plant or PRINTED) == (None, (), PRINTED) and controller in ("elqr", *BLOCK_LAWS)
-            usual = usual and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
-            usual = usual and not exact_value(spread, "", "spread")
-            if not usual or stress is None or setup.given().keys() - {"step", "lag"}:
+            designed = controller in ("elqr", *BLOCK_LAWS)
+            other = dict.fromkeys(sorted(setup.given().keys() - {"step", "lag"}), True)
+            wrong = chosen | other | {"law": law is not None, f"controller {controller!r}": not designed}
+            if stress is None or any(wrong.values()):
                 raise ParameterError(
-                    "blocks in slow sliding are guaranteed with a designed law: give stress (--stress), lag (--lag, "
-                    "such as D_c/(10 V)) and perhaps step (--step, such as D_c/(20 V)); omit all else"
+                    "a guarantee of blocks in slow sliding needs stress (--stress) and lag (--lag, near D_c/(10 V)), "
+                    f"and takes only step (--step, near D_c/(20 V)) besides. Received {_names(wrong, 'no stress')}."
                 )
             blocks = SlidingBlocks(chain=fault, lag=setup.lag, stress=exact_value(stress, "Pa", "stress"))
             assert setup.step is not None
@@ -190,13 +198,12 @@ def guarantee(
             return PlantGuarantee(proof=proof)
         fault = UncertainPlant.from_blocks(fault)
     if isinstance(fault, UncertainPlant):
-        usual = plant in (None, PRINTED) and (objective, scheme, disturbance_class) == (OBJECTIVES[0], None, CLASSES[0])
-        designed = law is None and not len(gains) and "slope of block 1" in fault.sectors
-        named = isinstance(controller, str) and (controller == "elqr" or (designed and controller in BLOCK_LAWS))
-        if not usual or not named or stress is not None or exact_value(spread, "", "spread"):
+        of_blocks = law is None and not len(gains) and "slope of block 1" in fault.sectors
+        named = isinstance(controller, str) and (controller == "elqr" or (of_blocks and controller in BLOCK_LAWS))
+        wrong = chosen | {"gains": False, "stress": stress is not None, f"controller {controller!r}": not named}
+        if any(wrong.values()):
             raise ParameterError(
-                "an uncertain plant is guaranteed with a law or gains alone. Received controller, objective, scheme, "
-                "class, plant, stress or spread. Omit these."
+                f"a guarantee of an uncertain plant needs a law or gains alone. Received {_names(wrong)}. Omit these."
             )
         proof = guarantee_plant(fault, law, gains, setup, decentralised=controller == BLOCK_LAWS[1])
         return PlantGuarantee(proof=proof)
@@ -211,20 +218,12 @@ def guarantee(
         raise ParameterError("law and controller are the same argument. Received both. Omit controller.")
     slides = fault.friction.equilibrium is STEADY_SLIDING
     if law is not None:
-        wrong = {
-            f"{fault.friction.name} friction": slides,
-            f"plant {plant!r}": plant not in (None, PRINTED),
-            f"objective {objective!r}": objective != OBJECTIVES[0],
-            "gains": len(gains),
-            "scheme": scheme is not None,
-            "stress": stress is not None,
-            "spread": exact_value(spread, "", "spread"),
-        }
+        wrong = chosen | {f"{fault.friction.name} friction": slides, "stress": stress is not None}
+        wrong[f"class {disturbance_class!r}"] = False
         if any(wrong.values()):
             raise ParameterError(
                 "a given law has guarantees on the plant without stick, for friction without a state. Received "
-                f"{', '.join(name for name, is_wrong in wrong.items() if is_wrong)}. Omit these, "
-                "or use a fault whose friction has no state."
+                f"{_names(wrong)}. Omit these, or use a fault whose friction has no state."
             )
         require_known(disturbance_class, CLASSES, "class")
         task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")
@@ -234,13 +233,18 @@ def guarantee(
         fault.friction.require(stick_slip=True)
         require_known(disturbance_class, CLASSES, "class")  # a proof for the class amplitude holds for the class rate
         family = control_law(controller)
-        usual = (family.name, tuple(gains), scheme) == ("elqr", (), None)
-        if method_of(family).takes_base_gains:
-            usual = scheme in (None, STICK_SLIP)
-        if not usual or stress is not None or exact_value(spread, "", "spread"):
+        takes_gains = method_of(family).takes_base_gains
+        wrong = {
+            f"controller {family.name!r}": not takes_gains and family.name != "elqr",
+            "gains": not takes_gains and len(gains),
+            f"scheme {scheme!r}": scheme not in ((None, STICK_SLIP) if takes_gains else (None,)),
+            "stress": stress is not None,
+            "spread": chosen["spread"],
+        }
+        if any(wrong.values()):
             raise ParameterError(
-                "the stick-slip plant is guaranteed with a designed elqr, or a sliding mode in the scheme stick-slip, "
-                "and friction without a state: omit gains of an elqr, scheme, stress and spread"
+                "a guarantee on the stick-slip plant needs a designed elqr or a sliding mode in the scheme stick-slip, "
+                f"and friction without a state. Received {_names(wrong)}. Omit these."
             )
         require_known(objective, OBJECTIVES, "objective")
         mode = method_of(family).base_law(uncertain_plant(fault), family, _exact_texts(gains))
@@ -248,12 +252,12 @@ def guarantee(
     stress_bound = None if stress is None else exact_value(stress, "Pa", "stress")
     uncertainty = exact_value(spread, "", "spread")
     if slides:
-        usual = (tuple(gains), scheme, objective, disturbance_class) == ((), None, OBJECTIVES[0], CLASSES[0])
-        if not usual or setup.given().keys() - set(_OF_SLOW_SLIDING):
+        wrong = chosen | dict.fromkeys(sorted(setup.given().keys() - set(_OF_SLOW_SLIDING)), True)
+        wrong["spread"] = False
+        if any(wrong.values()):
             raise ParameterError(
                 "slow sliding has a guarantee for a designed law of the slip alone, from steady sliding, under a "
-                "stress of bounded amplitude. Received gains, a scheme, rate noise, an objective, a disturbance class, "
-                "an initial slip or slip rate, jitter or averaging. Omit these options."
+                f"stress of bounded amplitude. Received {_names(wrong)}. Omit these options."
             )
         tell: Any = {} if progress is None else {"tell": progress}
         return guarantee_sliding(
@@ -299,6 +303,11 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
     if not slow or result.proved:
         return result
     return replace(result, proof=NoProof(reason=slow))
+
+
+def _names(wrong: Mapping[str, object], otherwise: str = "") -> str:
+    """Names of what was given and does not apply."""
+    return ", ".join(name for name, is_wrong in wrong.items() if is_wrong) or otherwise
 
 
 def _exact_texts(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:

@@ -66,8 +66,9 @@ class SlidingModes(DesignMethod[SlidingMode]):
         problem.require_exact_in_continuous_time()
         if problem.setup.path:
             raise UnsupportedError(
-                f"sliding modes are designed without delay, lag and diffusion path. Received one of these with "
-                f"{law.name}. Design an elqr, or use guarantee for a sliding mode with given gains."
+                f"sliding modes are designed without delay, lag and diffusion path. Received "
+                f"{', '.join(problem.setup.path)} with {law.name}. Design an elqr, or use guarantee for a sliding mode "
+                "with given gains."
             )
         if problem.feedforward != NONE and not problem.continuous:
             raise ParameterError(

@@ -181,12 +181,18 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
 
 def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: type[ExtendedLQR]) -> Designed:
     """Design of a law of the slip alone for slow sliding along the task."""
-    usual = OBJECTIVES[0], CLASSES[0]
-    if problem.continuous or (problem.objective, problem.disturbance_class) != usual or problem.setup.noise:
+    wrong = {
+        "continuous": problem.continuous,
+        f"objective {problem.objective!r}": problem.objective != OBJECTIVES[0],
+        f"class {problem.disturbance_class!r}": problem.disturbance_class != CLASSES[0],
+        "noise": bool(problem.setup.noise),
+    }
+    if any(wrong.values()):
         raise ParameterError(
             "a law for friction with a state is designed for the sampled loop without noise, with the objective "
-            f"{OBJECTIVES[0]} and the disturbance class {CLASSES[0]}. Received continuous, noise, another objective "
-            "or class. Omit these options, or use guarantee, which takes slip noise."
+            f"{OBJECTIVES[0]} and the disturbance class {CLASSES[0]}. Received "
+            f"{', '.join(name for name, is_wrong in wrong.items() if is_wrong)}. Omit these options, "
+            "or use guarantee, which takes slip noise."
         )
     fault = problem.fault
     path = wanted.diffusion or near_path(sliding_model(fault))

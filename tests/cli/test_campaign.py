@@ -48,7 +48,7 @@ def test_json_then_resumed_then_run_again(call, tmp_path):
 def test_for_people(call):
     code, out, err = call("--samples", "4", "--search", "peak_slip_rate")
     assert (code, err) == (0, "")
-    assert "4 samples, 0 of them from files" in out
+    assert "4 samples, 0 of them from an earlier run" in out
     assert "peak_slip_rate" in out
     assert "search-" in out
 
@@ -71,7 +71,7 @@ def test_ctrl_c_says_that_it_can_go_on(call, monkeypatch):
     monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(Interrupted()))
     code, _, err = call("--samples", "2")
     assert code == 130
-    assert "the same command goes on from" in err
+    assert "run the same command again to continue from" in err
     monkeypatch.setattr(running, "crew_of", lambda *_: UserExecutor(SerialExecutor()))
     assert call("--samples", "2")[0] == 0
 
@@ -132,7 +132,7 @@ def test_people_are_told_outcomes_quantiles_search_and_failures(capsys):
     counts = {"tracked": [0, 1, 2], "earthquake": [], "diverged": [7]}
     told = {"controller": SimpleNamespace(title="e-LQR"), "kinds": counts, "events": {"peak_rate": [7], "opening": []}}
     assert printed(capsys, shown(), **told) == [
-        "lab-fault, e-LQR: 8 samples, 5 of them from files",
+        "lab-fault, e-LQR: 8 samples, 5 of them from an earlier run",
         "outcomes (samples): 3 tracked, 1 diverged",
         "events (samples): 1 peak rate",
         *TABLE,
@@ -160,7 +160,7 @@ def test_people_are_told_that_there_is_nothing(capsys):
     diverged = "search: max_slip_error = diverges in search-9 of 40 samples"
     for found, said in ((None, []), (search, [diverged])):
         assert printed(capsys, shown(search=found, failures=[])) == [
-            "lab-fault, no control: 8 samples, 5 of them from files",
+            "lab-fault, no control: 8 samples, 5 of them from an earlier run",
             "outcomes (samples): none",
             "events (samples): none",
             *TABLE,

@@ -54,15 +54,19 @@ def test_a_command_ends_with_the_number_that_it_returns(ends, value, code):
         (
             ValueError("a\nb"),
             3,
-            "quakedesign: defect: ValueError: a b. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.\n",
+            "quakedesign: internal error: ValueError: a b. Set QUAKEDESIGN_TRACEBACK=1 for the traceback.\n",
         ),
-        (MemoryError(), 4, "quakedesign: out of memory. Raise the limit, or make the problem smaller.\n"),
+        (MemoryError(), 4, "quakedesign: out of memory. Raise the memory limit, or reduce the problem.\n"),
         (
             OSError(errno.EIO, "it fails", "stdout"),
             2,
             "quakedesign: stdout cannot be written: it fails. Choose another",
         ),
-        (OSError(errno.EIO, "it fails", "/a"), 3, "quakedesign: defect: OSError: [Errno 5] it fails: '/a'. Set"),
+        (
+            OSError(errno.EIO, "it fails", "/a"),
+            3,
+            "quakedesign: internal error: OSError: [Errno 5] it fails: '/a'. Set",
+        ),
         *((OSError(getattr(errno, name), "it fails", "/a"), 2, "quakedesign: /a cannot be written") for name in DISK),
         (OSError(errno.ENOSPC, "it fails"), 2, "quakedesign: the output cannot be written: it fails. Choose another"),
         (CoercionError(msg="this is wrong"), 2, "quakedesign: this is wrong\n"),

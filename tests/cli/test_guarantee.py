@@ -202,7 +202,7 @@ def test_where_no_controller_renews_its_pressure_so_slowly_the_answer_says_so(mo
     monkeypatch.setattr(StateFeedback, "sampled", lambda *_: none)
     said = qd.guarantee(fault, step=step).proof.reason
     assert said.startswith("no controller that withdraws at most 50 MPa can hold the fault with T_s") is slow
-    assert (" s in all (for some friction of the box, against the largest disturbance" in said) is slow
+    assert (" s (for some friction of the box, under the largest disturbance" in said) is slow
     for other in ({"gains": GAINS}, {"disturbance_class": "rate"}):
         assert qd.guarantee(fault, step=step, **other) == none
 
@@ -258,7 +258,7 @@ def test_a_sliding_mode_is_guaranteed_on_the_stick_slip_plant_with_its_file(call
 @pytest.mark.parametrize(
     ("scheme", "words"),
     [("explicit", "chatters"), ("semi-implicit", "chatters"), ("continuous", "at every instant"),
-     ("implicit", "a constant pressure p* holds it at e1 = T_s²·B0·p*, here up to 0.0091 m")],
+     ("implicit", "an equilibrium pressure p* leaves the error e1 = T_s²·B0·p*, here up to 0.0091 m")],
 )  # fmt: skip
 def test_other_schemes_of_sliding_modes_get_an_honest_none(call, scheme, words):
     code, out, _ = call("real-fault", "--controller", "cta", "--scheme", scheme)

@@ -125,7 +125,7 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
     fault, around = load_fault("crustal-patch"), {"diffusion": Fraction(800)}
     found = sliding_result.guarantee_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
     assert found.reason == (
-        "too much; a proof was found for a stress of at most 20 kPa: give --stress '20 kPa'; somewhat more may do"
+        "too much; a proof was found for a stress of at most 20 kPa: give --stress '20 kPa', or somewhat more"
     )
     none = NoProof(reason="no law whose loop is stable")
     with monkeypatch.context() as patched:
@@ -158,14 +158,14 @@ def test_where_a_slip_noise_has_no_proof_a_smaller_one_that_has_is_named(monkeyp
 def test_a_stress_far_beyond_what_a_law_stands_has_no_guarantee():
     known = parse_guarantee((PROOFS / "sliding_crustal-patch.json").read_text())
     found = proved_sliding(replace(known.task, stress=20 * known.task.stress), known.sampled_loop)
-    assert found.reason.startswith("a stress of 5e+05 Pa is not shown to leave |ln(v/V)| below 0.5")
+    assert found.reason.startswith("a stress of 5e+05 Pa is not shown to keep |ln(v/V)| below 0.5")
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("guarantee", "crustal-patch"), "needs a diffusion path or a lag"),
-        (("guarantee", "crustal-patch", "--diffusion", "833 s", "--jitter", "1 s"), "jitter or averaging. Omit"),
+        (("guarantee", "crustal-patch", "--diffusion", "833 s", "--jitter", "1 s"), "Received jitter. Omit"),
         (
             ("guarantee", "crustal-patch", "--diffusion", "833 s", "--rate-limit", "1 Pa/s"),
             "no guarantee with the rate limit of a pump",

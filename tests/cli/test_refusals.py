@@ -161,7 +161,7 @@ def test_another_error_of_the_system_stays_a_defect(capsys, monkeypatch):
     monkeypatch.setattr("quakedesign.fault.load_fault", lambda *_, **__: os.read(-1, 1))
     code, _, err = run(capsys, "fault", "lab-fault")
     assert code == 3
-    assert "defect: OSError" in err
+    assert "internal error: OSError" in err
 
 
 @pytest.mark.slow
@@ -242,7 +242,7 @@ def test_a_compiler_that_cannot_be_read_is_none(capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("given", "where"),
     [
-        (("guarantee", "lab-fault", "--step", "-1 ms"), "joined by =. See quakedesign guarantee --help."),
+        (("guarantee", "lab-fault", "--step", "-1 ms"), "by =. See quakedesign guarantee --help."),
         (("limits", "lab-fault", "lab-fault"), "See quakedesign limits --help."),
         (("--json", "fault", "lab-fault"), "See quakedesign --help."),
         (("fault", "lab-fault", "--where", "x"), "See quakedesign fault --help."),
@@ -266,4 +266,4 @@ def test_a_folder_is_no_certificate(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         main(["check", str(tmp_path)])
     assert end.value.code == 2
-    assert f"certificate must be a file. Received {tmp_path}, which is none" in capsys.readouterr().err
+    assert f"certificate must be a file. Received {tmp_path}, which is not a file" in capsys.readouterr().err

@@ -71,6 +71,6 @@ def test_names_fit_into_the_names_of_files():
     for name in ("real-fault", "a" * 60, "ä" * 60, "3 b_c.d-e"):
         require_name(name)
     for name in ("", "a" * 61, chr(0x1D49C) * 31, "a/b", "../a", "a\n", "\ud800", 3, None, "x" * 10**6):
-        with pytest.raises(ParameterError, match="name must be a text of at most 60") as raised:
+        with pytest.raises(ParameterError, match="name must be a string of at most 60") as raised:
             require_name(name)
         assert len(str(raised.value)) < 500

@@ -172,15 +172,15 @@ WRONG = {
         'name = "real-fault"',
         'name = "a/../b"',
         ParameterError,
-        "name must be a text of at most 60 letters",
+        "name must be a string of at most 60 letters",
     ),
-    "number as name": ('name = "real-fault"', "name = 3", ScenarioError, "name must be a text. Received 3"),
+    "number as name": ('name = "real-fault"', "name = 3", ScenarioError, "name must be a string. Received 3"),
     "no operation": ("184.17 hour", "0 hour", ParameterError, "operation_time must be positive"),
     "coarse sampling": ("184 ms", "1 hour", ParameterError, "sampling_time must be at most a thousandth"),
     "overflow": (LENGTH, 'length = "1e300 m"', ParameterError, "a magnitude between"),
     "hertz": ("0.69 rad/s", "0.11 Hz", UnitError, "frequency must be an angular frequency"),
     "broken TOML": (LENGTH, 'length = "5 km', ScenarioError, "own.toml is not valid TOML"),
-    "unit without quotes": (LENGTH, "length = 5 km", ScenarioError, "Values with a unit are in quotes"),
+    "unit without quotes": (LENGTH, "length = 5 km", ScenarioError, "Put values with a unit in quotes"),
     "nested TOML": (LENGTH, "length = " + "[" * 5000, ScenarioError, "own.toml is not valid TOML"),
 }
 
@@ -245,7 +245,7 @@ def test_everything_that_is_wrong_is_said_at_once():
         "frequency must be an angular frequency",
         "damping of the uncertainty box must be in [0, 1)",
         "uncertainty.stifness is not a known key. Did you mean stiffness?",
-        "name must be a text of at most 60 letters",
+        "name must be a string of at most 60 letters",
     ):
         assert expected in said
     assert "shear_modulus must be given" not in said

@@ -132,7 +132,7 @@ def test_an_entry_is_declared_once_for_reading_writing_template_and_schema():
     """A declared default and example appear in the template and the schema; the unit in the written file."""
     entry = PLANT["damping"]
     assert (entry.unit, entry.required) == ("kg/s", False)
-    assert f'# damping = "{entry.example}"  # η [kg/s], not negative; {entry.default_text}, if left out' in template()
+    assert f'# damping = "{entry.example}"  # η [kg/s], not negative; default: {entry.default_text}' in template()
     assert fault_schema()["properties"]["damping"]["examples"] == [entry.example]
     assert '\ndamping = "500000000000000.0 kg/s"\n' in fault_toml(load_fault("real-fault"))
 

@@ -130,7 +130,7 @@ def test_a_fit_with_another_trend_counts_unless_it_is_worse_by_ten():
     assert [in_doubt(9.9, None), in_doubt(10.0, None), in_doubt(10.0, 0.0)] == [True, False, True]
     check = sign_check(told, {"without a trend": (other, 9.9)})
     assert not check.passed
-    told_both = "from 0.001 to 0.003 in the fit that is taken, from -0.003 to -0.001 without a trend (AIC +9.9)"
+    told_both = "from 0.001 to 0.003 in the selected fit, from -0.003 to -0.001 without a trend (AIC +9.9)"
     assert check.sentence == f"the sign of a - b is open: {told_both}"
     agreeing = sign_check(told, {"with a trend in time": (estimate_between(0.002, 0.004), 1.0)})
     assert agreeing.passed

@@ -149,7 +149,7 @@ def test_what_is_not_told_is_said_with_the_end_that_is():
     above, below, nothing = identification(estimates=estimates).undetermined()
     assert above == "a is not identifiable from this record: at least 1, without an upper end"
     assert below == "b is not identifiable from this record: at most 3 m, without a lower end"
-    assert nothing == "c is not identifiable from this record: any value fits as well"
+    assert nothing == "c is not identifiable from this record: any value fits equally well"
     between = told("a - b", unit="m")
     (both, other) = identification(estimates=estimates, difference=between).undetermined()
     assert both == "a and b are not identifiable from this record: only a - b = 2 m (1 to 3) is"

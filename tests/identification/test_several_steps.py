@@ -86,7 +86,7 @@ def test_steps_of_two_rocks_are_said_to_differ():
     assert found.probability < 1e-6
     assert found.common.assessment.verdict == "cannot tell"
     (said,) = found.common.assessment.open
-    assert said.startswith("one set of parameters does not explain all steps (chance")
+    assert said.startswith("one set of parameters does not explain all steps (p-value")
     assert said in " ".join(" ".join(identification_lines(found)).split())
 
 
@@ -101,7 +101,7 @@ def test_the_text_is_one_screen_with_a_row_a_step(agreeing):
         one.assessment.verdict.split()[-1].replace("record", "explains") for one in agreeing.steps
     ]
     assert [float(row[1]) for row in rows] == pytest.approx([0.008, 0.008], rel=0.1)
-    assert "All together: one set of parameters explains all steps (chance" in text
+    assert "All together: one set of parameters explains all steps (p-value" in text
     assert len(identification_lines(agreeing, verbose=True)) > len(lines)
 
 
@@ -208,7 +208,7 @@ def test_a_record_is_cut_midway_between_changes_of_rate_and_no_sample_counts_twi
     numbers = np.arange(len(made.time))
     half = part(replace(made, counts=numbers + 1.0, load_rates=numbers * 2.0), numbers > 9, "half")
     assert (half.counts[0], half.load_rates[0], half.slip, len(half.normal)) == (11.0, 20.0, None, len(numbers) - 10)
-    with pytest.raises(RecordError, match=r"must have two changes of rate by a quarter. Received 1. Name the windows"):
+    with pytest.raises(RecordError, match=r"must have two changes of rate of over 25 %. Received 1. Name the windows"):
         cut(step(UP, 0))
 
 

@@ -167,7 +167,7 @@ MATRICES = {"A": [[1]], "B": [[1, 0]], "C": [[1]], "D": [[0, 0]], "inputs": ERRO
         (json.dumps({"step": 1, "pid": [1, 2, 3]}), "kp at least"),
         (json.dumps({"step": 1, "pid": {"kp": 1}, "N": 50}), "nothing but step beside it"),
         (json.dumps({"step": 1, "pid": {"kp": 1, "K": 2}}), "kp at least"),
-        (json.dumps({"step": [1], "gains": [1]}), "step of .* must be a text or a number"),
+        (json.dumps({"step": [1], "gains": [1]}), "step of .* must be a string or a number"),
         (json.dumps({"step": 0, "gains": [1]}), "step of a law must be positive"),
         (json.dumps({"step": 1, "gains": [None]}), "k1 must be a finite number"),
         (json.dumps(MATRICES | {"A": [[1, 2]]}), "matrix A of a law must be 1 x 1"),

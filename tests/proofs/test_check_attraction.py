@@ -213,7 +213,7 @@ def test_the_statement_is_printed():
     lines = checker.check(json.dumps(cubic())).statement
     assert lines[:3] == ("x' = 1*x^3 + -1*x", "V = 1*x^2", "level: 1")
     assert lines[-1].startswith("conclusion: every solution that starts where V < level remains there and tends to")
-    assert "from everywhere" in checker.check(json.dumps(everywhere())).statement[-1]
+    assert "from any initial state" in checker.check(json.dumps(everywhere())).statement[-1]
     assert "no other V proves it" in checker.check(json.dumps(refuted())).statement[-1]
     for document in (refuted("2", "5"), turning()):
         assert "no other V proves it" not in checker.check(json.dumps(document)).statement[-1]

@@ -262,7 +262,7 @@ def test_the_statement_of_a_functional_says_everything_that_was_verified():
         "multiplier: 1",
         "products: 1; degree: 2",
         "functional, zero on all other monomials: L(x^2) = 1/2, L(x) = -1/2, L(y^2) = 1/2, L(1) = 1",
-        "conclusion: multiplier times polynomial is no sum, of terms up to the degree, of products times sums of "
+        "conclusion: multiplier times polynomial is not a sum, with terms up to the degree, of products times sums of "
         "squares and multiples of the equalities",
     )
 

@@ -482,7 +482,7 @@ def test_only_readable_text_is_read(written, tmp_path, capsys):
     assert checker.main([written(b"\xff\xfe")]) == 1
     assert "invalid: the file must be UTF-8. Received another byte at 0" in capsys.readouterr().out
     assert checker.main([str(tmp_path)]) == 2
-    assert "it is no regular file" in capsys.readouterr().err
+    assert "it is not a regular file" in capsys.readouterr().err
     assert checker.main([written(b" " * (exact_numbers.MAX_BYTES + 1))]) == 1
     assert "bytes long" in capsys.readouterr().out
     assert checker.main([written(json.dumps(LOOPS.relay()).encode().ljust(exact_numbers.MAX_BYTES))]) == 0
@@ -548,7 +548,7 @@ def test_a_bound_under_inputs_is_no_longer_read(tmp_path, capsys):
     path = tmp_path / "old.json"
     path.write_text('{"format": 1, "inputs": {}, "outputs": {}}')
     assert checker.main([str(path)]) == 2
-    assert "of an older kind: no longer read" in capsys.readouterr().err
+    assert "of an older kind: no longer supported" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("key", ["inputs", "outputs"])

@@ -71,7 +71,7 @@ def test_no_statement_depends_on_a_name(document, tmp_path):
 def test_what_is_no_name_is_refused(document, name, tmp_path):
     for verdict, _ in both(named(document, name), tmp_path / "c.json"):
         assert verdict.startswith("invalid")
-    with pytest.raises(ParameterError, match="name must be a text of at most 60 letters"):
+    with pytest.raises(ParameterError, match="name must be a string of at most 60 letters"):
         require_name(name)
 
 

@@ -223,7 +223,7 @@ FORMS = [
     ((("set", "more"), []), "set must have exactly the keys"),
     ((("loop", "delay"), "0"), "loop must have exactly the keys"),
     ((("claims", "slip_error"), "1"), "claims must have exactly the keys"),
-    ((("disturbance", "change"), "1"), "the disturbance must have no bound of its change"),
+    ((("disturbance", "change"), "1"), "the disturbance must have no key change"),
     (((*FACETS, 0, 1), "1/9"), "first five facets"),
     (((*FACETS, 0), ["-5/2", "0", "0"]), "first five facets"),
     (((*FACETS, 1, 1), "0"), "first five facets"),

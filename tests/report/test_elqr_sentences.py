@@ -61,4 +61,6 @@ def test_margins_are_rounded_towards_what_is_proved_and_limits_away_from_it():
     decay, slope, span = margin_lines(found)
     assert "0.5555 1/s certified" in decay
     assert slope == "friction-slope margin 1.2345 certified; unstable from 1.2346 on"
-    assert span == "beta down to 0.7001 (unstable at 0.6999) or up to 5.699 is certified"
+    assert (
+        span == "certified: beta from 0.7001 (unstable at 0.6999) to the top of the box, and from its bottom to 5.699"
+    )

@@ -48,7 +48,11 @@ def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
     expected = {
         "decay rate # 1/s certified": (found.decay.certified,),
         "margin # certified; unstable from # on": (found.slope.certified, found.slope.limit),
-        r"beta down to # \(unstable at #\) or up to # is": (found.span.low, found.span.low_limit, found.span.high),
+        r"certified: beta from # \(unstable at #\) to the top of the box, and from its bottom to #": (
+            found.span.low,
+            found.span.low_limit,
+            found.span.high,
+        ),
         "stability is proved for every T_s up to # s": (held.largest_step,),
         r"slip rate below # m/s \(slip error # m\)": (peaks.claims.peak_slip_rate, peaks.claims.slip_error),
     }

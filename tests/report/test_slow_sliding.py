@@ -116,7 +116,7 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     ends = comparison.entries[0].proof.valve_pressures
     assert [row[-3], row[-1]] == [f"{type(end)(Fraction(end) / 10**6):.3g}" for end in ends]
     assert "Without control: the fault creeps" in said
-    assert "Run and proof begin in steady sliding at V = 1 µm/s; the way there from rest is not covered" in said
+    assert "Run and proof begin in steady sliding at V = 1 µm/s; the transition from rest is not covered" in said
     assert row[5:7] == [f"{UpperBound(10**6 * Fraction(claims.slip_error)):.3g}", f"{1e6 * worst.slip_error:.3g}"]
     print_comparison(comparison, terminal(file=told, width=200))
     gains = next(line for line in told.getvalue().splitlines() if "gains: " in line)
@@ -163,7 +163,7 @@ def test_the_report_is_the_one_of_all_faults(folder):
     assert not re.search(r"for ever\b", page[: page.index("Glossary")])
     assert first.index("of slip of the task") < first.index("under every shear stress disturbance of at most")
     assert first.index("for every shear stress disturbance of at most") < first.rindex("of slip of the task")
-    assert "the way there from rest is not covered" in first
+    assert "the transition from rest is not covered" in first
     plain = re.sub("<[^>]+>", "", first)
     assert "a well near the fault, L2/D = 800 s (28.3 m at D = 1 m2/s)" in plain
     assert "in which the fault slides forward throughout" in first
@@ -374,4 +374,4 @@ def test_the_slip_that_a_task_takes_stands_beside_that_of_an_earthquake(comparis
     said = steady_start_sentence(whole, SHORT)
     assert said.endswith("; the task uses up 0.3 m of the 0.649 m of slip of an earthquake")
     for other in (run, SimpleNamespace(cycle=None)):
-        assert steady_start_sentence(other, SHORT).endswith("the way there from rest is not covered")
+        assert steady_start_sentence(other, SHORT).endswith("the transition from rest is not covered")

@@ -220,7 +220,10 @@ def test_a_design_for_another_sampling_time_is_not_said_to_be_guaranteed(monkeyp
             "proved, but level_set fails: requires 2 times the certified value; UNSTABLE with zero-order hold",
             ", and this task violates its conditions; unstable with zero-order hold",
         ),
-        ("proved, but zero-order hold is proved for no T_s", "; zero-order hold is proved for no T_s"),
+        (
+            "proved, but with zero-order hold, stability is proved for no T_s",
+            "; with zero-order hold, stability is proved for no T_s",
+        ),
         (
             "proved, but level_set fails: requires 2 times the certified value; UNSTABLE with zero-order hold over T_s",
             ", and this task violates its conditions; unstable with zero-order hold over T_s",

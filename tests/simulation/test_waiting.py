@@ -20,7 +20,7 @@ def test_at_rest_without_disturbance_nothing_ever_begins():
     assert run.metrics.peak_slip_rate == 0
     assert found.onset is None
     assert found.growth == pytest.approx(0.468, abs=1e-3)
-    assert "has not begun at 59.98 s: no forward disturbance acts" in run_sentences(run, QUIET)[1]
+    assert "has not begun by 59.98 s: no forward disturbance acts" in run_sentences(run, QUIET)[1]
 
 
 def test_a_small_push_begins_where_a_longer_run_does():

@@ -175,7 +175,7 @@ def test_pressures_themselves_are_those_of_equilibrium_and_what_is_proved_beside
     assert not any("about a block's equilibrium" in line for line in one.lines())
     alone = SimpleNamespace(**{**vars(run), "pressure": pressures[:, :1]})
     lone = replace(one, chain=replace(chain, wells=(1250.0,)), run=alone).lines()
-    assert "slip error: proved about a block's equilibrium, in the run about the reference" in lone
+    assert "slip error: proved from a block's equilibrium, in the run from the reference" in lone
     assert [line for line in lone if line.startswith("well")] == ["well 1    run 0 Pa to 2 MPa"]
     told = one.lines()
     assert [line.endswith("(OUTSIDE)") for line in told if line.startswith("well")] == [False, True]
@@ -210,7 +210,7 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
     assert run("check", file) == 0
     assert run("simulate", PATH, "--duration", "1 hour", "--out", out) == 0
     told = capsys.readouterr().out
-    assert "bounds, which are proved of the plant without stick" in " ".join(told.split())
+    assert "bounds, which are proved for the plant without stick" in " ".join(told.split())
     assert (out / "blocks.png").stat().st_size > 20_000
     facts = json.loads((out / "results.json").read_text())
     assert facts["guarantee"]["verdict"] == "proved"
@@ -242,7 +242,7 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
         (("simulate", PATH, "--drift", "1 nm/s"), "--plant, --drift and --stress of several blocks need friction with"),
         (("simulate", PATH, "--stress", "1 kPa"), "--plant, --drift and --stress of several blocks need friction with"),
         (("simulate", SLIDING, "--stress", "1 kPa"), "stress on blocks needs a law"),
-        (("simulate", SLIDING, "--start", "late"), "several blocks have no --pressure, --start"),
+        (("simulate", SLIDING, "--start", "late"), "do not apply to several blocks. Received --start"),
         (("simulate", SLIDING, "--controller", "centralised"), "run under the law of a certificate"),
         (("simulate", SLIDING, "--plant", "printed"), "must be one of smooth, quasi-dynamic"),
         (("simulate", SLIDING, "--certificate", TWO_BLOCKS), "about these blocks in slow sliding"),
@@ -391,7 +391,7 @@ def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monke
     )
     told = " ".join(capsys.readouterr().out.split())
     assert "proved for up to 10 kPa, a lag of 800 s, with |ln(v/V)| <= 0.07" in told
-    assert "within what is proved of slips, slip rates, states and pressures" in told
+    assert "within the proved bounds of slips, slip rates, states and pressures" in told
     facts = json.loads((tmp_path / "run" / "results.json").read_text())["run"]
     assert facts["within"] is True
     assert facts["stress"] == pytest.approx(10_000, rel=1e-4)
@@ -481,7 +481,7 @@ def test_blocks_in_slow_sliding_are_designed_run_and_drawn(designed, tmp_path, c
     assert "(changes of slip rate, divided by V, due to 10 kPa of shear stress and up to " in assumptions
     assert "so the slip rate of every block stays at most 1.077e-06 m/s" in told
     assert "run over 1e+06 s (11.6 days) under a sine of 10 kPa" in told
-    assert "within what is proved" in told
+    assert "within the proved bounds" in told
     facts = json.loads((tmp_path / "run" / "results.json").read_text())
     assert facts["guarantee"]["peaks"].keys() >= {"slip error 3", "log state 1", "pressure 2"}
     assert facts["run"]["plant"] == "quasi-dynamic"

@@ -274,7 +274,7 @@ def test_the_model_without_state_is_what_it_was():
     root = math.sqrt(eta**2 / 4 + softening - k)
     assert model.eigenvalues == pytest.approx([-eta / 2 + root, -eta / 2 - root], rel=1e-12)
     assert model.unstable
-    assert "the spring unloads slower" in model.reasons[0]
+    assert "the spring unloads more slowly" in model.reasons[0]
 
 
 def test_a_users_law_without_state_goes_through_derive_and_stability():

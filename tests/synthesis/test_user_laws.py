@@ -289,12 +289,17 @@ def test_a_law_without_a_guarantee_names_a_factor_of_its_pressure_that_has_one()
     half = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([3e8, 2.5e8, 5e7], step="0.184"))
     assert not strong.proved
     assert "largest eigenvalue over a period has modulus" in strong.lines()[0]
-    assert strong.lines()[1] == f"not this law, but the same law with its output times 0.5: {half.proof.sentence()}"
+    assert (
+        strong.lines()[1]
+        == f"not this law, but the same law with its output multiplied by 0.5: {half.proof.sentence()}"
+    )
     near = strong.to_dict()["nearest"]
     assert (near["quantity"], near["value"]) == ("pressure_factor", "1/2")
     assert near["peak_slip_rate"] == half.to_dict()["peak_slip_rate"]
     wrong = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], step="0.184"))
-    assert wrong.lines()[1] == f"not this law, but the same law with its output times -1: {half.proof.sentence()}"
+    assert (
+        wrong.lines()[1] == f"not this law, but the same law with its output multiplied by -1: {half.proof.sentence()}"
+    )
     of_slip = {"step": "0.184", "inputs": ("slip", "slip_rate")}
     turned = qd.guarantee(REAL, law=qd.SampledLaw.from_gains([-3e8, -2.5e8, -5e7], **of_slip)).nearest[1]
     assert (

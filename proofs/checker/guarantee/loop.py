@@ -212,7 +212,7 @@ def read_pump(value: Any) -> dict[str, Fraction]:
     found = numbers(value, "pump", *(("least", "largest") if limited else ()), *(("rate", "ramp") if paced else ()))
     if limited:
         low, high = found["least"], found["largest"]
-        need(low <= 0 <= high and low != high, "the range of a pump must contain 0, and more")
+        need(low <= 0 <= high and low != high, "the range of a pump must contain 0 and have different ends")
     need(not paced or min(found["rate"], found["ramp"]) > 0, "rate and ramp of a pump must be > 0")
     return found
 

@@ -132,7 +132,10 @@ def read_plant(value: Any) -> Plant:
     given = keys(value, "plant", *parts)
     need(type(given["A"]) is list and 1 <= len(given["A"]) <= MOST, f"A must have 1 to {MOST} rows")
     n = len(given["A"])
-    need(type(given["B"]) is list and len(given["B"]) == n and type(given["B"][0]) is list, "B must have a row a state")
+    need(
+        type(given["B"]) is list and len(given["B"]) == n and type(given["B"][0]) is list,
+        "B must have one row per state",
+    )
     m = len(given["B"][0])
     need(1 <= m <= MOST, f"B must have 1 to {MOST} columns")
     C = table(given["C"], "C", n)

@@ -105,7 +105,7 @@ def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
     need(type(value) is list and len(value) < 2 * MAX_CELLS, f"there must be 1 to {MAX_CELLS} cells")
     open_boxes, cells = [box], []
     for entry in value:
-        need(bool(open_boxes), "cells must end when every part is listed")
+        need(bool(open_boxes), "cells must have no entry after the last part")
         part = open_boxes.pop()
         if entry == []:
             cells.append(part)
@@ -116,7 +116,7 @@ def read_cells(value: Any, box: dict[str, Range]) -> list[dict[str, Range]]:
         low, high = part[name]
         need(low < at < high, "a cut must lie inside its box")
         open_boxes += [part | {name: (at, high)}, part | {name: (low, at)}]
-    need(not open_boxes, "cells must list every part")
+    need(not open_boxes, "cells must have an entry for every part")
     return cells
 
 

@@ -441,7 +441,7 @@ def verify(document: dict[str, Any]) -> list[str]:
     keys(document, "the file", "format", "kind", "fault", "reference", "disturbance", "loop", "set", "claims")
     claims = numbers(document["claims"], "claims", *CLAIMS)
     task, rock = read_task(document), read_rock(document["fault"])
-    need(task.change is None, "the disturbance must have no bound of its change")
+    need(task.change is None, "the disturbance must have no key change")
     target = number(document["reference"]["target_slip"], "target_slip")
     growths = [number(document["disturbance"]["growths"][name], name) for name in ("slip", "rate")]
     law, reach = read_law(document["loop"]), read_reach(document["set"])

@@ -37,7 +37,7 @@ def refute(document: dict[str, Any]) -> list[str]:
         balance: dict[str, Number] = {}
         for term in terms:
             add(balance, state, limit_of(term, values, list(point.values()), mixture))
-        need(not balance, f"the weighted limit of d{state}/dt", "zero", "another number")
+        need(not balance, f"the weighted limit of d{state}/dt", "zero", "a nonzero number")
     return [*describe(loop), *describe_equilibrium(loop, values, point, weights)]
 
 

@@ -370,7 +370,7 @@ def too_slow(task: FaultPlant, withdrawal: Fraction, step: Fraction, delay: Frac
     if late is None or step + delay <= late:
         return ""
     most = LowerBound(withdrawal).quantity("Pa")
-    how = f"with T_s and delay above {late.quantity('s')} in all"
+    how = f"with T_s + delay above {late.quantity('s')}"
     return f"no controller that withdraws at most {most} can hold the fault {how}{_ASSUMED}"
 
 
@@ -397,7 +397,7 @@ def infeasibility(task: FaultPlant, withdrawal: Fraction, delay: Fraction, diffu
 
 
 _ASSUMED = (
-    " (for some friction of the box, against the largest disturbance, applied from some time on, even if the "
+    " (for some friction of the box, under the largest disturbance, constant from some instant on, even if the "
     "controller knows both)"
 )
 

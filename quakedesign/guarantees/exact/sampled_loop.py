@@ -140,9 +140,10 @@ class SampledLoop(ExactSetup):
             )
         if self.law.of_reference and (self.diffusion or self.longest_step or self.law.implicit_step is not None):
             raise ParameterError(
-                "a law that uses the slip, the slip rate or the reference itself has no guarantee with a diffusion "
-                "path, aperiodic sampling or an implicit step. Received one of these. Use slip_error and "
-                "slip_rate_error, or omit these."
+                "a law that uses slip, slip rate or reference directly has no guarantee with a diffusion path, "
+                f"aperiodic sampling or an implicit step. Received diffusion {shortly(self.diffusion)} s, longest_step "
+                f"{shortly(self.longest_step)} s and {'an' if self.law.implicit_step else 'no'} implicit step. Use "
+                "slip_error and slip_rate_error alone, or omit these."
             )
         if self.longest_step:
             self._require_aperiodic()
@@ -152,7 +153,7 @@ class SampledLoop(ExactSetup):
         if self.longest_step <= self.step:
             raise ParameterError(
                 "the longest step must exceed the step, which is the shortest sampling interval. Received "
-                f"{shortly(self.longest_step)} s and the step {shortly(self.step)} s. Swap both, or omit the "
+                f"{shortly(self.longest_step)} s and the step {shortly(self.step)} s. Swap them, or omit the "
                 "longest step."
             )
         first = (v for row in self.law.first for v in row)
@@ -163,9 +164,9 @@ class SampledLoop(ExactSetup):
             or (self.pump and self.pump.rate)
         ):
             raise ParameterError(
-                "aperiodic sampling needs a linear law and errors that are 0 at the start. It has no guarantee with a "
-                "delay, a lag, a diffusion path, jitter, averaging, the rate limit of a pump or an implicit step. "
-                f"Received longest_step {shortly(self.longest_step)} s with one of these. Omit longest_step, or these."
+                "aperiodic sampling needs a linear law, zero initial errors, and no delay, lag, diffusion path, "
+                "jitter, averaging, pump rate limit or implicit step. Received longest_step "
+                f"{shortly(self.longest_step)} s without all of this. Omit longest_step, or what does not apply."
             )
 
     @property

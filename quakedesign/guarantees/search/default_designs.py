@@ -248,8 +248,8 @@ def _why_none(task: FaultPlant, law: type[SlidingMode], scheme: str, step: Fract
     if scheme == "implicit":
         rest = UpperBound(step**2 * task.authority * max(map(abs, task.rest_pressure)))
         return (
-            "the implicit step knows no disturbance, so that a constant pressure p* holds it at e1 = T_s²·B0·p*, here "
-            f"up to {rest:.2g} m{_REMEDY}"
+            "the implicit step has no estimate of the disturbance, so that an equilibrium pressure p* leaves the error "
+            f"e1 = T_s²·B0·p*, here up to {rest:.2g} m{_REMEDY}"
         )
     return (
         f"at e1 = 0 the slope of {law.title} is infinite, so that its pressure held over T_s chatters, and no linear "

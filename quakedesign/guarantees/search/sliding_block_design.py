@@ -74,7 +74,7 @@ def sliding_block_guarantee(
         proof = plant_guarantee(plant, law, _PIECES)
         if proof.available and max(proof.claims.controls) * MPA < claims.push:
             return replace(proof, notes=(_slip_rates(blocks, rate),))
-    return NoProof(reason="the bounds that an estimate finds are not proved")
+    return NoProof(reason="the estimated bounds are not proved: reduce the stress")
 
 
 def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Fraction, UpperBound, PlantProof]:

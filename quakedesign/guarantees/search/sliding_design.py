@@ -362,7 +362,7 @@ def _excess(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims
 
 def _too_much(task: SlidingPlant, log_rate: Fraction) -> str:
     return (
-        f"a stress of {float(task.stress):.3g} Pa is not shown to leave |ln(v/V)| below {float(log_rate):.3g} with the "
+        f"a stress of {float(task.stress):.3g} Pa is not shown to keep |ln(v/V)| below {float(log_rate):.3g} with the "
         "laws that were tried"
     )
 
@@ -494,7 +494,7 @@ def possible_remedy(
         Of the task.
     """
     if well.sampled_loop is None or well.numbers is None:
-        return "no guarantee was found with a well that is much nearer either: a smaller spread, stress or noise may do"
+        return "no guarantee was found even with a much nearer well: a smaller spread, stress or noise may help"
     for noise in (setup.slip_noise, *quieter(setup)):
         loop = setup if noise == setup.slip_noise else replace(setup, slip_noise=noise)
         sampled_loop = replace(well.sampled_loop, slip_noise=noise)
@@ -507,7 +507,7 @@ def possible_remedy(
             )
         if remedies := ", and ".join(filter(None, sentences)):
             return f"a proof was found {with_noise(noise, setup)}{remedies}"
-    return "a smaller spread, stress or noise may do"
+    return "a smaller spread, stress or noise may help"
 
 
 def quieter(setup: ExactSetup) -> tuple[Fraction, ...]:
@@ -549,4 +549,6 @@ def _slower(
 
 
 def _under(proof: SlidingProof) -> str:
-    return f" under a stress of at most {float(proof.task.stress):.3g} Pa (a law designed for it alone may stand more)"
+    return (
+        f" under a stress of at most {float(proof.task.stress):.3g} Pa (a law designed for it alone may tolerate more)"
+    )

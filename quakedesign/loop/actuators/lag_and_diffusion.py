@@ -106,7 +106,7 @@ class Diffusion(FlowStage):
         Option(
             name="storage",
             unit="m^3/Pa",
-            help="Fluid volume stored in the diffusion path per pressure, such as '1e-4 m^3/Pa'; gives injected volume "
+            help="Fluid volume stored in the path per unit pressure, such as '1e-4 m^3/Pa'; gives injected volume "
             "and flow rate.",
         ),
         Option(name="cells", unit="", help="Number of cells of the diffusion path.", default=16),

@@ -316,7 +316,8 @@ def _sheet(
     loop = closed_loop(subject, gains, lipschitz=1, gain_range=gain_range)
     if "d" not in loop.uncertain or len(set(over)) != 2 or not set(over) <= set(loop.gains):
         raise ParameterError(
-            f"a map needs two different gains among {', '.join(loop.gains)}. Received {' '.join(over)}."
+            f"a map needs two different gains among {', '.join(loop.gains)}. Received {' '.join(over) or 'none'}. "
+            "Give for example k1 k2."
         )
     if points < 2:
         raise ParameterError(f"a map needs at least two points along each axis. Received {points}.")

@@ -56,7 +56,7 @@ def reject(text: str, token: Token, expected: str, remedy: str) -> NoReturn:
     shown = f"{'…' if start > 24 else ''}{before}⟦{text[start:end]}⟧{after}{'…' if end + 24 < len(text) else ''}"
     line = "".join(c if c.isprintable() else repr(c)[1:-1] for c in shown)
     where = "at the end" if token.kind == "end" else f"at character {start + 1}"
-    raise PolynomialError(f"{expected} expected {where}. Received {line} there. {remedy}")
+    raise PolynomialError(f"expected {expected} {where}. Received {line}. {remedy}")
 
 
 class Expansion:
@@ -398,7 +398,7 @@ def _begin(text: str, token: Token, values: list[Terms], pending: list[Token], e
     elif sign == "-":
         pending.append(token._replace(kind="negative"))
     elif sign != "+":
-        reject(text, token, "a number, a name or (", "Complete the expression there.")
+        reject(text, token, "a number, a name or (", "Complete the expression.")
     return False
 
 

@@ -62,7 +62,7 @@ def unique(pairs: list[tuple[str, object]]) -> Json:
 
 
 def _no_float(text: str) -> None:
-    raise CertificateError(f"numbers must be integers or texts of rationals; received {text[:20]}.")
+    raise CertificateError(f"numbers must be integers or strings of rationals; received {text[:20]}.")
 
 
 def _integer(text: str) -> int:
@@ -93,7 +93,7 @@ def headed(raw: object, kind: str = "") -> Json:
 def read_rational(raw: object) -> Fraction:
     """Fraction of a text in canonical form."""
     if not isinstance(raw, str):
-        _reject("a rational must be a text")
+        _reject("a rational must be a string")
     return _rational(raw)
 
 

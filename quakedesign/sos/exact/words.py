@@ -163,7 +163,7 @@ def _shape(region: Region) -> str:
 
 def _start(claim: Attraction) -> str:
     if claim.level is None:
-        return "from everywhere"
+        return "from any initial state"
     return f"that starts where V < {claim.level} ({LowerBound(claim.level)} rounded down)"
 
 

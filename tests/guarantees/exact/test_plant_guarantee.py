@@ -438,8 +438,8 @@ def test_a_sentence_names_every_size_that_it_covers_rounded_inward():
         "on the uncertain plant of the certificate (2 states, 1 control), from |x_i(0)| <= 0.6666, 0, with zero-"
         "order hold over 0.1 s, with a delay of 0.05 s, for all uncertain terms in 1 sector, 1 of which hold for "
         "|y| <= 2.333, "
-        "disturbances of at most 0.06666, loads of rates of at most 0.01666, measurement noise of at most 0.0006666, 0"
-        ", for all t >= 0: |y1| <= "
+        "disturbances of at most 0.06666, loads that change by at most 0.01666, measurement noise of at most "
+        "0.0006666, 0, for all t >= 0: |y1| <= "
     )
     for name, bound in zip(
         ("y1", "y2", "u1 minus its equilibrium value"), (*found.claims.outputs, *found.claims.controls), strict=True
@@ -447,7 +447,7 @@ def test_a_sentence_names_every_size_that_it_covers_rounded_inward():
         (shown,) = re.findall(rf"\|{name}\| <= ([0-9.e-]+)", found.sentence())
         assert bound <= Fraction(shown) < bound * (1 + 2000 * half)
     told = named(found, replace(plant, units={"y1": "m", "u1": "MPa", "d": "m/s²"})).sentence()
-    assert "disturbances of at most 66.66 mm/s², loads of rates of at most 16.66 kPa/s, measurement" in told
+    assert "disturbances of at most 66.66 mm/s², loads that change by at most 16.66 kPa/s, measurement" in told
     prefixes = {"m": Fraction(1, 1000), "": Fraction(1), "k": Fraction(1000), "M": Fraction(10**6)}
     for name, unit, bound in (
         ("y1", "m", found.bounds["y1"]),

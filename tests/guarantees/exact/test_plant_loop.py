@@ -339,9 +339,9 @@ def test_plants_are_read_up_to_their_limits(given):
     [
         (plant_of(A=5), "A must have 1 to 40 rows"), (plant_of(A=[]), "A must have 1 to 40 rows"),
         (plant_of(n=41), "A must have 1 to 40 rows"), (plant_of(A="ab"), "A must have 1 to 40 rows"),
-        (plant_of(B=5), "B must have a row a state"), (plant_of(B=[["1"], ["1"]]), "B must have a row a state"),
-        (plant_of(B=[5]), "B must have a row a state"), (plant_of(B=["1"]), "B must have a row a state"),
-        (plant_of(B=[]), "B must have a row a state"), (plant_of(B=[[]]), "B must have 1 to 40 columns"),
+        (plant_of(B=5), "B must have one row per state"), (plant_of(B=[["1"], ["1"]]), "B must have one row per state"),
+        (plant_of(B=[5]), "B must have one row per state"), (plant_of(B=["1"]), "B must have one row per state"),
+        (plant_of(B=[]), "B must have one row per state"), (plant_of(B=[[]]), "B must have 1 to 40 columns"),
         (plant_of(m=41), "B must have 1 to 40 columns"), (plant_of(C=5), "C must have at most 40 rows"),
         (plant_of(C=[["0"]] * 41, noise=["0"] * 41), "C must have at most 40 rows"),
         (plant_of(outputs={"0": 1}), "outputs must have at most 40 rows"),

@@ -256,7 +256,10 @@ def test_other_sliding_modes_have_no_guarantee_of_a_loop_that_runs():
     paper = law("cta", CTA, "1/4000")
     others = [
         (paper, "at every instant"),
-        (replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="implicit")), "knows no disturbance"),
+        (
+            replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="implicit")),
+            "has no estimate of the disturbance",
+        ),
         (replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated")), "Give both in its"),
     ]
     for controller, words in others:

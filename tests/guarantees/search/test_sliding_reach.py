@@ -97,7 +97,7 @@ def test_where_the_slip_noise_is_too_large_a_smaller_one_is_named(monkeypatch):
         (Fraction(1, 10**7), "a proof was found at this V for L^2/D = 500 s"),
         (Fraction(1, 10**9), "a proof was found with slip noise of at most 1 nm at this V for L^2/D = 500 s"),
         (Fraction(0), "a proof was found with exact measurements of slip at this V for L^2/D = 500 s"),
-        (Fraction(-1), "a smaller spread, stress or noise may do"),
+        (Fraction(-1), "a smaller spread, stress or noise may help"),
     ):
         tried = []
 
@@ -113,7 +113,7 @@ def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
     reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, ExactSetup(lag=Fraction(600)), stressed=False)
     assert (reach.share, reach.sampled_loop) == (0, None)
     assert possible_remedy(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith(
-        "no guarantee was found with a well"
+        "no guarantee was found even with a much nearer well"
     )
 
 

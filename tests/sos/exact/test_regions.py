@@ -142,7 +142,7 @@ PROVED = replace(STABLE, level=F(1, 3))
 def test_words_of_claims():
     field = ["x' = -x", "V = x^2"]
     assert claim_words(STABLE) == [
-        *field, "every solution from everywhere tends to the origin, which is asymptotically stable",
+        *field, "every solution from any initial state tends to the origin, which is asymptotically stable",
     ]  # fmt: skip
     assert claim_words(PROVED) == [
         *field,

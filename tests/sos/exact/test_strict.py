@@ -160,8 +160,8 @@ def test_an_object_is_read_by_the_types_of_its_fields_and_written_again():
     [
         ({"more": 1}, "unknown field `more`"),
         ({"size": "2/4"}, "lowest terms"),
-        ({"size": 1}, "size: a rational must be a text"),
-        ({"size": None}, "a rational must be a text"),
+        ({"size": 1}, "size: a rational must be a string"),
+        ({"size": None}, "a rational must be a string"),
         ({"name": "abcd"}, "name: expected a name of up to 40 letters"),
         ({"name": "a\n"}, "name: expected a name of up to 40 letters"),
         ({"ends": ["1"]}, "ends: expected `array` of length 2"),

@@ -50,7 +50,7 @@ NUMBERS = ["nan", "NaN", "NAN", "inf", "Inf", "INF", "infinity", "Infinity", "oo
 @pytest.mark.parametrize("name", NUMBERS)
 def test_the_name_of_a_number_is_a_variable_only_where_it_is_declared(name):
     for read in (parse, names_in_text, lambda text: parse_constraint(f"{text} >= 0")):
-        with pytest.raises(PolynomialError, match=rf"at character 7\..*x\^2 \+ ⟦{name}⟧ .*Write numbers in digits"):
+        with pytest.raises(PolynomialError, match=rf"at character 7\..*x\^2 \+ ⟦{name}⟧.*Write numbers in digits"):
             read(f"x^2 + {name}")
     assert parse(f"x^2 + {name}", ["x", name]) == (("x", name), {(2, 0): 1, (0, 1): 1})
     assert parse(f"{name}1 + e + i") == ((f"{name}1", "e", "i"), {(1, 0, 0): 1, (0, 1, 0): 1, (0, 0, 1): 1})
@@ -59,7 +59,7 @@ def test_the_name_of_a_number_is_a_variable_only_where_it_is_declared(name):
 def test_given_variables_fix_the_order_and_exclude_other_names():
     assert parse("x + 2*y", ["y", "z", "x"]) == (("y", "z", "x"), {(0, 0, 1): 1, (1, 0, 0): 2})
     assert parse("1", "x") == (("x",), {(0,): 1})
-    with pytest.raises(PolynomialError, match=r"one of the variables x, y expected at character 5\..*⟦z⟧"):
+    with pytest.raises(PolynomialError, match=r"expected one of the variables x, y at character 5\..*⟦z⟧"):
         parse("x + z", ["x", "y"])
 
 
@@ -106,13 +106,13 @@ def test_variables_of_several_texts_are_collected_in_order():
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x > 0", r"one of >=, <=, == expected at character 3.*closed"),
-        ("0 <= x <= 1", r"only one relation expected at character 8"),
-        ("x + 1", r"one of >=, <=, == expected at the end"),
-        ("x >=", r"a number, a name or \( expected at the end"),
-        (">= 0", r"expected at the end. Received ⟦⟧>= 0|expected .*>= 0"),
-        ("(x >= 0)", r"a closing parenthesis for this \( expected at character 1"),
-        ("x != 0", r"expected at character 3.*⟦!⟧"),
+        ("x > 0", r"expected one of >=, <=, == at character 3.*closed"),
+        ("0 <= x <= 1", r"expected only one relation at character 8"),
+        ("x + 1", r"expected one of >=, <=, == at the end"),
+        ("x >=", r"expected a number, a name or \( at the end"),
+        (">= 0", r"expected .*>= 0"),
+        ("(x >= 0)", r"expected a closing parenthesis for this \( at character 1"),
+        ("x != 0", r"expected .*at character 3.*⟦!⟧"),
     ],
 )
 def test_other_relations_are_refused(text, message):
@@ -123,40 +123,40 @@ def test_other_relations_are_refused(text, message):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("2x", r"an operator expected at character 2\. Received 2⟦x⟧ there\. Write products with \*"),
-        ("x(y)", r"an operator expected at character 2"),
-        ("x y", r"an operator expected at character 3"),
-        ("1.2.3", r"an operator expected at character 4"),
-        ("1_000", r"an operator expected at character 2"),
-        ("0x1", r"an operator expected at character 2"),
-        ("1e", r"an operator expected at character 2"),
-        ("x +", r"a number, a name or \( expected at the end"),
-        ("x + * y", r"a number, a name or \( expected at character 5"),
-        ("", r"a number, a name or \( expected at the end"),
-        ("()", r"a number, a name or \( expected at character 2"),
-        ("(x", r"a closing parenthesis for this \( expected at character 1"),
-        ("x + 1)", r"an opening parenthesis for this \) expected at character 6"),
-        ("x/0", r"a nonzero number after / expected at character 2"),
+        ("2x", r"expected an operator at character 2\. Received 2⟦x⟧\. Write products with \*"),
+        ("x(y)", r"expected an operator at character 2"),
+        ("x y", r"expected an operator at character 3"),
+        ("1.2.3", r"expected an operator at character 4"),
+        ("1_000", r"expected an operator at character 2"),
+        ("0x1", r"expected an operator at character 2"),
+        ("1e", r"expected an operator at character 2"),
+        ("x +", r"expected a number, a name or \( at the end"),
+        ("x + * y", r"expected a number, a name or \( at character 5"),
+        ("", r"expected a number, a name or \( at the end"),
+        ("()", r"expected a number, a name or \( at character 2"),
+        ("(x", r"expected a closing parenthesis for this \( at character 1"),
+        ("x + 1)", r"expected an opening parenthesis for this \) at character 6"),
+        ("x/0", r"expected a nonzero number after / at character 2"),
         ("x/(1 - 1)", r"a nonzero number after /"),
         ("1/x", r"a nonzero number after /"),
-        ("x^-1", r"a whole number from 0 to 60 as exponent expected at character 3"),
+        ("x^-1", r"expected a whole number from 0 to 60 as exponent at character 3"),
         ("x^1.0", r"whole number"),
         ("x^1e1", r"whole number"),
         ("x^y", r"whole number"),
-        ("x^", r"whole number from 0 to 60 as exponent expected at the end"),
-        ("2^3^2", r"only one exponent expected at character 4"),
-        ("x >= 0", r"a polynomial without relation expected at character 3"),
-        ("x\x00", r"expected at character 2. Received x⟦\\x00⟧"),
-        ("x² + 1", r"expected at character 2"),
-        ("١", r"expected at character 1"),
-        ("sin(x)", r"an operator expected at character 4"),
-        ("__import__('os')", r"expected at character 12"),
-        ("x.y", r"expected at character 2"),
-        ("x[0]", r"expected at character 2"),
-        ("x if 1 else y", r"an operator expected at character 3"),
-        ("lambda: 1", r"expected at character 7"),
-        ("x; y", r"expected at character 2"),
-        ("x # y", r"expected at character 3"),
+        ("x^", r"expected a whole number from 0 to 60 as exponent at the end"),
+        ("2^3^2", r"expected only one exponent at character 4"),
+        ("x >= 0", r"expected a polynomial without relation at character 3"),
+        ("x\x00", r"expected .*at character 2. Received x⟦\\x00⟧"),
+        ("x² + 1", r"expected .*at character 2"),
+        ("١", r"expected .*at character 1"),
+        ("sin(x)", r"expected an operator at character 4"),
+        ("__import__('os')", r"expected .*at character 12"),
+        ("x.y", r"expected .*at character 2"),
+        ("x[0]", r"expected .*at character 2"),
+        ("x if 1 else y", r"expected an operator at character 3"),
+        ("lambda: 1", r"expected .*at character 7"),
+        ("x; y", r"expected .*at character 2"),
+        ("x # y", r"expected .*at character 3"),
     ],
     ids=repr,
 )
@@ -200,7 +200,7 @@ HOSTILE = {
     "length": ("x+" * LENGTH, f"at most {LENGTH} characters"),
     "names": ("+".join(f"v{i}" for i in range(VARIABLES + 1)), "at most 16 different variables"),
     "long name": ("x" * 10_000, "a name of at most 32"),
-    "long rubbish": ("é" * 19_000, "expected at character 1"),
+    "long rubbish": ("é" * 19_000, "expected .*at character 1"),
 }
 
 
@@ -365,7 +365,7 @@ def test_a_refusal_shows_24_characters_on_either_side(start, length, shown):
     token = expansion.Token("name", text[start : start + length], start)
     with pytest.raises(PolynomialError) as caught:
         expansion.reject(text, token, "another", "Write it.")
-    assert str(caught.value) == f"another expected at character {start + 1}. Received {shown} there. Write it."
+    assert str(caught.value) == f"expected another at character {start + 1}. Received {shown}. Write it."
 
 
 LIMITS = [  # allowed, and refused
@@ -396,7 +396,7 @@ def test_what_is_just_allowed_is_read_and_what_is_just_beyond_refused(allowed, r
 def test_a_refusal_writes_what_cannot_be_printed_and_nothing_else_differently():
     with pytest.raises(PolynomialError) as caught:
         expansion.reject("é\\'\n\x1b\u2028", expansion.Token("other", "é", 0), "another", "Write it.")
-    assert str(caught.value) == "another expected at character 1. Received ⟦é⟧\\'\\n\\x1b\\u2028 there. Write it."
+    assert str(caught.value) == "expected another at character 1. Received ⟦é⟧\\'\\n\\x1b\\u2028. Write it."
 
 
 def test_a_sum_costs_the_shorter_of_its_two_operands_twice():
