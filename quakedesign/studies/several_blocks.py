@@ -425,7 +425,7 @@ class SlidingChainRun:
             ]
             return [
                 *parts,
-                f"{'within' if self.within else 'OUTSIDE'} the proved bounds of slips, slip rates, states and pressures",
+                f"{'within' if self.within else 'OUTSIDE'} the proved bounds of slips, rates, states and pressures",
             ]
         events = self.events
         loaded = f"{self.chain.name}, loaded from afar at {quantity(self.run.loading_rate, 'm/s')}"

@@ -391,7 +391,7 @@ def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monke
     )
     told = " ".join(capsys.readouterr().out.split())
     assert "proved for up to 10 kPa, a lag of 800 s, with |ln(v/V)| <= 0.07" in told
-    assert "within the proved bounds of slips, slip rates, states and pressures" in told
+    assert "within the proved bounds of slips, rates, states and pressures" in told
     facts = json.loads((tmp_path / "run" / "results.json").read_text())["run"]
     assert facts["within"] is True
     assert facts["stress"] == pytest.approx(10_000, rel=1e-4)
