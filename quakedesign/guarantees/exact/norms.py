@@ -352,10 +352,9 @@ class _Sudden(_Response):
         return later * self.entry * 0
 
     def since_jump(self, rows: arb_mat) -> Iterator[tuple[arb_mat, arb_mat, arb_mat]]:
-        by, more = self.segment.by, rows * (self.entry * 0)
+        by = self.segment.by
         for i, (a, b) in enumerate(pairwise(by.modulus(rows * now) for now in self.ends)):
-            if by.proves:
-                more = absolute(rows) * self.curvature(self.ends[i], i) * self.segment.chord(i)
+            more = absolute(rows) * self.curvature(self.ends[i], i) * self.segment.chord(i) if by.proves else a
             yield a, b, more
 
 
@@ -536,10 +535,10 @@ def slowest(flows: list[_SegmentFlow]) -> list[arb]:
 class _Periods:
     """Ψ of a loop, its powers, and bounds of the states after 2^j periods; each is computed once."""
 
-    def __init__(self, flows: list[_SegmentFlow], period: arb_mat | None = None) -> None:
+    def __init__(self, flows: list[_SegmentFlow]) -> None:
         self.by, self.size = flows[0].by, flows[0].jump.nrows()
         self.later = list(accumulate((flow.whole for flow in flows[:0:-1]), mul, initial=self.by.identity(self.size)))
-        self.powers = [self.later[-1] * flows[0].whole if period is None else period]
+        self.powers = [self.later[-1] * flows[0].whole]
         self.mode = self.by.slowest(self.powers[0]) if self.by.slowest else None
         self.slow = slowest(flows) if self.by.proves else []
         self._seen: dict[int, tuple[arb_mat, arb_mat]] = {}
@@ -653,7 +652,7 @@ def _peaks(columns: arb_mat, weights: list[arb]) -> arb_mat:
 
 def _but(column: arb_mat, place: int) -> arb_mat:
     """A column with 0 in one place."""
-    copied = column * 1
+    copied = arb_mat(column)
     copied[place, 0] = 0
     return copied
 
@@ -779,9 +778,7 @@ class LoopResponses:
     def free(self) -> list[arb_mat]:
         """Largest outputs of the free response from the box: in a proof on every piece, else at all ends of pieces."""
         by, peaks = self.by, []
-        period = reduce(lambda now, flow: flow.whole * now, self.flows, by.identity(self.periods.size))
-        periods = _Periods(self.flows, period) if by.proves else self.periods
-        groups = _followed(periods, by.hstack([by.column(s) for s in self.loop.start]))
+        groups = _followed(self.periods, by.hstack([by.column(s) for s in self.loop.start]))
         for flow in self.flows:
             phases, parts = flow.phases(self.rows), []
             for columns, weights in groups:
@@ -813,7 +810,7 @@ class _Past:
         ends = [part.columns(map_) for part, map_ in zip(parts, later, strict=True)]
         if by.proves:
             rests = [part.rest(map_) for part, map_ in zip(parts, later, strict=True)]
-            ends.append(_diagonal(reduce(add, rests[::-1])))
+            ends.append(_diagonal(reduce(add, rests)))
         columns = by.hstack(ends)
         if mode := periods.mode:
             return cls(
