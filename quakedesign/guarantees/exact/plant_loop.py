@@ -209,7 +209,6 @@ _AT_ONCE = 8  # periods
 _MOST_WORK = 12 * 10**8
 _BEYOND = 64  # multiple of the work limit; a power of the map must be small before it is reached
 _LEFT = Fraction(1, 1024)
-_ROOM = Fraction((1 << 20) + 1, 1 << 20)
 _FAINT = Fraction(1, 1 << 60)
 
 
@@ -321,25 +320,17 @@ class _AllResponses:
                 now = now * leap
             done, check = check, 2 * check
             far = absolute(BALLS.part(now, height - size, height))
-            if not all(v < 1 << 80 for v in far.entries()):
-                raise _unstable()
             totals = [_total(sums, i, len(own), rest) for i, rest in enumerate(left)]
             wholes = [_raised(BALLS.part(total, height - size, height)) for total in totals]
             most = _raised(BALLS.part(free, height - size, height))
-            if all(not_above(far * part, part * ball(_LEFT)) for part in [*wholes, *([most] if start else [])]):
+            if all(not_above(far * part, part * ball(_LEFT)) for part in [*wholes, most]):
                 break
+        # With far·part ≤ ε·part, ε = 2⁻¹⁰, x = (1 + 2ε)·part satisfies part + far·x ≤ x; and far·most ≤ most.
         beyond = absolute(now)
-        for i, part in enumerate(wholes):
-            solution = absolute(part * ball(1 + 2 * _LEFT))  # some x with part + far·x ≤ x
-            if not not_above(part + far * solution, solution):
-                raise _unstable()
-            totals[i] = absolute(totals[i] + beyond * solution)
-        if start:
-            most = absolute(most * ball(_ROOM))
-            if not not_above(far * most, most):
-                raise _unstable()
-            free = absolute(larger(free, beyond * most))
-        return totals, free
+        totals = [
+            absolute(total + beyond * part * ball(1 + 2 * _LEFT)) for total, part in zip(totals, wholes, strict=True)
+        ]
+        return totals, absolute(larger(free, beyond * most))
 
     def _peaks(self, s: int, i: int, before: arb_mat) -> Row:
         """Bounds of all rows in a segment for input `i`, of which the last stands for the initial states.

@@ -7,12 +7,14 @@ from math import exp
 from types import SimpleNamespace
 
 import pytest
+from flint import arb, arb_mat, ctx
 from standalone_guarantee import CHECK
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound
+from quakedesign.guarantees.exact import plant_loop
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document
-from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, response_bounds, solved
+from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, response_bounds, solved
 from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof
 from quakedesign.plant.plant_values import ExactSector, SlowLoad
 
@@ -34,7 +36,7 @@ PART = LinearPart(
         SlowLoad(control=rows([1, 2])[0], shift=rows([0, 0])[0], rate=F(2)),
     ),
     sectors=(
-        ExactSector(entry=rows([1, 0])[0], row=rows([0, 1, 0, "1/8"])[0], slopes=(F(-1, 4), F(1, 2))),
+        ExactSector(entry=rows([1, 0])[0], row=rows([0, 1, "1/16", "1/8"])[0], slopes=(F(-1, 4), F(1, 2))),
         ExactSector(entry=rows([0, 1])[0], row=rows([1, 0, 0, 0])[0], slopes=(F(-1, 8), F(1, 8))),
     ),
     noise=(F(1), F(0), F(2)),
@@ -404,3 +406,51 @@ def test_bounds_of_rows_count_every_input_with_its_size():
     for numbers in ([F(-1), F(0)], [F(7), F(-1, 9)]):
         with pytest.raises(CHECK.Refused, match="inputs of the sectors must be >= 0"):
             checker.rows_of(plant, found, numbers)
+
+
+def test_a_law_of_other_dimensions_is_rejected():
+    for law in (replace(NONE, feedback=rows([0, 0])), replace(NONE, feedback=()), replace(NONE, output=((F(0),),))):
+        with pytest.raises(
+            ParameterError, match=r"of a law for this plant must be 1 x [01], as 1 signals are measured"
+        ):
+            LAG.loop(law)
+
+
+def test_a_sampled_input_passes_the_second_jump_of_the_period():
+    """x′ = −x, reset by each sample and multiplied by 10 after 1 s: the largest response is 10/e, just after that."""
+    loop = PlantLoop(
+        flow=rows([-1]), segments=((rows([0]), F(1)), (rows([10]), F(2))), inputs=(), sampled=rows([1]), start=(),
+        rows=rows([1]),
+    )  # fmt: skip
+    assert 10 * exp(-1) <= response_bounds(loop, 8).sampled[0][0] <= 10 * exp(-1) * (1 + (2 / 8) ** 2 / 8 + 1e-9)
+
+
+def test_a_loop_that_needs_more_products_than_allowed_has_no_bound(monkeypatch):
+    """8·r·n·(c + n) products for eight periods of a lag, after which e⁻⁸ is left, less than 1/1024.
+
+    n = 2 states with the pressure; r = 8 rows: two at two ends of the piece, and twice two unit rows; c = 5 columns:
+    one disturbance at two ends, two units and one initial state.
+    """
+    needed = 8 * 8 * 2 * (5 + 2)
+    for most, proved in ((needed, True), (needed - 1, False)):
+        monkeypatch.setattr("quakedesign.guarantees.exact.plant_loop._MOST_WORK", most)
+        with nullcontext() if proved else pytest.raises(ParameterError, match="stable and decay fast"):
+            assert response_bounds(LAG.loop(NONE), 1).inputs[0][0] > 1
+
+
+def test_a_loop_with_a_large_transient_is_bounded():
+    """x′ = −x/10 + 100y, y′ = −y/10 + w: the response 100·te^{−t/10} has the integral 10⁴."""
+    loop = PlantLoop(
+        flow=rows(["-1/10", 100], [0, "-1/10"]), segments=((rows([1, 0], [0, 1]), F(1)),), inputs=rows([0, 1]),
+        sampled=(), start=rows([0, 1]), rows=rows([1, 0]),
+    )  # fmt: skip
+    found = response_bounds(loop, 8)
+    assert 10**4 <= found.inputs[0][0] <= 10**4 * (1 + 1e-2)
+    assert 1000 * exp(-1) <= found.start[0] <= 1000 * exp(-1) * (1 + 1e-2)
+
+
+def test_raised_bounds_exceed_all_bounds_and_zero():
+    with ctx.workprec(128):
+        raised = plant_loop._raised(arb_mat([[3], [0]])).entries()
+        assert raised[0] > 3
+        assert 0 < raised[1] < arb(2) ** -55
