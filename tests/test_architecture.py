@@ -467,16 +467,16 @@ BUDGETS = {
     "laws": 3114,
     "loop": 4185,
     "plant": 1458,
-    "guarantees": 13502,
+    "guarantees": 13501,
     "lyapunov": 6962,
     "linear": 2405,
     "synthesis": 1969,
     "rocq": 847,
-    "simulation": 9756,
+    "simulation": 9757,
     "identification": 4065,
     "studies": 4155,
     "report": 4141,
-    "cli": 3563,
+    "cli": 3567,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

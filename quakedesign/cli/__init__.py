@@ -82,7 +82,7 @@ def _with_help(error: CycloptsError) -> str:
     """Error message of a command line, with a pointer to the help unless it is about a value and states a remedy."""
     if isinstance(error, CoercionError):
         return str(error)
-    hyphen = " Join a value that begins with - by =." if isinstance(error, MissingArgumentError) else ""
+    hyphen = " Join a value that begins with - to its option by =." if isinstance(error, MissingArgumentError) else ""
     return f"{error}{hyphen} See {' '.join(('quakedesign', *(error.command_chain or ())))} --help."
 
 

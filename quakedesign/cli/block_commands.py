@@ -262,7 +262,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
     ]
     last = "proved on the plant without stick; run on the stick-slip plant, where errors may exceed the bounds"
     if chain.has_state:
-        meant = ["(largest slip rate, slip relative to the reference, pressure relative to the plan)"]
+        meant = ["(largest slip rate, slip minus reference, pressure minus planned pressure)"]
         stress = LowerBound(sliding["stress"]).quantity("Pa")
         last = f"proved for any shear stress of up to {stress}; run without inertia, under a sinusoidal stress"
     lines = [

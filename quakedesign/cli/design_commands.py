@@ -64,7 +64,8 @@ class DesignOptions(WellOptions):
         with a zero-order hold: explicit, implicit, semi-implicit, compensated, stick-slip. Other designs run as
         designed.
     stress
-        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; default: the largest proved.
+        Rate-and-state faults: bound of the shear stress disturbance, such as '25 kPa'; by default about the largest
+        with a guarantee.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c, such as 0.1.
     published_scheme

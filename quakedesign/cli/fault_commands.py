@@ -186,7 +186,10 @@ def init(
     return 0
 
 
-_AROUND = "Preset or .toml file, from which the file to write takes everything but the friction."
+_AROUND = (
+    "Preset or .toml file, from which the file to write takes all but the friction; without T_s and disturbance if "
+    "only the identified friction has a state."
+)
 
 
 @app.command

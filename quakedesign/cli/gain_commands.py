@@ -57,7 +57,7 @@ def synthesise(
         all |e_i| ≤ L̄ (the value of --lipschitz). beta: widest certified range of the input gain β. sampled: smallest
         simulated error of proved gains on a fault.
     lipschitz
-        Bound on |h'|, the rate of change of the matched disturbance h, in the unit of the control ν per second; by
+        Bound on |h'|, the rate of change of the matched perturbation h, in the unit of the control ν per second; by
         default 1, for sampled 1.1 times the largest |h'| of the fault.
     gain_range
         b_m and b_M, the range of the input gain β; 1 1 by default, for sampled that of the fault. For beta
@@ -221,7 +221,7 @@ def gain_map(
         Four numbers: both ends of the first gain, then of the second; by default 0.25 and 4 times the gain's value in
         --gains.
     lipschitz
-        One or more bounds on |h'|, the rate of change of the matched disturbance h; by default 25, 50, 75, 90 and 99 %
+        One or more bounds on |h'|, the rate of change of the matched perturbation h; by default 25, 50, 75, 90 and 99 %
         of the bound that no proof can exceed.
     gain_range
         b_m and b_M, the range of the input gain β.

@@ -46,7 +46,7 @@ def certify(
     gains
         Exact numbers: decimals, with or without exponent, or p/q; four for cta and for elqr (elqr: in SI units).
     lipschitz
-        Sliding mode: bound on |h'|, the rate of change of the matched disturbance h, in the unit of the control ν per
+        Sliding mode: bound on |h'|, the rate of change of the matched perturbation h, in the unit of the control ν per
         second.
     maximize
         Sliding mode: quantity to maximise: lipschitz (the bound on |h'|; also gives the smallest λ for the bound of
@@ -212,11 +212,11 @@ def sos(
         Positive polynomial multiplier, or auto to search for one and to try powers of 1 + x² + y² + … (x² + y² + … for
         forms).
     margin
-        Decide polynomial − margin·(1 + Σ x_i^degree) instead (without the 1 for forms).
+        Decide polynomial − margin·(1 + Σ x_i^d) instead, d its degree (without the 1 for forms).
     degree
         Largest degree of a summand; by default the smallest possible, and under constraints also the next even one.
     products
-        Use all products of constraints, or none; by default products of variables only.
+        Use all products of constraints, or none; by default only of constraints such as x >= 0.
     gram
         Instead of a polynomial: JSON or .mat file with a polynomial and a Gram matrix of another program.
     verbose

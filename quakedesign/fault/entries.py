@@ -117,7 +117,7 @@ class Table:
         self._missing: list[str] = []
 
     def read(self, entries: Mapping[str, FileEntry], quantity: Reader = si_value) -> Json:
-        """Texts, and quantities in SI units, by name; None for an invalid or missing required entry.
+        """Texts, and quantities in SI units, by name; None for an invalid entry or a missing required one.
 
         An omitted optional entry has no value.
         """
@@ -136,7 +136,7 @@ class Table:
         return values
 
     def table(self, key: str, *, optional: bool = False) -> "Table":
-        """Table inside this one; an invalid or missing one is empty, without errors of its entries."""
+        """Table inside this one; if invalid or missing, an empty one whose own errors are discarded."""
         if self._given(key, optional):
             with self.problems.collected():
                 name = self._name(key)
@@ -198,12 +198,12 @@ class Table:
 
 
 def _of(kind: type[_Value], value: object, name: str, what: str) -> _Value:
-    """Return a value of a type; its name and the description of the type are for the message."""
+    """Return a value if it has a type; `name` and `what` (the type in words) are for the message."""
     if not isinstance(value, kind):
         raise ScenarioError(f"{name} must be {what}. Received {shown(value)}. Compare with a preset.")
     return value
 
 
 def _letters(symbol: str) -> str:
-    """Letters and digits of a symbol, in small letters."""
+    """Letters and digits of a symbol, in lower case."""
     return re.sub(r"[^a-z0-9]", "", symbol.lower())

@@ -169,7 +169,7 @@ class Problems:
         raise error from None
 
     def resolved(self, value: _Value | None, where: str = "") -> _Value:
-        """Raise the collected errors, see `refuse`, or return the value; it may be None only if there are errors."""
+        """Raise the collected errors, see `raise_collected`, or return the value; None only if there are errors."""
         self.raise_collected(where)
         assert value is not None
         return value

@@ -80,7 +80,7 @@ def _registry() -> Any:
 
 @cache
 def dimension(unit: str) -> tuple[Fraction, ...]:
-    """Exponents of `BASES` in a unit; a plain ``m`` is one of slip and ``Pa`` one of normal stress or fluid pressure.
+    """Exponents of `BASES` in a unit; plain ``m`` means slip, ``Pa`` normal stress or fluid pressure.
 
     Raises
     ------
@@ -190,7 +190,7 @@ class Radical:
     def __pow__(self, exponent: Fraction | int) -> "Radical":
         power = Fraction(exponent)
         if (self.sign == 0 and power <= 0) or (self.sign < 0 and power.denominator != 1):
-            raise ParameterError(f"{self.text()} has no real power {power}.")
+            raise ParameterError(f"{self.text()} has no power {power} here.")
         if self.sign == 0:
             return self
         sign = -1 if self.sign < 0 and power.numerator % 2 else 1
@@ -308,7 +308,7 @@ class Scales:
 
 
 def power_product(bases: Mapping[str, Radical | Fraction | int], exponents: Mapping[str, Fraction]) -> Radical:
-    """Π base^exponent, exact; bases may be zero only where they are not used."""
+    """Π base^exponent, exact; a base that is zero must have an exponent ≥ 0."""
     return prod((radical(bases[n]) ** e for n, e in exponents.items() if e), start=radical(1))
 
 
@@ -318,7 +318,7 @@ def power_product(bases: Mapping[str, Radical | Fraction | int], exponents: Mapp
 # pressure are multiplied by their scale factors.
 
 TOLERANCE = Fraction(1, 100)
-"""Relative difference of a π-group up to which faults known to three digits count as similar."""
+"""Largest relative difference of a π-group of similar faults, for parameters of three digits."""
 
 CLOCKS = ("reference.operation_time", "shear_modulus")
 """Quantities that may set the time scale: the task, as in Table I of the paper, or the natural period ∝ √(ρL²/G)."""
@@ -488,7 +488,7 @@ def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Faul
     if exact.pop(_UNIT_FRICTION, radical(1)) != radical(1):
         raise ParameterError(
             f"slip_m/normal_m must have the factor 1, because {source.friction.name} cannot be multiplied by a factor. "
-            f"Received the factor {scales.of('slip_m/normal_m')}. Give slip_m and normal_m one factor."
+            f"Received the factor {scales.of('slip_m/normal_m')}. Give slip_m and normal_m the same factor."
         )
     parts: dict[str, dict[str, float]] = {"": {}, "friction": {}, "reference": {}, "disturbance": {}}
     for dotted, value in exact.items():

@@ -142,7 +142,7 @@ class Guarantee:
     def _proof(self) -> Any:
         if not self.proved:
             raise CertificateError(
-                f"the result must be proved, or it has no law and no certificate. Received {self.sentence()}."
+                f"a result must be proved, or it has no law and no certificate. Received {self.sentence()}."
             )
         return self.proof
 

@@ -183,7 +183,7 @@ def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
     table, repairs = pd.DataFrame(given), []
     whole = table.dropna()
     if lost := len(table) - len(whole):
-        repairs.append(f"{lost} of {len(table)} rows without a number left out")
+        repairs.append(f"{lost} of {len(table)} rows left out, as a number is missing")
     if whole.empty:
         raise RecordError(
             f"a record must have rows with a number in every column. Received none in {len(table)} rows. Remove the "
@@ -218,7 +218,7 @@ def _window(given: dict[str, ndarray], begin: str | None, end: str | None) -> di
     if not (begin is None and end is None) and inside.sum() < 2:
         time = given["time"]
         raise RecordError(
-            f"a window must hold samples. Received from {begin or 'the first'} to {end or 'the last'} in a record from "
+            f"a window needs two samples. Received from {begin or 'the first'} to {end or 'the last'} in a record from "
             f"{time[0]:.6g} to {time[-1]:.6g} s. Give times or displacements of the file."
         )
     return {name: column[inside] for name, column in given.items()}
@@ -284,7 +284,7 @@ def _friction(given: dict[str, ndarray], stress: float | None) -> tuple[ndarray,
         raise RecordError(f"{measured} must be positive. Received a median friction of {middle:.3g}. Change its sign.")
     least, largest = _PLAUSIBLE
     if not least <= middle <= largest:
-        by = "column" if measured == "friction" else f"units of {measured} and {across}, of --normal-stress too"
+        by = "column" if measured == "friction" else f"units of {measured} and {across}, or of --normal-stress"
         raise RecordError(
             f"friction must have a median from {least:g} to {largest:g}. Received {middle:.3g}. Check the {by}."
         )
@@ -304,7 +304,7 @@ def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | No
             moved = column - column[0]
             if not displaced:
                 moved = np.concatenate([[0.0], np.cumsum(np.diff(given["time"]) * column[:-1])])
-            return moved, None if displaced else column, [f"{name} decreases: its sign is changed"] * backward
+            return moved, None if displaced else column, [f"{name} runs backward: its sign is changed"] * backward
     return None, None, []
 
 
@@ -338,7 +338,7 @@ def scatter(time: ndarray, values: ndarray) -> float:
 
 
 def reading_step(values: ndarray) -> float:
-    """Resolution of quantised values (the first repeat or often turn by one step); otherwise 1e-9 of the range."""
+    """Resolution of quantised values (the first repeat, or increments often change); otherwise 1e-9 of the range."""
     levels, first = np.unique(values), np.diff(values[:_FIRST])
     step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
     quantised = np.any(first == 0) or np.sum(np.abs(np.diff(first)) > step / 2) > _BENDS

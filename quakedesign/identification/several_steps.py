@@ -94,7 +94,7 @@ def cut(record: Record) -> list[Record]:
     begins = np.empty(0) if loading is None else loading.steps
     if len(begins) < 2:
         raise RecordError(
-            f"a record that is cut into steps must have two changes of rate of over 25 %. Received {len(begins)}. "
+            f"a record that is cut into steps must have two changes of rate by over 25 %. Received {len(begins)}. "
             "Name the windows: --steps '0 s to 60 s, 60 s to 120 s'."
         )
     ends = [-np.inf, *((begins[1:] + begins[:-1]) / 2).tolist(), np.inf]

@@ -53,13 +53,13 @@ class SampledLaw(SampledController):
     step : Fraction
         T_s [s].
     delay, lag, diffusion, longest : Fraction
-        Path between law and fault in runs, see `Sampling` [s].
+        Path between law and fault, and longest sampling interval, in runs; see `Sampling` [s].
     rest_limit : RestLimit, optional
         None: the law does not receive the pressure applied at a limit.
     label : str
         Name for display.
     notes : tuple of str
-        Changes when floats became exact numbers.
+        Changes made by the conversion of floats to exact numbers.
     """
 
     name: ClassVar[str] = "user-law"
@@ -83,7 +83,7 @@ class SampledLaw(SampledController):
         Parameters
         ----------
         system : control.StateSpace or control.TransferFunction
-            Its one output is the pressure [Pa] with its sign: multiply a law for negative feedback by −1.
+            Its one output is the pressure itself [Pa]: multiply a law designed for u = −Ky by −1.
         inputs : sequence of str
             Signals in the order of its inputs: slip_error, slip_rate_error, slip, slip_rate, reference or
             reference_rate [m, m/s].
@@ -265,7 +265,7 @@ class SampledLaw(SampledController):
         """Read a law from a ``.json`` or ``.npz`` file; no code of the file is run.
 
         The keys are those of `to_dict`, with numbers or texts (``"184 ms"``). In place of the matrices a file may have
-        ``gains`` or ``pid`` (kp, ki, kd, N); ``step`` is always required. In ``.npz`` ``dt`` may stand for ``step``.
+        ``gains`` or ``pid`` (kp, ki, kd, N); ``step`` is always required. ``dt`` may stand for ``step``.
 
         Raises
         ------
@@ -341,7 +341,7 @@ _DEPENDENT = 1e-6
 
 
 def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
-    """Law with an exact integrator in place of one perturbed by rounding, and a note of the change."""
+    """Matrix A with an exact integrator in place of one perturbed by rounding, and a note of the change."""
     size = len(A)
     with suppress(ParameterError):
         still = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(A))

@@ -26,7 +26,7 @@ class Segment:
     duration : Fraction
         [s], positive.
     ends, past_ends : tuple of Fraction
-        Ends of the pieces of the flow in bounds of outputs, and of past responses: fractions of the duration, 0 to 1.
+        Ends of the pieces of the flow, for bounds of outputs and for past responses: fractions of the duration.
     """
 
     jump: Matrix

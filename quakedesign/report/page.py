@@ -192,7 +192,7 @@ def _slowly(entry: "Entry") -> list[str]:
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
         "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
         "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
-        "terms of the claimed bounds, and these bounds lie within the claims (small gain). They hold "
+        "terms of the claims, and the resulting bounds lie within the claims (small gain). The claims hold "
         f"{proof.lasts}. The box of constants is divided into {cells}.",
     ]
 
@@ -393,7 +393,7 @@ CAPTIONS = {
     "metrics": "Largest errors, root mean square and total variation of the pressure after a quarter of the task. "
     "Hatched: published gains.",
     "friction-law": "Friction against slip, and the line along which the spring unloads: where friction falls "
-    "faster than the spring, the fault is unstable.",
+    "faster than this line, the fault is unstable.",
     "earthquakes": "Natural earthquake and the one that a constant injection induces.",
     "friction-coefficient": "Friction coefficient in closed loop; dotted: its smallest and largest values.",
     "errors-and-power": "Errors and pressure divided by those of the e-LQR; values below 1 are better.",

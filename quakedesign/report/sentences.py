@@ -1,6 +1,6 @@
 """Sentences of reports: scope of a proof, outcome of a run, margins and limits.
 
-Chapters: what a proof covers of loop and task; headline of a run; e-LQR margins and sampling; comparison;
+Chapters: loop and task that a proof covers; headline of a run; e-LQR margins and sampling; comparison;
 runs with friction state.
 """
 
@@ -79,7 +79,7 @@ def _failing(premise: Premise) -> str:
 
 
 def _hold_gaps(entry: "Entry") -> list[str]:
-    """Parts of the proof that do not apply to the scheme of the run."""
+    """Gaps of the proof for the scheme of the run."""
     if entry.run is None:
         return []
     scheme, step = entry.run.provenance["scheme"], entry.run.provenance["step"]
@@ -132,7 +132,7 @@ def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
     text = f"the fault is unstable, but its event has not begun by {run.time[-1]:.4g} s"
     if event.onset is None:
         return f"{text}: no forward disturbance acts; without --duration the run adds one"
-    return f"{text}: growing by {event.growth:.3g} 1/s it would begin at about {event.onset:.3g} s"
+    return f"{text}: at a growth rate of {event.growth:.3g} 1/s it would begin at about {event.onset:.3g} s"
 
 
 def pressure_sentence(least: float, largest: float) -> str:
@@ -222,7 +222,7 @@ def margin_lines(analysis: Analysis) -> list[str]:
     if span is not None:
         end = f"unstable at {span.low_limit:.4g}"
         lines.append(
-            f"certified: beta from {span.low:.4g} ({end}) to the top of the box, and from its bottom to {span.high:.4g}"
+            f"certified ranges of beta: {span.low:.4g} to the box's upper end ({end}); its lower end to {span.high:.4g}"
         )
     return lines
 
@@ -485,7 +485,7 @@ def state_run_lines(result: Json) -> list[str]:
         lines.append(f"slip of an event {cycle['slip']:.4g} m, magnitude {cycle['magnitude']:.2f}")
     lines += [_event_line(number, event) for number, event in enumerate(events[:_MOST_EVENTS], start=1)]
     if len(events) > _MOST_EVENTS:
-        lines.append(f"and {len(events) - _MOST_EVENTS} events more (--json lists all)")
+        lines.append(f"and {len(events) - _MOST_EVENTS} more events (--json lists all)")
     lines.append(f"energy error of the integration: {result['energy']['relative_residual']:.2g} of the largest energy")
     return lines
 
@@ -509,7 +509,7 @@ def _cycle(run: Trajectory, cycle: dict[str, float | None], fault: Fault) -> str
 
 
 def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
-    """Beginning of run and proof of slow sliding, and the share of an earthquake's slip in their task."""
+    """Beginning of run and proof of slow sliding, and the share of an earthquake's slip that their task uses up."""
     task = fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
     text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; the transition from rest is not"
@@ -574,7 +574,7 @@ def sliding_run_lines(result: Json) -> list[str]:
         f"{outcome['kind']}: peak slip rate {outcome['peak_slip_rate']:.4g} m/s, the reference's is "
         f"{result['largest_reference_rate']:.4g} m/s (an earthquake from {outcome['earthquake_from']:.3g} m/s on)",
         f"zero-order hold over {result['step']:.4g} s{path}{shaken}, for {lasting(result['duration'])}; without "
-        f"control errors grow by {result['growth_rate']:.3g} 1/s",
+        f"control errors grow at {result['growth_rate']:.3g} 1/s",
         f"|ln(v/r')| at most {metrics['max_log_rate']:.3g}, slip error at most {metrics['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; feedback adds at most "
         f"{metrics['max_asked'] / 1e6:.3g} MPa, of either sign, to what the reference needs",

@@ -152,7 +152,7 @@ def printed_lines(rows: list[Json], fault: str = "") -> list[str]:
     plant = " on the stick–slip plant (--plant printed simulates the paper's plant)" if sticks else ""
     return ["", f"printed in the paper, and computed here{plant}:"] + [
         f"  {row['run']}, {row['metric']}: {row['printed']:.3g} {row['unit']} printed ({row['place']}), "
-        f"{row['found']:.3g} found, ratio {row['ratio']:.3g}. {row['note']}"
+        f"{row['found']:.3g} computed, ratio {row['ratio']:.3g}. {row['note']}"
         if row["ratio"] is not None
         else f"  {row['run']}, {row['metric']}: {row['printed']:.3g} printed ({row['place']}), no run to compare with"
         for row in rows

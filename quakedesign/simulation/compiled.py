@@ -38,7 +38,8 @@ from quakedesign.loop.schemes.implicit import where_needed
 # uniquely, with exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`).
 # They are defined once, as CasADi expressions; this module inserts them into CasADi functions and translates them into
 # C. Errors are below 1 unit in the last place; for cube roots below 0.65, for other powers (exponents up to 2) below
-# 1.5, for the hyperbolic tangent below 2. Zeros have no sign. The power with the float next to ⅓ is the cube root.
+# 1.5, for the hyperbolic tangent below 2. The sign of a zero is unspecified. The power with the float next to ⅓ is the
+# cube root.
 
 _ROUNDER = 1.5 * 2.0**52  # sums with it are rounded to whole numbers
 _SPLITTER = 2.0**27 + 1
@@ -69,7 +70,7 @@ def verbatim(*, bits: bool = False) -> Iterator[None]:
 
 
 def _pieces(number: Fraction, bits: int, count: int) -> list[float]:
-    """Floats with a given number of leading bits each, and a last one, whose sum is `number`."""
+    """Floats with a given number of leading bits each, and a rounded last one, whose sum is `number`."""
     leading = []
     for _ in range(count - 1):
         unit = Fraction(2) ** (math.frexp(float(number))[1] - bits)
@@ -614,7 +615,7 @@ def declared(
 
 @cache
 def portable_library() -> str:
-    """Text before CasADi's C that replaces calls of the C library by the portable functions."""
+    """C text that precedes CasADi's and replaces calls of the C library by the portable functions."""
     names = {FUNCTIONS[code].__name__: code for code in FUNCTIONS if code != ca.OP_POW}
     called = {"power": "pow"}
     replaced = "".join(f"#define {called.get(name, name)} portable_{name}\n" for name in names)

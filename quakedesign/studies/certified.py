@@ -238,7 +238,7 @@ def _limit_lines(largest: CertifiedLimit) -> list[str]:
     if largest.beyond is None:
         return [text, "the search ended there without reaching an upper limit"]
     beyond = f"at {UpperBound(largest.beyond)} no function of degree {degrees} was found"
-    return [text, beyond if largest.sharp else f"{beyond}; between both values nothing is known"]
+    return [text, beyond if largest.sharp else f"{beyond}; between the two values nothing is known"]
 
 
 def _limit_line(limit: Fraction | None) -> str:

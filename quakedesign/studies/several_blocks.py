@@ -61,7 +61,7 @@ def chain_lines(chain: BlockChain) -> list[str]:
     lines += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
     pole, peak = _growth(chain), natural_peak(chain)
     stable = "stable" if pole == 0 else "stability unknown: its modes are not resolved in floating point"
-    lines += [f"without control: {f'unstable, errors grow with up to {pole:.4g} 1/s' if pole else stable}"]
+    lines += [f"without control: {f'unstable, errors grow at up to {pole:.4g} 1/s' if pole else stable}"]
     lines += [] if peak is None else [f"natural earthquake: slip rate up to {quantity(peak, 'm/s')}"]
     if chain.diffusivity is not None:
         lines.append(
@@ -92,7 +92,7 @@ def farthest_balance(chain: BlockChain, proof: PlantProof) -> UpperBound | None:
     N, task = len(chain.blocks), uncertain_plant(chain.fault)
     if len(chain.wells) == N:
         return None
-    moves = [size for _, size in proof.part.disturbances[N:]]  # they follow the forces on the blocks
+    moves = [size for _, size in proof.part.disturbances[N:]]  # listed after the forces on the blocks
     return UpperBound(max(moves) / task.reference_rates[0] * task.target_slip)
 
 
@@ -240,7 +240,7 @@ class ChainRun:
             parts += [f"run: {lasting(float(run.times[-1]))} on the stick-slip plant, where errors and pressures may"]
             parts += [f"exceed bounds that are proved for the plant without stick{did}"]
             if len(chain.wells) < N:
-                parts.append("slip error: proved from a block's equilibrium, in the run from the reference")
+                parts.append("slip error: relative to equilibrium in the proof, to the reference in the run")
             for event, happened in (("a block would slip backward", run.reversed), ("a block opens", run.opened)):
                 parts += [f"{event}: the run is outside the model"] if happened else []
         return parts
@@ -292,13 +292,13 @@ def chain_law(
         plant = UncertainPlant.from_blocks(chain)
         if not several or claim.part != linear_part(plant, {}):
             raise CertificateError(
-                f"a certificate must be about the fault. Received {certificate}, about another plant than "
+                f"a certificate must be about the fault. Received {certificate}, about a plant other than "
                 f"{plant.name}. Give a file of guarantee {chain.name} --out FILE."
             )
         proof = named(claim, plant)
     if claim.law.delay or claim.check() is not Verdict.PROVED:
         raise CertificateError(
-            f"a certificate must be valid, of a law without delay. Received {certificate}. Prove one with guarantee."
+            f"a certificate must be valid, for a law without delay. Received {certificate}. Prove one with guarantee."
         )
     return proof
 
@@ -428,7 +428,7 @@ class SlidingChainRun:
                 f"{'within' if self.within else 'OUTSIDE'} the proved bounds of slips, rates, states and pressures",
             ]
         events = self.events
-        loaded = f"{self.chain.name}, loaded from afar at {quantity(self.run.loading_rate, 'm/s')}"
+        loaded = f"{self.chain.name}, under remote loading at {quantity(self.run.loading_rate, 'm/s')}"
         parts = [f"{loaded}: {counted(len(events), 'event')} in {end}"]
         parts += [
             f"event {i}: from {lasting(event.onset)}, slip "
@@ -487,7 +487,7 @@ def run_sliding_chain(
     controller, certificate
         As in `chain_law`.
     sliding : mapping, optional
-        Lag and stress of a new design. Without it and a certificate there is no control.
+        Lag and stress of a new design. With neither it nor a certificate there is no control.
     stress : float, optional
         Amplitude of sinusoidal shear stress on every block, with equally spaced phases [Pa]; by default the proved one.
     stress_period : float
@@ -505,7 +505,7 @@ def run_sliding_chain(
         run = natural_cycles(chain, duration, loading_rate=loading_rate, inertia=inertia)
         return SlidingChainRun(chain=chain, run=run, inertia=inertia)
     if loading_rate is not None:
-        raise ParameterError("the far end rests in slow sliding. Received a loading rate. Omit it.")
+        raise ParameterError("the far end of the springs is fixed in slow sliding. Received a loading rate. Omit it.")
     proof = chain_law(chain, controller, certificate, **(sliding or {}))
     if not proof.available:
         return SlidingChainRun(chain=chain, run=None, inertia=inertia, proof=proof, controller=controller)

@@ -493,7 +493,7 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
         )
     if not claim.sampled or claim.slides != (fault.friction.equilibrium is STEADY_SLIDING):
         raise CertificateError(
-            "the certificate must be of a sampled law, and about friction with a state only if the fault has such "
+            "the certificate must be of a sampled law, and for friction with a state if and only if the fault has such "
             f"friction. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
         )
     if differences := _differences(fault, claim):

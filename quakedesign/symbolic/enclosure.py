@@ -51,7 +51,7 @@ _RISING: dict[type[sp.Basic], Interval] = {  # with their limits at −inf and i
 
 
 def interval(expression: sp.Expr, box: Box) -> Interval:
-    """Interval that contains every value of an expression over a box; the whole line if it may be undefined.
+    """Interval that contains every value of an expression over a box; the whole line if it may be undefined there.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def interval(expression: sp.Expr, box: Box) -> Interval:
 def regular(expression: sp.Expr, box: Box) -> bool:
     """Whether an expression has no pole, no end of its domain and no jump of a signed power on a box.
 
-    Then its derivatives off the kinks determine its monotonicity; at other jumps derivatives contain an impulse.
+    Then its derivatives off the kinks determine its monotonicity; those of `Heaviside` and `sign` contain an impulse.
     """
     intervals = _intervals(expression, box)
     ends = [intervals[node.args[0]] for node in intervals if _singular_at_zero(node)]
@@ -317,7 +317,7 @@ def enclose(expression: sp.Expr, box: BallBox) -> arb:
     Returns
     -------
     flint.arb
-        Not finite if the expression is not defined on the whole box.
+        Not finite if the expression is undefined somewhere in the box.
 
     Raises
     ------
@@ -589,7 +589,7 @@ def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction)
     limit : Fraction
         Returned if the expression is proved not to exceed it.
     slack : Fraction
-        Largest accepted excess of an enclosure that cannot be sharpened.
+        Largest accepted excess of the enclosure over the limit.
 
     Returns
     -------

@@ -223,7 +223,7 @@ def _claims(
         yield Identity(left=twice * e, right=at[e] ** 2), f"f(Δ²x)·f(x) = f(Δx)², for any degree of f = {e}"
     for (s, e), (other, f) in combinations(components.items(), 2):
         left, right = epsilon ** weights[other] * at[e] * f, epsilon ** weights[s] * at[f] * e
-        yield Identity(left=left, right=right), f"one degree for the components of {s} and {other}"
+        yield Identity(left=left, right=right), f"the same degree for the components of {s} and {other}"
 
 
 def _search(identity: Identity, meaning: str, weights: Mapping[Any, Any]) -> Counterexample | None:

@@ -203,7 +203,7 @@ def guarantee(
         wrong = chosen | {"gains": False, "stress": stress is not None, f"controller {controller!r}": not named}
         if any(wrong.values()):
             raise ParameterError(
-                f"a guarantee of an uncertain plant needs a law or gains alone. Received {_names(wrong)}. Omit these."
+                f"options of a fault do not apply to an uncertain plant. Received {_names(wrong)}. Omit these."
             )
         proof = guarantee_plant(fault, law, gains, setup, decentralised=controller == BLOCK_LAWS[1])
         return PlantGuarantee(proof=proof)

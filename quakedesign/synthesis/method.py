@@ -114,7 +114,7 @@ class GainProblem(Generic[Designed]):
         if self.continuous and self.setup != IDEAL:
             raise ParameterError(
                 "a design in continuous time needs exact measurements of slip and slip rate, and no delay, lag or "
-                "diffusion path. Received {', '.join(self.setup.given())}. Omit continuous, or these."
+                f"diffusion path. Received {', '.join(self.setup.given())}. Omit continuous, or these."
             )
 
     def by_method(self, law: type[Controller]) -> Designed:

@@ -79,7 +79,7 @@ def test_a_run_that_is_not_what_is_proved_says_so(capsys, more, outside):
     ("fault", "more", "said"),
     [
         ("creeping-patch", (), "rate [m/s] 0.000001 in the certificate"),
-        ("real-fault", (), "about friction with a state only if the fault has such"),
+        ("real-fault", (), "for friction with a state if and only if the fault has such"),
         ("crustal-patch", ("--lag", "2 s"), "lag cannot be used with"),
         ("crustal-patch", ("--controller", "cta"), "--certificate contains the law"),
     ],

@@ -108,7 +108,7 @@ def test_a_line_of_headings_alone_is_no_record(tmp_path):
     [
         ("-15", "25 MPa", "shear_stress must be positive. Received a median friction of -0.6. Change its sign."),
         ("15", "25 Pa", "median from 0.01 to 3. Received 6e+05. Check the units"),
-        ("0.2", "25 MPa", "Received 0.008. Check the units of shear_stress and normal_stress, of --normal-stress too."),
+        ("0.2", "25 MPa", "Received 0.008. Check the units of shear_stress and normal_stress, or of --normal-stress."),
     ],
 )
 def test_friction_that_no_rock_has_is_refused_with_its_likely_cause(shear, normal, said, tmp_path):
@@ -182,7 +182,7 @@ def test_what_falls_is_turned_and_what_slows_down_is_not(tmp_path):
     """A displacement above zero that falls, and rates that are positive and fall."""
     record = read_record(written(tmp_path, "time [s], displ [um], mu", "0, 100, 0.6", "1, 80, 0.61", "2, 50, 0.6"))
     assert record.load_point.tolist() == pytest.approx([0, 20e-6, 50e-6])
-    assert "load_point_displacement decreases: its sign is changed" in record.remarks
+    assert "load_point_displacement runs backward: its sign is changed" in record.remarks
     record = read_record(written(tmp_path, "time [s], velocity [um/s], mu", "0, 10, 0.6", "1, 3, 0.61", "2, 1, 0.6"))
     assert record.load_point.tolist() == pytest.approx([0, 10e-6, 13e-6])
     assert not any("sign is changed" in remark for remark in record.remarks)

@@ -198,7 +198,7 @@ def test_rows_without_a_number_and_times_that_repeat_are_counted_once(tmp_path):
     path.write_text("\n".join([*text[:2], *rows[:2], *text[2:4], rows[2], rows[3], text[4]]))
     record = read_record(path)
     assert record.remarks == (
-        "3 of 8 rows without a number left out",
+        "3 of 8 rows left out, as a number is missing",
         "1 samples at the time of another replaced by their mean",
     )
     np.testing.assert_allclose(record.time, [0, 0.1, 0.2, 0.4])
@@ -236,7 +236,7 @@ def test_a_window_is_counted_as_the_file_counts(begin, end, kept, tmp_path):
     np.testing.assert_allclose(record.time + record.origin, ROWS[kept, 0])
     np.testing.assert_allclose(record.friction, ROWS[kept, 2] / 5)
     with pytest.raises(
-        RecordError, match=r"must hold samples\. Received from 7 s to the last in a record from 0 to 0.4"
+        RecordError, match=r"needs two samples\. Received from 7 s to the last in a record from 0 to 0.4"
     ):
         read_record(path, begin="7 s")
     with pytest.raises(QuakedesignError, match="a time, or a displacement"):

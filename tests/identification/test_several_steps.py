@@ -208,7 +208,7 @@ def test_a_record_is_cut_midway_between_changes_of_rate_and_no_sample_counts_twi
     numbers = np.arange(len(made.time))
     half = part(replace(made, counts=numbers + 1.0, load_rates=numbers * 2.0), numbers > 9, "half")
     assert (half.counts[0], half.load_rates[0], half.slip, len(half.normal)) == (11.0, 20.0, None, len(numbers) - 10)
-    with pytest.raises(RecordError, match=r"must have two changes of rate of over 25 %. Received 1. Name the windows"):
+    with pytest.raises(RecordError, match=r"must have two changes of rate by over 25 %. Received 1. Name the windows"):
         cut(step(UP, 0))
 
 

@@ -461,7 +461,7 @@ def test_gains_of_another_step_are_not_read_off():
         replace(claim.sampled_loop.law, update=((F(0), F(0), F(1, 9)), *claim.sampled_loop.law.update[1:])),
         replace(claim.sampled_loop.law, feedback=(*claim.sampled_loop.law.feedback[:2], F(0))),
     ):
-        with pytest.raises(UnsupportedError, match="follow from a certificate of a 2-CTA or a 2-DIA"):
+        with pytest.raises(UnsupportedError, match="can be recovered only for a 2-CTA or 2-DIA"):
             recovered(replace(claim, sampled_loop=replace(claim.sampled_loop, law=law)))
     assert recovered(claim).weight == F(7, 20)
 

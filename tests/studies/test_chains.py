@@ -175,7 +175,7 @@ def test_pressures_themselves_are_those_of_equilibrium_and_what_is_proved_beside
     assert not any("about a block's equilibrium" in line for line in one.lines())
     alone = SimpleNamespace(**{**vars(run), "pressure": pressures[:, :1]})
     lone = replace(one, chain=replace(chain, wells=(1250.0,)), run=alone).lines()
-    assert "slip error: proved from a block's equilibrium, in the run from the reference" in lone
+    assert "slip error: relative to equilibrium in the proof, to the reference in the run" in lone
     assert [line for line in lone if line.startswith("well")] == ["well 1    run 0 Pa to 2 MPa"]
     told = one.lines()
     assert [line.endswith("(OUTSIDE)") for line in told if line.startswith("well")] == [False, True]
@@ -249,10 +249,10 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
         (("simulate", SLIDING, "--certificate", ONE_BLOCK), "must be about several blocks"),
         (
             ("simulate", SLIDING, "--certificate", SLIDING.with_suffix(".json"), "--drift", "1 nm/s"),
-            "the far end rests in slow sliding",
+            "the far end of the springs is fixed in slow sliding",
         ),
-        (("simulate", PATH, "--certificate", TWO_BLOCKS), "about another plant than three-blocks"),
-        (("export", PATH, "--certificate", ONE_BLOCK), "about another plant than three-blocks"),
+        (("simulate", PATH, "--certificate", TWO_BLOCKS), "about a plant other than three-blocks"),
+        (("export", PATH, "--certificate", ONE_BLOCK), "about a plant other than three-blocks"),
         (("derive", PATH), "Use the commands fault, design, guarantee, compare, simulate, export or limits"),
     ],
 )
@@ -317,7 +317,7 @@ def test_a_certificate_that_does_not_hold_or_is_of_other_blocks_gives_no_law(tmp
     found = chains.chain_law(CHAIN, certificate=path)
     assert found.law == claim.law
     assert "|slip-rate error 2| <= 1 m/s" in found.sentence()
-    with pytest.raises(CertificateError, match="about another plant"):
+    with pytest.raises(CertificateError, match="about a plant other than"):
         chains.chain_law(replace(CHAIN, wells=(1000.0, 2500.0, 4000.0)), certificate=path)
     late = replace(claim, law=replace(claim.law, delay=F(1, 100)))
     monkeypatch.setattr(chains, "load_guarantee", lambda _: late)
@@ -407,7 +407,7 @@ def test_a_run_of_slow_sliding_says_whether_it_stays_within_what_is_proved(monke
 def test_cycles_without_control_are_told(capsys, tmp_path):
     assert run("simulate", SLIDING, "--duration", "1 year", "--drift", "1 nm/s", "--out", tmp_path / "run") == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "loaded from afar at 1 nm/s: 1 event in 3.156e+07 s" in told
+    assert "under remote loading at 1 nm/s: 1 event in 3.156e+07 s" in told
     assert "recurrence" not in told
     facts = json.loads((tmp_path / "run" / "results.json").read_text())["run"]
     (event,) = facts["slip_events"]
@@ -532,7 +532,7 @@ def test_a_law_of_slow_sliding_with_a_delay_is_neither_run_nor_exported(monkeypa
     monkeypatch.setattr(chains, "load_guarantee", lambda _: late)
     for command in ("simulate", "export"):
         assert run(command, SLIDING, "--certificate", tmp_path / "x.json") == 2
-        assert "of a law without delay" in " ".join(capsys.readouterr().err.split())
+        assert "for a law without delay" in " ".join(capsys.readouterr().err.split())
 
 
 def test_the_law_of_slow_sliding_is_exported_with_its_plan(monkeypatch, capsys, tmp_path):

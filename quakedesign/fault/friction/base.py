@@ -64,7 +64,7 @@ class FrictionLaw(ABC):
 
     @property
     def rest_excess(self) -> float:
-        """Friction at rest minus friction in slip [-]: `healing`, for laws with this parameter."""
+        """Friction at rest minus friction in slip [-]: `healing`; 0 for laws without this parameter."""
         return float(getattr(self, "healing", 0.0))
 
     @property
@@ -93,7 +93,7 @@ class FrictionLaw(ABC):
         """Largest chord slope |Δμ/Δrate| [s/m] at a fixed state."""
 
     def require(self, **given: object) -> None:
-        """Reject arguments, other than None, that have no meaning for a fault with this friction in its equilibrium."""
+        """Reject arguments other than None that do not apply to the equilibrium of this law."""
         for name, message in self.equilibrium.messages.items():
             if (value := given.get(name)) is not None:
                 raise ParameterError(message.format(value=value, law=self.name, states=", ".join(self.state_names)))

@@ -184,7 +184,7 @@ class BetweenSamples:
             heights = by.modulus(rows * self.inputs) + by.modulus(following * self.inputs)
             area = area + by.sums(by.scaled(heights * h / 2 + bent * sizes * h**3 / 12, bounds))
             rows = following
-        yield rows, area, area * 0
+        yield rows, area, area  # no piece follows
 
     def _step(self, piece: Fraction) -> tuple[arb_mat, arb_mat]:
         """e^{Ah} and an upper bound of |e^{Aσ}|, 0 ≤ σ ≤ h."""

@@ -333,7 +333,7 @@ class _AllResponses:
         return totals, absolute(larger(free, beyond * most))
 
     def _peaks(self, s: int, i: int, before: arb_mat) -> Row:
-        """Bounds of all rows in a segment for input `i`, of which the last stands for the initial states.
+        """Bounds of all rows in a segment for input `i`; the last `i` stands for the initial states.
 
         `before` is the contribution of all earlier times.
 

@@ -39,7 +39,7 @@ class Proof(ABC, Generic[B]):
     lasts : str
         Time range of the claims, as text.
     covers_healing : bool
-        Whether static friction may exceed sliding friction, see `StickSlipProof.beside_healing`.
+        Whether friction at rest may exceed friction in slip, see `StickSlipProof.beside_healing`.
     slides : bool
         Whether the proof is about slow sliding with rate-and-state friction.
     sampled : bool

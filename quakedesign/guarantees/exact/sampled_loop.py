@@ -166,7 +166,7 @@ class SampledLoop(ExactSetup):
             raise ParameterError(
                 "aperiodic sampling needs a linear law, zero initial errors, and no delay, lag, diffusion path, "
                 "jitter, averaging, pump rate limit or implicit step. Received longest_step "
-                f"{shortly(self.longest_step)} s without all of this. Omit longest_step, or what does not apply."
+                f"{shortly(self.longest_step)} s for a loop that violates this. Omit longest_step, or change the loop."
             )
 
     @property
@@ -206,8 +206,7 @@ class SampledLoop(ExactSetup):
     def measured_errors(self, task: FaultPlant, errors: tuple[Fraction, Fraction]) -> tuple[Fraction, Fraction]:
         """Bounds of the measured errors from those of the true errors at any time [m], [m/s].
 
-        A mistimed measurement is compared with the reference at the nominal instant, so the motion of the reference
-        counts.
+        A mistimed measurement may be compared with the reference at the nominal instant, so that its motion counts.
         """
         parts = zip(errors, (self.slip_noise, self.rate_noise), task.reference_rates, strict=True)
         slip, rate = (error + noise + self.timing_error * motion for error, noise, motion in parts)

@@ -21,9 +21,9 @@ the fault with mass is one without mass (ŝ in place of s) under a stress that i
 |N′| ≤ KV(1 + W)/μ* + |q′|, |z′| ≤ ζ with ζ the larger of ρ(e^Y − e^{−Z}) and ρ(e^Z − e^{−Y}), or ρe^Y(Y + Z) for the
 slip law, and |x′| ≤ V(e^Y − 1 + W). The well pressure minus the plan, u, acts on the fault through filters 1/(1 +
 s/λ_n), one of which has the rate λ. So q′ = λ(i − w) − Δ′ with i the input and w the output of that filter, Δ = p* −
-plan, |Δ′| ≤ d. Filters are means over the past, with a mean delay E in all. So |u − Δ| ≤ U gives |i − Δ| ≤ U + dE and,
-as |w − Δ| = |q| ≤ Q, |q′| ≤ λ(U + dE + Q) + d. A diffusion path has λ = π²/(4τ) < 5/(2τ) and E = τ/2, and E = τ/2 + ℓ
-with a lag ℓ before it; a lag alone has λ = 1/ℓ, E = ℓ.
+plan, |Δ′| ≤ d. Filters are weighted means of the past, with a total mean delay E. So |u − Δ| ≤ U gives |i − Δ| ≤ U + dE
+and, as |w − Δ| = |q| ≤ Q, |q′| ≤ λ(U + dE + Q) + d. A diffusion path has λ = π²/(4τ) < 5/(2τ) and E = τ/2, and E = τ/2
++ ℓ with a lag ℓ before it; a lag alone has λ = 1/ℓ, E = ℓ.
 
 **Sectors.** For |y| ≤ Y, f/y lies between (1 − e^{−Y})/Y and (e^Y − 1)/Y, with midpoint c and half-width δ. For |z| ≤
 Z, g/z lies between the same bounds with Z, with midpoint c_z and half-width δ_z. With the midpoints N₀, a₀, b₀, μ₀, ρ₀
@@ -37,7 +37,7 @@ so |e| ≤ sup|ŝ| + δN|a₀y + b₀z| + N_max(δa|y| + δb|z|) + HVδ|y| + δ�
 midpoint c_z and half-width δ_z. Then z′ = −ρ₀c_z(y + z) − ρ₀h does not contain φ, and |h| ≤ δ_z|y + z|. ω is another
 input. Noise of the measured slip, drift of p* from the plan and the truncation error R of the diffusion modes are
 inputs as in `small_gain`. q is that of the loop plus R. y and its combinations with z include the direct feedthrough of
-e and μ₀R, where R has at most its weight at the beginning of a part of the period.
+e and μ₀R, where R is bounded by its weight at the beginning of each part of the period.
 
 **After a step.** R is largest immediately after a step, before the fault responds to the step. With the midpoint N₀a₀ +
 HVc = B, By = X + e and |X′| ≤ KV(e^Y − 1 + W) + N₀b₀ζ + μ₀q̇, |z′| ≤ ζ, |q′| ≤ q̇ as above. So until θ after a step, αy
@@ -235,7 +235,7 @@ def _left(task: SlidingPlant, claims: SlidingClaims) -> str:
 def channels_of(
     task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims, loop: PeriodicLoop
 ) -> tuple[Channel, ...]:
-    """Inputs of the loop, each with its F and c."""
+    """Inputs of the loop with their bounds F + Σ c_y·|y|, see `Channel`."""
     low, high = task.normal_stress(claims.push)
     rates, states = chords(claims.log_rate), _state_slopes(task, claims)
     spread, bent = _ageing_spread(task), _half(rates)
@@ -275,7 +275,7 @@ def inertia(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims
 
 
 def regularisation(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
-    """Stress equivalent of regularised friction, N_max·ε [Pa]."""
+    """Stress equivalent of the regularisation, N_max·ε [Pa]."""
     if not task.regularised:
         return _ZERO
     a = task.ranges["direct_effect"][1]
@@ -392,7 +392,7 @@ def after_a_step(loop: PeriodicLoop) -> tuple[Fraction, ...]:
 
 
 def settled(loop: PeriodicLoop) -> Fraction:
-    """First of the times `after_a_step` [s] at which the truncation error has at most a weight of 1/16; 0."""
+    """First of the times `after_a_step` [s] at which the truncation error has a weight of at most 1/16; else 0."""
     times = sorted(after_a_step(loop))
     return next((t for t in times for fading in loop.fading.values() if fading.weight(t) <= _FADED), _ZERO)
 

@@ -1,7 +1,7 @@
 """Design of sliding modes in the schemes ``compensated`` and ``stick-slip`` with bounds.
 
 The implicit step of a law is derived from the scheme as a sum of signed powers; then scale, weight and authority are
-chosen by their certified bounds.
+chosen by their estimated bounds.
 """
 
 from bisect import bisect_left
@@ -115,7 +115,7 @@ def _enclosed(value: sp.Expr) -> tuple[Fraction, Fraction]:
 
 
 # ----------------------------------------------------------------------
-# A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by certified bounds.
+# A sliding mode in the scheme ``compensated``: scale, weight and authority chosen by estimated bounds.
 
 GUARANTEED = "compensated"
 STICK_SLIP = "stick-slip"  # the scheme for the stick–slip plant
@@ -167,7 +167,7 @@ class Compensation:
 
     @property
     def limited(self) -> SlidingMode:
-        """The controller with the limit against windup of its guarantee, if it has one."""
+        """The controller with the anti-windup limit of its guarantee, if it has one."""
         limit, sampling = getattr(self.proof, "rest_limit", None), self.controller.sampling
         if limit is None or sampling is None:
             return self.controller
@@ -273,13 +273,13 @@ def design_compensated(
     weights: tuple[Fraction, ...] = WEIGHTS,
     setup: ExactSetup = PLAIN,
 ) -> Compensation:
-    """Weight, authority and scale of a sliding mode, chosen over certified bounds.
+    """Weight, authority and scale of a sliding mode, chosen by estimated bounds.
 
-    Where the signed power of the slip error contains the solution, the step is deadbeat, e1 + T_s·w = 0, for any gains.
-    So weight and authority are chosen for the deadbeat step, on a grid of `weights`. ``peak``: the smallest certified
-    slip-rate error. ``tracking``: the smallest slip error under a drifting disturbance, among laws whose certified
-    slip-rate error is at most 1.25 times the smallest. λ = ρ⁶ is then the smallest scale for which the step is nearly
-    deadbeat for all claimed errors.
+    Where the set-valued sign of the slip error contains the solution, the step is deadbeat, e1 + T_s·w = 0, for any
+    gains. So weight and authority are chosen for the deadbeat step, on a grid of `weights`. ``peak``: the smallest
+    estimated slip-rate error. ``tracking``: the smallest slip error under a drifting disturbance, among laws whose
+    estimated slip-rate error is at most 1.25 times the smallest. λ = ρ⁶ is then the smallest scale for which the step
+    is nearly deadbeat for all claimed errors.
     """
     require_ordinary(step=step)
     return _made(task, controller, step, _deadbeat(task, step, objective, weights, setup=setup), setup)
@@ -421,7 +421,7 @@ def recovered(proof: TrackingProof | StickSlipProof) -> Compensation:
 
 
 _NOT_RECOVERED = (
-    "gains follow from a certificate of a 2-CTA or a 2-DIA in the scheme compensated or stick-slip. Received a "
+    "gains can be recovered only for a 2-CTA or 2-DIA in the scheme compensated or stick-slip. Received a "
     "certificate of another law. Use the controller of its design, or its gains, scale and settings in that scheme."
 )
 
@@ -438,7 +438,7 @@ def _sticking(proof: StickSlipProof) -> Compensation | None:
 
 
 def sticking_controller(controller: SlidingMode, sampled_loop: SampledStickSlip) -> SlidingMode:
-    """Sliding mode in the scheme ``stick-slip`` with the estimate of a law."""
+    """Sliding mode in the scheme ``stick-slip`` with the disturbance estimator of a law."""
     law, step = sampled_loop.law, sampled_loop.step
     settings = {
         "authority": 1 / (step * law.target_gain),
@@ -534,7 +534,7 @@ def _with_gains(pull: tuple[Power, ...], step: Fraction, authority: Fraction) ->
 
 
 def _of_few_digits(value: Fraction, power: Fraction) -> Fraction:
-    """Rational of the smallest denominator near a power of a number."""
+    """Rational nearest to a power of a number, with a denominator up to 10¹⁸."""
     near = sp.Pow(to_sympy(value), to_sympy(power)).evalf(_DIGITS)
     return fraction_of(sp.Rational(str(near))).limit_denominator(_MOST_DENOMINATOR)
 

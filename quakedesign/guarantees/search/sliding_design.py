@@ -549,6 +549,4 @@ def _slower(
 
 
 def _under(proof: SlidingProof) -> str:
-    return (
-        f" under a stress of at most {float(proof.task.stress):.3g} Pa (a law designed for it alone may tolerate more)"
-    )
+    return f" under a stress of at most {float(proof.task.stress):.3g} Pa (a law for this case alone may tolerate more)"

@@ -61,15 +61,17 @@ _TRIED_EACH = 3  # turns after which all multipliers are tried again
 _PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)  # periods per policy; turns; turns that add facets
 _TINY = 1e-12  # rounding, relative to a height
 _LITTLE = 1.01  # largest growth of a height in a step to the fixed point of a policy
-_NEARLY = 0.93  # larger shares of the factor of y that leaves a facet unchanged in a slow slide are raised to 1
+_NEARLY = (
+    0.93  # a factor of y above this share of the one that leaves a facet unchanged in slow sliding is set to that one
+)
 _ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
 _ALIKE, _WIDER = 1 - 1e-8, 1e-5  # cosine of equal normals; margin of a facet that rest leaves unchanged
 _KEPT, _FOLLOWED = 0.6, 14  # growth retained when facets are added; later turns until heights only grow
-_MARGINS = 2e-6, 2e-5  # margins of the last polytope over its images
+_MARGINS = 2e-6, 2e-5  # margins of a polytope over its images; the second if the first gives no proof
 _FAR = 30  # times the first extents: a larger set counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried, relative to a size and to present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
-_LOWER, _GUESSES = Fraction(1, 50), 3  # largest deficit of a pressure below its guess, over σ'; number of guesses
+_LOWER, _GUESSES = Fraction(1, 50), 3  # margin of a guessed least pressure, over σ'; number of guesses
 _SHRUNK, _LITTLE_LESS = 60, 2e-5  # replacements of a set by its image; decrease of its extents that ends these
 _SNAPPED = 1e-3  # largest factor of the slip that counts as 0, over that of e1
 _INSIDE = 1e-4  # least distance of an interior point from all facets, over the size
@@ -131,7 +133,7 @@ def tuned(
 
 
 # ----------------------------------------------------------------------
-# Convex hull of the states that disturbances reach, grown from sample to sample.
+# Convex hull of the reachable states, grown from sample to sample.
 
 
 def _noises(sampled_loop: SampledStickSlip) -> list[float]:
@@ -178,7 +180,7 @@ class _Start:
     def ended(
         self, moved: np.ndarray, end: np.ndarray, rests: np.ndarray, interval: float, later: float | None = None
     ) -> np.ndarray:
-        """States after an interval, from its slip, final slip rate and state of rest.
+        """States after an interval, from its slip, its final slip rate and whether the fault then rests.
 
         By default the noise of the next sample has the opposite sign.
         """
@@ -203,7 +205,7 @@ class _ReachableStates:
     sampled_loop: SampledStickSlip
     plant: Ranges
     periods: list[Period]
-    excess: float = 0.0  # excess of friction at rest over that in slip in simulations [m/s²]
+    excess: float = 0.0  # excess of friction at rest over friction in slip, in simulations [m/s²]
 
     @classmethod
     def of(cls, task: FaultPlant, sampled_loop: SampledStickSlip) -> "_ReachableStates":
@@ -245,7 +247,7 @@ class _ReachableStates:
                 yield start.ended(share * stop, 0 * stop, np.full(stop.shape, True), interval)[possible]
 
     def _sliding(self, start: "_Start", period: Period) -> Iterator[np.ndarray]:
-        """States after the sliding map; only the final slip rate is constrained to be at least 0."""
+        """States after the sliding map; slip and slip rate are constrained to be at least 0 only at the end."""
         step, amplitude = float(period.interval), float(self.task.amplitude)
         of_slip, of_rate = period.impulses
         times = step - np.linspace(0, step, len(of_slip))
@@ -306,7 +308,7 @@ class _ReachableStates:
             if np.all(np.abs(extent - before) <= _SETTLED * np.tile(size, 2)):
                 break
             before = extent
-            tell("states that disturbances reach", turn / _ROUNDS)
+            tell("reachable states", turn / _ROUNDS)
         return points
 
 
@@ -420,7 +422,7 @@ def _wide_periods(task: FaultPlant, sampled_loop: SampledStickSlip, size: tuple[
 
 @dataclass
 class _Images:
-    """Largest values of normals after a period: linear in the heights, with a constant."""
+    """Largest n·z of every normal n after a period: affine in the heights."""
 
     tops: np.ndarray
     moves: np.ndarray
@@ -461,7 +463,7 @@ class _Growing:
         return _wide_periods(self.task, self.sampled_loop, tuple(float(f"{float(v):.1e}") for v in self.size))
 
     def images(self) -> "_Images | None":
-        """Largest value of every normal after a period, with the best multipliers; None for an empty polytope."""
+        """Largest n·z of every normal n after a period, with the best multipliers; None for an empty polytope."""
         periods = self.periods()
         plant = periods[0].plant
         facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
@@ -584,7 +586,7 @@ class _Growing:
             for _ in range(_PERIODS):  # periods with this policy
                 least = self.heights if late else self.least
                 self.heights = np.where(changed, np.maximum(least, after.moves @ self.heights + own), self.heights)
-            tell("a polytope that the loop never leaves", turn / _TURNS)
+            tell("an invariant polytope", turn / _TURNS)
         return False
 
     def _shrink(self, after: _Images, margin: np.ndarray) -> None:
@@ -669,7 +671,7 @@ class _Growing:
         return np.asarray(self.multipliers * factors)
 
     def exact(self) -> StickSlipPolytope | None:
-        """Polytope in rational numbers of few digits, with the constraints that meet at each vertex."""
+        """Polytope in exact numbers, with the constraints that meet at each vertex."""
         facets = tuple(tuple(_dyadic(float(v)) for v in row) for row in self.facets)
         periods, bases = self.periods(), list[list[tuple[int, ...]]]()
         sizes = np.append(self.size, self.size[1] * float(self.sampled_loop.longest))
@@ -735,11 +737,11 @@ def proved(
 
 def _searched(task: FaultPlant, sampled_loop: SampledStickSlip, tell: Tell) -> StickSlipProof | NoProof:
     proof: StickSlipProof | NoProof
-    proof = NoProof(reason="no polytope was found that the loop never leaves")
+    proof = NoProof(reason="no invariant polytope was found")
     try:
         points = _ReachableStates.of(task, sampled_loop).hull(tell)
         if points is None:
-            return NoProof(reason="the states that disturbances reach grow without bound")
+            return NoProof(reason="the reachable states grow without bound")
         normals = _normals(points, _FACETS)
         heights = (normals @ points.T).max(axis=1)
         growing = _Growing(task, sampled_loop, normals, heights, np.zeros((len(normals), 5)), heights, points)
@@ -752,7 +754,7 @@ def _searched(task: FaultPlant, sampled_loop: SampledStickSlip, tell: Tell) -> S
     except ParameterError as error:
         return NoProof(reason=str(error))
     except (ArithmeticError, ValueError, LinAlgError, QhullError):
-        return NoProof(reason="numbers of the loop are too far apart for a search in floats")
+        return NoProof(reason="the loop is too badly scaled for a search in floats")
     return proof
 
 
@@ -783,7 +785,7 @@ def design_stick_slip(
     healing : Fraction
         Δμ_h [-], proved as a larger disturbance, see `StickSlipProof.covered_healing`.
     implicit : bool
-        Whether the law is a deadbeat implicit step; it has one tuning for both objectives.
+        Whether the law is a deadbeat implicit step; it has the same tunings for both objectives.
     tell : callable
         Called with the name of the current step and the fraction done [-].
     """

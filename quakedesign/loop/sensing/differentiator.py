@@ -145,9 +145,9 @@ def _stirling(j: int, i: int) -> int:
 #
 # Levant and Livne (2020), Robust exact filtering differentiators, European Journal of Control 55, 33, doi
 # 10.1016/j.ejcon.2019.08.006: λ̃_0 … λ̃_n for n = n_d + n_f = 0 … 12, rounded to about four digits. They are those of
-# the recursive form with λ = 1.1, 1.5, 2, 3, 5, 7, 10, 12, 14, 17, 20, 26, 32 (there too, and up to n = 5 in Levant
-# (2003), Higher-order sliding modes, differentiation and output-feedback control, Int. J. Control 76, 924), by λ̃_n =
-# λ_n and λ̃_j = λ_j·λ̃_(j+1)^(j/(j+1)).
+# the recursive form with λ = 1.1, 1.5, 2, 3, 5, 7, 10, 12, 14, 17, 20, 26, 32 (also given there, and up to n = 5 in
+# Levant (2003), Higher-order sliding modes, differentiation and output-feedback control, Int. J. Control 76, 924), by
+# λ̃_n = λ_n and λ̃_j = λ_j·λ̃_(j+1)^(j/(j+1)).
 
 LONGEST = 12
 TABLES = (
@@ -374,7 +374,7 @@ def _next(entries: Iterator[ca.SX], count: int) -> Entries:
 # is piecewise linear, and its corners are binomial coefficients of alternating sign: c = 1 for n_d = 1, 3/2 for n_d =
 # 2.
 
-ORDER = 2  # n_d as printed
+ORDER = 2  # n_d of the paper
 
 
 def names_before(order: int = ORDER) -> tuple[str, ...]:

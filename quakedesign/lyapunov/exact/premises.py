@@ -279,9 +279,9 @@ def _with(controller: SlidingMode) -> str:
 def linear_premises(fault: Fault, controller: Controller, certificate: Certificate | None) -> list[Premise]:
     """Premises of linear feedback: sectors inside the certified ones; constant reference; vanishing disturbance.
 
-    The certificate is about constant references and disturbances that vanish at the equilibrium. The last two premises
-    quantify the deviation of a task from both (ERRATA 8, 11); for such a task `certify --peaks` proves bounds of the
-    errors.
+    The certificate is about constant references and disturbances that vanish at the equilibrium. `constant_reference`
+    and `vanishing_disturbance` quantify the deviation of a task from both (ERRATA 8, 11); for such a task `certify
+    --peaks` proves bounds of the errors.
 
     Raises
     ------
@@ -314,7 +314,7 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             certified=ranges["s"][1],
             unit="1/s^2",
             proved=proved and inside,
-            note="chord slope of weakening less spring; effective stress up to "
+            note="chord slope of weakening minus that of the spring; effective stress up to "
             f"{UpperBound(needed.largest_effective_stress):.4g} Pa",
         ),
         Premise(
@@ -348,7 +348,7 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
             required=abs(worst[0]),
             certified=abs(worst[1]),
             unit="Pa",
-            note="inside the limits of the law; the proof is for deviations within these limits",
+            note="must lie inside the limits of the law; the proof is for deviations within these limits",
         )
     ]
 

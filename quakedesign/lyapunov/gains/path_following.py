@@ -101,7 +101,7 @@ def neighbourhood(
     lyapunov : tuple of Term
         Current V, with which the changes of the gains are linearised.
     changed : sequence of Loop
-        Loops with one changed gain each. The difference to `loop` is one part, exact if the field is affine in the
+        Loops with one changed gain each. The difference from `loop` is one part, exact if the field is affine in the
         gain. The conditions of the cells stay those of `loop`, so a search must re-check its resulting gains.
     """
     monomials = signed_monomials(loop.states, degree, loop.domain)
@@ -527,7 +527,7 @@ class Objective(ABC):
         return find_certificate(state.loop, setting.degree, subject=subject)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate of given gains without a climb, or None; with a rate it is compared with that of a climb."""
+        """Certificate of given gains without a climb, or None; with a rate, the better one of this and of a climb."""
         return None
 
     @abstractmethod
@@ -540,7 +540,7 @@ class Objective(ABC):
 #
 # At gains k0 with V0 the products of changes of V and of k are omitted, so that one programme with the largest margin
 # changes both V and k (the path-following of Hassibi, How and Boyd, American Control Conference 1999). A step is
-# accepted only if a programme with the resulting gains fixed has a margin, too. Nothing here is proved.
+# accepted only if a programme with the resulting gains fixed also has a positive margin. Nothing here is proved.
 
 _ROUNDS = 100  # largest number of steps
 
@@ -549,7 +549,7 @@ _ROUNDS = 100  # largest number of steps
 class TrustRegion:
     """Step sizes for which the linearisation is trusted; a step is the share by which the level improves."""
 
-    # First share. The omitted terms are of second order, about (`gains` times the share)²: a tenth of the linear terms
+    # First share. The omitted terms are of second order, about (`gains` times the share)²: 0.3 of the linear terms
     initial: float = 0.1
     largest: float = 0.35  # Share at which the omitted terms are as large as the linear terms
     # Share below which the search centres instead: ten units of the fourth digit, to which gains are rounded

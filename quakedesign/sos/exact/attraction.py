@@ -1,7 +1,7 @@
 """Regions of attraction of polynomial fields by Lyapunov functions: claim, proof, files.
 
-The claim holds if V, and μ·(−V̇) where V < level, are sums of squares with positive definite Gram
-matrices; see the first chapter. Further chapters: files of regions (proofs/FORMAT.md) and of fields (TOML).
+The claim holds if V is a sum of squares and μ·(−V̇) = σ_0 + (level − V)·σ_1, with positive definite Gram matrices; see
+the first chapter. Further chapters: files of regions (proofs/FORMAT.md) and of fields (TOML).
 """
 
 import json
@@ -56,7 +56,7 @@ class LyapunovProof:
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Attraction:
-    """Claim that V̇ < 0 for x' = field(x) where V < level, except at the origin; proved, refuted or undecided.
+    """Claim that V > 0 > V̇ for x' = field(x) where V < level, except at the origin; proved, refuted or undecided.
 
     Attributes
     ----------
@@ -197,7 +197,7 @@ class Region:
 
     @property
     def verdict(self) -> str:
-        """``proved``, ``refuted`` (no level can be proved with this V or this field) or ``undecided``."""
+        """``proved``, ``refuted`` (the claim without a level fails for this V or this field) or ``undecided``."""
         if self.proved is not None:
             return "proved"
         return "refuted" if self.refuted is not None and self.refuted.level is None else "undecided"
@@ -389,6 +389,6 @@ def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
     sound = isinstance(field, dict) and all(isinstance(rate, str) for rate in field.values())
     if not raw.keys() <= {"field", "V"} or not sound or not isinstance(function, str | None):
         raise PolynomialError(
-            f'{path} must have a table [field], such as x = "-x + x^3", and at most V = "x^2" before it.'
+            f'{path} must have a table [field], such as x = "-x + x^3", and may have V = "x^2" before it.'
         )
     return dict(field), function

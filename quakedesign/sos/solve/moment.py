@@ -54,7 +54,7 @@ class MomentSolution:
 
 
 class MomentProgram:
-    """Programme of one shape, built once and solved for many targets.
+    """Programme of given blocks, built once and solved for many targets.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class MomentProgram:
         return next((self._solution(answer) for answer in answers if answer is not None), None)
 
     def margin(self, target: Mapping[Exponents, float], accuracy: float) -> float | None:
-        """Margin of `solve` only; without refinement of the linear systems if possible, in two thirds of the time."""
+        """Only the margin of `solve`; without iterative refinement if possible, in two thirds of the time."""
         quick = self._answer(target, (accuracy, False), _LARGEST_MARGINS[0])
         if quick is not None:
             return -float(quick.z[0])

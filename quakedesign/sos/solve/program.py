@@ -219,11 +219,11 @@ class Program:
 
         Parameters
         ----------
-        room : float
+        margin : float
             Loss of objective allowed for the margin, relative to max(1, |optimum|).
         """
         if not margin >= 0 or math.isinf(margin):
-            raise PolynomialError(f"room must be a number of at least 0. Received {margin!r}. Give for example 0.01.")
+            raise PolynomialError(f"margin must be a number of at least 0. Received {margin!r}. Give for example 0.01.")
         self.problem()
         solution = next(self._interior((margin,)), None)
         return None if solution is None else np.asarray(self._vector.value).tolist()

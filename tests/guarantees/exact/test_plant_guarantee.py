@@ -377,7 +377,7 @@ STARTED = replace(STARTED, law=replace(STARTED.law, first=((Fraction(1), Fractio
         (lambda: qd.guarantee(bearing()[0], law=USER_LAW, step="0.2"), "here 0.2 s. Received dt = 0.1"),
         (lambda: qd.guarantee(bearing()[0], law=FOLLOWING), "Received one with r or r' as an input"),
         (lambda: qd.guarantee(bearing()[0], law=STARTED), "Received one with other first states"),
-        (lambda: qd.guarantee(bearing()[0], "cta", gains=[[1, 1]], step="1"), "needs a law or gains alone"),
+        (lambda: qd.guarantee(bearing()[0], "cta", gains=[[1, 1]], step="1"), "do not apply to an uncertain plant"),
         (lambda: qd.UncertainPlant(A=[[1, 2]], B=[[1]]), "matrix A of a plant must be 1 x 1"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"v": (1, 2)}), "gains of a plant must be of u1"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"u1": (2, 1)}), "least, then the largest"),

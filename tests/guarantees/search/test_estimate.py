@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from quakedesign.guarantees.exact.norms import BALLS, START, norms
 from quakedesign.guarantees.search.float_bounds import FLOATS, gains_of
-from quakedesign.loop import PeriodicLoop, Segment
+from quakedesign.loop import Fading, PeriodicLoop, Segment
 
 FLOW = ((F(-1), F(2), F(0)), (F(-2), F(-3), F(1)), (F(0), F(1, 2), F(-1, 2)))
 HOLD = ((F(1), F(0), F(1, 4)), (F(0), F(1), F(0)), (F(1, 5), F(-1, 3), F(1, 2)))
@@ -73,3 +73,17 @@ def test_an_estimate_of_a_loop_that_grows_is_none():
 
 def test_balls_prove_and_floats_do_not():
     assert (BALLS.proves, FLOATS.proves) == (True, False)
+
+
+def test_a_decaying_input_is_estimated_by_an_impulse_of_its_area():
+    """x is halved every 4 s, after which the input b·(h·e^{−λθ} + f) begins: b(h/λ + fT)(1 + 1/2 + …)."""
+    fading = Fading(entry=(F(3),), first=0, height=F(5), rate=F(2), floor=F(1, 7))
+    loop = PeriodicLoop(
+        states=("x",),
+        flow=((F(0),),),
+        segments=(Segment(jump=((F(1, 2),),), duration=F(4)),),
+        inputs={},
+        outputs={"x": (F(1),)},
+        fading={"w": fading},
+    )
+    assert gains_of(loop)["x", "w"] == pytest.approx([3 * (5 / 2 + 4 / 7) * 2] * (PIECES + 1), rel=1e-4)
