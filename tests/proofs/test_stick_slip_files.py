@@ -14,6 +14,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.guarantees import read_guarantee
 from quakedesign.guarantees.exact import stick_slip_set as package
+from quakedesign.guarantees.exact.guarantee_files import guarantee_text
 from quakedesign.lyapunov.exact.claim import Verdict
 
 PATH = Path(__file__).parents[2] / "proofs" / "certificates" / "stick_slip_real-fault.json"
@@ -270,6 +271,19 @@ def test_a_file_of_another_form_is_refused_by_both(change, reason):
     document = changed(box(), change)
     assert refused(document, reason)
     assert package_refuses(document)
+
+
+def test_a_bounded_change_of_the_disturbance_is_not_read_as_if_it_counted():
+    with pytest.raises(
+        CertificateError, match="a bounded change of the disturbance is not used on the stick-slip plant"
+    ):
+        read_guarantee(changed(box(), (("disturbance", "change"), "1")))
+
+
+def test_a_law_without_an_implicit_step_is_written_without_its_terms():
+    claim = read_guarantee(box())
+    assert not claim.sampled_loop.law.pull
+    assert "pull" not in json.loads(guarantee_text(claim))["loop"]
 
 
 def test_floats_are_refused_by_both():

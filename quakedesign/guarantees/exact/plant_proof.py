@@ -174,14 +174,13 @@ def peaks(part: LinearPart, responses: ResponseBounds, inputs: Row) -> Row | Non
 def row_bounds(part: LinearPart, responses: ResponseBounds, inputs: Row) -> Row:
     """P_r of every row of the loop: outputs, arguments of sectors, controls."""
     own = [size for _, size in part.disturbances] + [load.rate for load in part.loads]
-    halves = [(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors]
-    sizes = [*own, *(w if h else Fraction(0) for w, h in zip(inputs, halves, strict=True))]
+    uncertain = [s.slopes[0] != s.slopes[1] for s in part.sectors]
+    sizes = [*own, *(w if varies else Fraction(0) for w, varies in zip(inputs, uncertain, strict=True))]
     noise = [size for size in part.noise if size]
     parts = (*zip(responses.inputs, sizes, strict=True), *zip(responses.sampled, noise, strict=True))
     bounds = list(responses.start)
     for gains, size in parts:
-        if size:
-            bounds = [b + g * size for b, g in zip(bounds, gains, strict=True)]
+        bounds = [b + g * size for b, g in zip(bounds, gains, strict=True)]
     return tuple(bounds)
 
 

@@ -454,3 +454,15 @@ def test_raised_bounds_exceed_all_bounds_and_zero():
         raised = plant_loop._raised(arb_mat([[3], [0]])).entries()
         assert raised[0] > 3
         assert 0 < raised[1] < arb(2) ** -55
+
+
+def test_a_sentence_names_plant_and_forces_and_a_bound_of_zero_without_unit():
+    claims = PlantClaims(outputs=(UpperBound(1), UpperBound(2)), controls=(UpperBound(0), UpperBound(3)))
+    remarks = {"plant": "of a fault", "disturbances": "all forces"}
+    units = ("m", "m", "Pa", "Pa", "m/s^2", "m/s^2", "m/s^2")
+    proof = PlantProof(part=PART, law=LAW, pieces=1, inputs=(F(1),) * 2, claims=claims, units=units)
+    text = replace(proof, remarks=remarks).sentence()
+    assert "(2 states, 2 controls) of a fault, from" in text
+    assert "3 m/s^2 (all forces), loads" in text
+    assert "|row 3| <= 0, |row 4| <= 3 Pa" in text
+    assert "(2 states, 2 controls), from" in proof.sentence()
