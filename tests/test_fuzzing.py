@@ -42,7 +42,7 @@ from quakedesign.cli.app import app
 from quakedesign.errors import QuakedesignError
 from quakedesign.exact import rational
 from quakedesign.fault import parse_fault
-from quakedesign.guarantees import SampledLoop, farthest_rock, guarantee, longest_delay
+from quakedesign.guarantees import SampledLoop, guarantee, longest_delay, longest_diffusion_time
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.small_gain import VaryingGain
 from quakedesign.laws import summed_integrals
@@ -682,7 +682,7 @@ FOUND = [
     (ErrorModel.delayed, (EYE, (), 1)),
     (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(0))),
     (longest_delay, (uncertain_plant(qd.load_fault("real-fault")), Fraction(10**400))),
-    (farthest_rock, (uncertain_plant(qd.load_fault("real-fault")), Fraction(1, 10**20))),
+    (longest_diffusion_time, (uncertain_plant(qd.load_fault("real-fault")), Fraction(1, 10**20))),
     (ErrorModel, {"update": EYE, "command": (1, 1), "gain": 1, "pressures": ("q",)}),
     (ErrorModel, {"update": EYE, "command": (1, 1, 1), "gain": 1}),
     (partial(stability, FAULT, loading_rate=Fraction(10**400)), ()),

@@ -31,11 +31,11 @@ from .search.linear_design import CLASSES as CLASSES
 from .search.linear_design import OBJECTIVES as OBJECTIVES
 from .search.linear_design import best_guarantee as best_guarantee
 from .search.linear_design import certified_peaks as certified_peaks
-from .search.linear_design import continued as continued
 from .search.linear_design import design_at as design_at
+from .search.linear_design import design_near_longer_step as design_near_longer_step
 from .search.linear_design import design_sampled_law as design_sampled_law
-from .search.linear_design import farthest_rock as farthest_rock
 from .search.linear_design import longest_delay as longest_delay
+from .search.linear_design import longest_diffusion_time as longest_diffusion_time
 from .search.linear_design import longest_step as longest_step
 from .search.linear_design import tightened as tightened
 from .search.worst_case import WorstCase as WorstCase

@@ -122,7 +122,7 @@ class TrackingGuarantee(Guarantee):
                     f"{quantity(seen.slip_rate_error or 0.0, 'm/s')}{', pressure ' if ends else ''}{' to '.join(ends)}"
                 )
         lines += [*filter(None, [self.stick_slip_gap]), *self._differentiator_lines(), *self.task_lines()]
-        if self.leaves_with_stick:
+        if self.exceeded_on_stick_slip:
             lines.append(
                 "on the stick-slip plant a run was found that exceeds the bounds, which are proved on the plant "
                 "without stick only"
@@ -229,7 +229,7 @@ class TrackingGuarantee(Guarantee):
         return None if self.limit is None else self.limit.slip_rate_error
 
     @property
-    def leaves_with_stick(self) -> bool:
+    def exceeded_on_stick_slip(self) -> bool:
         """Whether the stick–slip plant exceeds the claims in the worst case found."""
         if not self.proof.available or self.worst_with_stick is None:
             return False
@@ -255,7 +255,7 @@ class TrackingGuarantee(Guarantee):
                 **({} if self.notes is None else {"notes": list(self.notes)}),
                 **({"stick_slip": self.not_at_rest} if self.not_at_rest else {}),
             }
-        bounds, sampled_loop = self.proof.recomputed(), self.proof.sampled_loop
+        bounds, sampled_loop = self.proof.theorem_bounds(), self.proof.sampled_loop
         small = None if not bounds.available else float_above(bounds.small_gain)
         return {
             "verdict": str(self.proof.verdict_of(bounds)),
@@ -348,7 +348,7 @@ def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGua
     seen = TrackingGuarantee(
         fault=fault, proof=proof, worst=worst_tracking(proof), stick_search=worst_tracking(proof, sticks=True)
     )
-    return seen if proof.varying_gain is None or not seen.leaves_with_stick else _with_room(seen, proof)
+    return seen if proof.varying_gain is None or not seen.exceeded_on_stick_slip else _with_room(seen, proof)
 
 
 def given_law_with_worst_case(
@@ -368,7 +368,7 @@ def _with_room(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarant
     exceeded += ["slip_rate_error", "peak_slip_rate"] if faster else []
     claims = replace(proof.claims, **{name: getattr(arbitrary.claims, name) for name in exceeded})
     wider = replace(seen, proof=replace(proof, claims=claims))
-    return seen if wider.leaves_with_stick or wider.proof.check() is not Verdict.PROVED else wider
+    return seen if wider.exceeded_on_stick_slip or wider.proof.check() is not Verdict.PROVED else wider
 
 
 def _seen(worst: WorstCase | None) -> dict[str, float | None] | None:

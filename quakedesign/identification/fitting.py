@@ -72,24 +72,26 @@ class Fit:
         return weighted(self.weights, self.residuals)
 
     @property
-    def squares(self) -> float:
+    def sum_of_squares(self) -> float:
         """Sum of squares of the used residuals."""
         return float(np.sum(self.whitened**2))
 
     @property
-    def freedom(self) -> int:
+    def degrees_of_freedom(self) -> int:
         """Number of used samples minus number of coordinates."""
         return int(self.used.sum()) - len(self.fitted)
 
     @property
     def freedom_of_noise(self) -> float:
         """Degrees of freedom of the estimated noise, at most its number of independent pieces."""
-        return min(self.freedom, self.pieces, self.correlated.pieces if self.correlated is not None else math.inf)
+        return min(
+            self.degrees_of_freedom, self.pieces, self.correlated.pieces if self.correlated is not None else math.inf
+        )
 
     @property
     def noise(self) -> float:
         """Standard deviation of one measurement [-]."""
-        return float(np.sqrt(self.squares / self.freedom))
+        return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
 
     @property
     def accuracy(self) -> float:
@@ -110,7 +112,7 @@ class Fit:
 
     def excess(self, squares: float) -> float:
         """Excess of a sum of squares over the smallest, divided by the noise variance of independent samples."""
-        return (squares - self.squares) / (self.noise**2 * self.correlation)
+        return (squares - self.sum_of_squares) / (self.noise**2 * self.correlation)
 
     def threshold(self, count: int, chance: float = 1 - CONFIDENCE) -> float:
         """`excess` that `count` parameters jointly exceed by noise alone with probability `chance` (Fisher's F)."""
@@ -137,7 +139,7 @@ class Fit:
         return weighted(self.weights, _finite(self.experiment.slopes(self.fitted)))
 
     @cached_property
-    def deviations(self) -> ndarray:
+    def standard_errors(self) -> ndarray:
         """Standard deviations of the fitted coordinates from the slopes; infinite where undetermined."""
         scale = np.linalg.norm(self.slopes, axis=0)
         scale[scale == 0] = 1
@@ -193,7 +195,7 @@ def fit(
         agreeing = sum(squares <= best * (1 + _AGREEMENT) for _, squares in minima)
         entries: dict[str, Any] = {"measured": measured, "counts": counts, "used": every}
         fit = Fit(experiment=experiment, fitted=fitted, agreeing=agreeing, starts=number, **entries)
-        if number >= least and agreeing > 1 and np.all(fit.deviations < high - low):
+        if number >= least and agreeing > 1 and np.all(fit.standard_errors < high - low):
             break
     return settled(fit)
 
@@ -276,7 +278,7 @@ def settled(fit: Fit) -> Fit:
     for _ in range(_ROUNDS):
         used = ~outliers(fit.scaled)
         finer = fit.experiment
-        if not np.all(np.abs(fit.fitted - made_for) <= fit.deviations):
+        if not np.all(np.abs(fit.fitted - made_for) <= fit.standard_errors):
             finer, made_for = finer.resolved(fit.fitted, fit.accuracy), fit.fitted
         fitted, _ = minimised(finer, fit.measured, replace(fit, used=used).weights, fit.fitted)
         unchanged = finer is fit.experiment and np.array_equal(used, fit.used)
@@ -310,7 +312,7 @@ def advantage(one: Fit, other: Fit) -> tuple[float, float]:
     """
     both = one.used & other.used
     if one.correlated is not None or other.correlated is not None:
-        ours, theirs = one.squares, other.squares
+        ours, theirs = one.sum_of_squares, other.sum_of_squares
     else:
         ours, theirs = (float(np.sum(fit.scaled[both] ** 2)) for fit in (one, other))
     independent = float(both.sum()) / min(one.correlation, other.correlation)
@@ -373,7 +375,7 @@ class Profile:
         below = max((p for p in points if p.distance < wanted), key=lambda p: abs(p.step), default=start)
         far = replace(start, step=side * math.inf, distance=math.inf)
         above = min((p for p in points if p.distance >= wanted), key=lambda p: abs(p.step), default=far)
-        deviation = fit.deviations[place]
+        deviation = fit.standard_errors[place]
         first = wanted * deviation if np.isfinite(deviation) else _FIRST
         for trial in range(_MOST_TRIALS):
             near, end = abs(below.step), abs(above.step)

@@ -344,7 +344,7 @@ class _Choice:
                     raise
         choice = self
         for _ in range(_MOST_MOVES):
-            better = choice._extended(min(fits, key=lambda fitted: fitted.best.squares))
+            better = choice._extended(min(fits, key=lambda fitted: fitted.best.sum_of_squares))
             if (moved := choice._moved(better)) is None:
                 break
             choice = moved
@@ -357,7 +357,7 @@ class _Choice:
         """Choice with the times of rate changes corrected by fitted delays; None if they need no correction."""
         coordinates = fitted.best.experiment.coordinates
         places = [place for place, c in enumerate(coordinates) if c.name.startswith(DELAY)]
-        delays, errors = fitted.best.fitted[places], fitted.best.deviations[places]
+        delays, errors = fitted.best.fitted[places], fitted.best.standard_errors[places]
         errors = np.where(errors < np.array([coordinates[place].high for place in places]), errors, 0)
         if self.loading is None or not np.any(np.abs(delays) > _STAYS * errors):
             return None
@@ -376,8 +376,8 @@ class _Choice:
 
         Alternatives are fits with other trends, and of the rival law if the record hardly distinguishes the laws.
         """
-        noise, rival = self._noise(min(fits, key=lambda fitted: fitted.best.squares)), None
-        fits = sorted((_with_noise(each, noise) for each in fits), key=lambda fitted: fitted.best.squares)
+        noise, rival = self._noise(min(fits, key=lambda fitted: fitted.best.sum_of_squares)), None
+        fits = sorted((_with_noise(each, noise) for each in fits), key=lambda fitted: fitted.best.sum_of_squares)
         if len(fits) > 1:
             squares, excess = advantage(fits[0].best, fits[1].best)
             rival = OtherLaw(law=fits[1].kind.name, squares=squares, excess=excess)
@@ -397,7 +397,7 @@ class _Choice:
         """
         own, rest = next(iter(_nuisance(fitted) & _TRENDS.keys()), ""), _nuisance(fitted) - _TRENDS.keys()
         names = {"", own} if self.trend in _ONE_TREND else _TRENDS
-        same = fitted, fitted.best.squares
+        same = fitted, fitted.best.sum_of_squares
         fits = {name: same if name == own else self._among(fitted, {*rest, name} - {""}) for name in sorted(names)}
         aic = {name: fitted.best.excess(squares) + 2 * bool(name) for name, (_, squares) in fits.items()}
         in_time = self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE
@@ -502,7 +502,7 @@ class _Choice:
         if not fitted.setup.starts:
             return fitted
         wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
-        return _again(wider) if needed(wider.best, fitted.best.squares, len(_START)) else fitted
+        return _again(wider) if needed(wider.best, fitted.best.sum_of_squares, len(_START)) else fitted
 
     def _without_start(self, fitted: _Fitted) -> _Fitted:
         """Fit without an unsteady beginning, unless it improves the fit significantly."""
@@ -551,7 +551,7 @@ def needed(best: Fit, squares: float, fewer: int = 1) -> bool:
     does not count.
     """
     resolution = _UNSEEN * float(np.ptp(best.measured))
-    measurable = squares - best.squares > resolution**2 * best.freedom
+    measurable = squares - best.sum_of_squares > resolution**2 * best.degrees_of_freedom
     return measurable and best.excess(squares) > best.threshold(fewer, _CHANCE)
 
 

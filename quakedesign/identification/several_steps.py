@@ -173,7 +173,7 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
         starts += [value for value, c in zip(fit.fitted.tolist(), own, strict=True) if c.name not in shared]
     rows = [[[c.name for c in own].index(name) for name in shared] for own in of_steps]
     values = np.array([fit.fitted[row] for fit, row in zip(fits, rows, strict=True)])
-    sharp = np.array([np.maximum(fit.deviations[row] ** -2.0, 1e-12) for fit, row in zip(fits, rows, strict=True)])
+    sharp = np.array([np.maximum(fit.standard_errors[row] ** -2.0, 1e-12) for fit, row in zip(fits, rows, strict=True)])
     start = np.array([*(np.sum(sharp * values, axis=0) / np.sum(sharp, axis=0)), *starts])
     parts = tuple(fit.experiment for fit in fits)
     joint = _Joint(fits=tuple(fits), parts=parts, places=tuple(places), coordinates=tuple(coordinates))
@@ -185,7 +185,7 @@ def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
         finer = best.experiment.resolved(best.fitted, best.accuracy)
         fitted, _ = minimised(finer, measured, ones, best.fitted)
         best = replace(best, experiment=finer, fitted=fitted)
-    return best, shared, max(best.squares - sum(fit.squares / fit.noise**2 for fit in fits), 0.0)
+    return best, shared, max(best.sum_of_squares - sum(fit.sum_of_squares / fit.noise**2 for fit in fits), 0.0)
 
 
 def _assessed(common: Identification, steps: Sequence[Identification], probability: float) -> Assessment:

@@ -568,14 +568,14 @@ def _short(step: Fraction) -> Fraction:
 class SampledStability:
     """Results for a gain K with zero-order hold over a sampling period."""
 
-    runs: VaryingVerdict  # Verdict with summed integrals and any time history of the parameters
+    verdict_at_step: VaryingVerdict  # Verdict with summed integrals and any time history of the parameters
     longest: LargestVaryingStep | None  # Longest proved period
     radius: float  # Spectral radius of a period, largest over the vertices, in floating point
 
     @property
     def step(self) -> Fraction:
         """T_s [s]."""
-        return self.runs.step
+        return self.verdict_at_step.step
 
     @property
     def largest_step(self) -> LowerBound | None:
@@ -589,11 +589,11 @@ class SampledStability:
 
     def to_dict(self) -> Json:
         """Plain values, SI; proved periods are floats rounded down."""
-        refuted, witness = self.refuted_step, self.runs.witness
+        refuted, witness = self.refuted_step, self.verdict_at_step.witness
         return {
             "step": float(self.step),
-            "verdict": str(self.runs.verdict),
-            "varying": str(self.runs.verdict),
+            "verdict": str(self.verdict_at_step.verdict),
+            "varying": str(self.verdict_at_step.verdict),
             "radius": self.radius if isfinite(self.radius) else None,
             "witness": [float(v) for v in witness] if witness else None,
             "largest_step": _number(self.largest_step),
@@ -626,7 +626,7 @@ def sampled_stability(
     require_positive("Give it in seconds.", step=period)
     longest = largest_varying_step(problem, gains)
     return SampledStability(
-        runs=varying_verdict(problem, gains, period, longest=longest),
+        verdict_at_step=varying_verdict(problem, gains, period, longest=longest),
         longest=longest,
         radius=HeldPoles(problem, gains).radius(period),
     )

@@ -115,7 +115,7 @@ class LinearVerdict:
         if isinstance(self.peaks, ContinuousProof):
             by_name["peaks"] = self.peaks
         problem, gains = LinearProblem.of(self.fault), tuple(self.controller.gains.values())
-        sampled = sampled_files(problem, gains, self.sampled.runs)
+        sampled = sampled_files(problem, gains, self.sampled.verdict_at_step)
         return by_name | {f"held{f'-{n}' if n else ''}": answer for n, answer in enumerate(sampled)}
 
     def save(self, out: Path, *, force: bool = False) -> dict[str, str]:

@@ -136,7 +136,7 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
         inputs=loop.inputs if fading else {**loop.inputs, "awaited": entry},
         sampled={**loop.sampled, "awaited_told": tuple(own * late * v for v in measured)},
         fading={**loop.fading, "awaited": replace(fading, entry=entry)} if fading else {},
-        at_once={("slip_rate_error", "awaited"): own},
+        feedthrough={("slip_rate_error", "awaited"): own},
     )
 
 

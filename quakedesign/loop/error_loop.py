@@ -117,7 +117,7 @@ def sampled_error_loop(
         return loop
     entry = system.column({"behind": 1 / lag} if lag else {"e2": gain})
     late = Pulse(entry=entry, first=int(part > 0), early=lead, late=after, before=lead, after=lead + instants.ramp / 2)
-    return replace(loop, pulses={"late": late}, at_once={("asked" if lag else "push", "drift"): after})
+    return replace(loop, pulses={"late": late}, feedthrough={("asked" if lag else "push", "drift"): after})
 
 
 def starts(

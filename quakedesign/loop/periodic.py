@@ -115,7 +115,7 @@ class PeriodicLoop:
         Inputs that decay after a jump.
     pulses : dict of str to Pulse
         Inputs that act only near a jump.
-    at_once : dict of (str, str) to Fraction
+    feedthrough : dict of (str, str) to Fraction
         Bound of the direct feedthrough from an input of size 1 to an output, by (output, input).
     start : tuple of tuple of Fraction
         Columns s_i of the box of initial states: x(0) = Σ θ_i·s_i, |θ_i| ≤ 1, before the first jump; empty for 0.
@@ -129,7 +129,7 @@ class PeriodicLoop:
     sampled: dict[str, Row] = field(default_factory=dict)
     fading: dict[str, Fading] = field(default_factory=dict)
     pulses: dict[str, Pulse] = field(default_factory=dict)
-    at_once: dict[tuple[str, str], Fraction] = field(default_factory=dict)
+    feedthrough: dict[tuple[str, str], Fraction] = field(default_factory=dict)
     start: tuple[Row, ...] = ()
 
     def __hash__(self) -> int:

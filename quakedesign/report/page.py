@@ -193,7 +193,7 @@ def _slowly(entry: "Entry") -> list[str]:
         "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
         "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
         "terms of the claims, and the resulting bounds lie within the claims (small gain). The claims hold "
-        f"{proof.lasts}. The box of constants is divided into {cells}.",
+        f"{proof.validity}. The box of constants is divided into {cells}.",
     ]
 
 

@@ -65,7 +65,10 @@ def _unstable_with_hold(entry: "Entry") -> bool:
     """Whether a run in continuous time hides an instability with zero-order hold."""
     if entry.run is None or entry.zero_order_hold is None:
         return False
-    return entry.run.provenance["scheme"] == "continuous" and entry.zero_order_hold.runs.verdict is Verdict.REFUTED
+    return (
+        entry.run.provenance["scheme"] == "continuous"
+        and entry.zero_order_hold.verdict_at_step.verdict is Verdict.REFUTED
+    )
 
 
 def _bounded(entry: "Entry", premise: Premise) -> bool:
@@ -88,12 +91,12 @@ def _hold_gaps(entry: "Entry") -> list[str]:
         return ["UNSTABLE at the step used"] if unstable else []
     if entry.zero_order_hold is None or scheme != "explicit":
         return [f"zero-order hold (scheme {scheme}) is not covered"]
-    if entry.zero_order_hold.runs.verdict is Verdict.REFUTED:
+    if entry.zero_order_hold.verdict_at_step.verdict is Verdict.REFUTED:
         return ["UNSTABLE with zero-order hold"]
     used, longest = rational(step), entry.zero_order_hold.largest_step
     if longest is None:
         return ["with zero-order hold, stability is proved for no T_s"]
-    own = used == entry.zero_order_hold.step and entry.zero_order_hold.runs.verdict is Verdict.PROVED
+    own = used == entry.zero_order_hold.step and entry.zero_order_hold.verdict_at_step.verdict is Verdict.PROVED
     if not (used <= longest or own):
         return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved"]
     return ["with zero-order hold stability is proved, but no bound of the errors"]
@@ -165,9 +168,9 @@ def _percent(share: float) -> str:
 def hold_sentences(stability: SampledStability) -> list[str]:
     """Stability of the running law with zero-order hold, and the largest proved T_s."""
     over = f"with zero-order hold over T_s = {float(stability.step):.12g} s"
-    if stability.runs.verdict is Verdict.REFUTED and stability.runs.witness is not None:
-        return [f"UNSTABLE {over} ({_near(stability.runs.witness)})", _proved_up_to(stability)]
-    if stability.runs.verdict is Verdict.UNDECIDED:
+    if stability.verdict_at_step.verdict is Verdict.REFUTED and stability.verdict_at_step.witness is not None:
+        return [f"UNSTABLE {over} ({_near(stability.verdict_at_step.witness)})", _proved_up_to(stability)]
+    if stability.verdict_at_step.verdict is Verdict.UNDECIDED:
         return [f"undecided {over}", _proved_up_to(stability)]
     course = "any time history of the parameters, with integrals as sums over the samples"
     return [f"stable {over}, proved for {course}", _proved_up_to(stability)]
@@ -332,7 +335,7 @@ def _verdict(design: Design, run: Trajectory | None) -> list[str]:
     """Verdict on the sampled loop or in continuous time, with the reason if it is not positive."""
     if design.verdict is Verdict.PROVED:
         ran: FaultProof | None = design.runs if design.runs is not None and design.runs.available else None
-        lasts, proved = (ran.lasts, ran.plant) if ran else ("for all t >= 0", TrackingProof.plant)
+        lasts, proved = (ran.validity, ran.plant) if ran else ("for all t >= 0", TrackingProof.plant)
         plant = "for the loop that ran"
         if run is not None and proved and run.provenance["plant"] != proved:
             other = "stick-slip plant" if proved == STICK_SLIP else "plant without stick"

@@ -18,8 +18,8 @@ from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.lyapunov.search.certify import (
     CertifiedLimit,
     Number,
-    against,
     closed_loop,
+    counterexample_kind,
     largest_gain_range,
     largest_lipschitz,
     necessary_limit,
@@ -149,7 +149,7 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
     refuted = None if fast else refute(loop, name)
     certificate = fast[0] if fast else refuted or (None if infeasible else proof(loop, name))
     proved = certificate is not None and refuted is None
-    kind = "none" if proved else against(loop, refuted)
+    kind = "none" if proved else counterexample_kind(loop, refuted)
     excluded = [] if proved or kind == "exact" else _excluded(loop)
     settling = fast[1] if fast else None
     values = _values(

@@ -15,11 +15,11 @@ from quakedesign.guarantees import (
     NoProof,
     SlidingProof,
     TrackingProof,
-    continued,
     design_at,
+    design_near_longer_step,
     design_sampled_law,
-    farthest_rock,
     longest_delay,
+    longest_diffusion_time,
     longest_step,
 )
 from quakedesign.guarantees.exact.limit_theorems import (
@@ -382,7 +382,7 @@ def _limits_at_rest(
         longest = longest_delay(task, step, **sensing.wanted)
         proved["largest_delay"] = LowerBound(longest.sampled_loop.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
-        if (farthest := farthest_rock(task, step, **sensing.wanted)) is not None:
+        if (farthest := longest_diffusion_time(task, step, **sensing.wanted)) is not None:
             proved["largest_diffusion_time"] = rock = LowerBound(farthest.sampled_loop.diffusion)
             proved["farthest_well"] = nearest_proved_well(rock, spread)
     return Limits(
@@ -518,7 +518,7 @@ def _proved_steps(
     if own is not None and own.available:
         own = _best_at(own, sensing)
     else:
-        own = continued(task, step, longest, **sensing.wanted)
+        own = design_near_longer_step(task, step, longest, **sensing.wanted)
     proofs = [] if own is None else [own]
     if longest is not None and (own is None or longest.guarantee.sampled_loop.step > step):
         proofs.append(design_at(task, longest))

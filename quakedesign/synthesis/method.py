@@ -381,7 +381,7 @@ class Samples(DesignMethod[SampledController]):
         """Guarantee; for a law of the errors alone also the worst case found."""
         proof = self.guarantee(fault, task, controller, setup)
         result = given_law_with_worst_case(fault, proof, controller.notes)
-        if proof.available or proof.pressed or proof.reason == _STANDING or setup.longest_step:
+        if proof.available or proof.only_pressure_fails or proof.reason == _STANDING or setup.longest_step:
             return result
         for factor in _FACTORS:
             other = self.guarantee(fault, task, replace(controller, law=_times(factor, controller.law)), setup)

@@ -135,9 +135,9 @@ class SlidingModes(DesignMethod[SlidingMode]):
         if not made.proof.available:
             laws, none = deadbeat(task, law, wanted.gains), made.proof
             longest = longest_step(task, kind=laws, setup=setup)
-            again = laws.continued(task, step, longest, setup=setup)
+            again = laws.design_near_longer_step(task, step, longest, setup=setup)
             if again is None:
-                nearest = nearest_setup(task, step, kind=laws, pressed=none.pressed, setup=setup)
+                nearest = nearest_setup(task, step, kind=laws, pressed=none.only_pressure_fails, setup=setup)
                 shorter = None if longest is None else laws.at(task, longest).proof
                 near = shorter if isinstance(shorter, TrackingProof) else None
                 entries: Any = {"shorter": near, "unproved_step": step if near else None, "nearest": nearest}

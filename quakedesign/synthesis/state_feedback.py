@@ -23,7 +23,7 @@ from quakedesign.guarantees import (
 )
 from quakedesign.guarantees.exact.limit_theorems import infeasibility
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup, SampledLoop
-from quakedesign.guarantees.search.linear_design import continued, design_at, longest_step, nearest_setup
+from quakedesign.guarantees.search.linear_design import design_at, design_near_longer_step, longest_step, nearest_setup
 from quakedesign.guarantees.search.lqg import near_path, sliding_model, why_no_law
 from quakedesign.guarantees.search.stick_slip_design import design_stick_slip
 from quakedesign.guarantees.sliding_result import guarantee_sliding
@@ -117,12 +117,12 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         designed = design_sampled_law(task, step, objective=wanted.objective, **entries)
         if designed.available:
             return with_worst_case(fault, designed)
-        if setup.longest_step or designed.pressed:
-            nearest = nearest_setup(task, step, pressed=designed.pressed, **entries)
-            if nearest is not None or not designed.pressed:
+        if setup.longest_step or designed.only_pressure_fails:
+            nearest = nearest_setup(task, step, pressed=designed.only_pressure_fails, **entries)
+            if nearest is not None or not designed.only_pressure_fails:
                 return TrackingGuarantee(fault=fault, proof=designed, nearest=nearest)
         longest = longest_step(task, **entries)
-        if (again := continued(task, step, longest, **entries)) is not None:
+        if (again := design_near_longer_step(task, step, longest, **entries)) is not None:
             return with_worst_case(fault, again)
         shorter, tried = (None, None) if longest is None else (design_at(task, longest), step)
         nearest = nearest_setup(task, step, **entries)

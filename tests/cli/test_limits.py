@@ -27,7 +27,7 @@ def _quick(monkeypatch):
         "quakedesign.studies.performance_limits.design_sampled_law",
         lambda *_, **__: NoProof(reason="none"),
     )
-    for name in ("longest_step", "longest_delay", "farthest_rock"):
+    for name in ("longest_step", "longest_delay", "longest_diffusion_time"):
         monkeypatch.setattr(f"quakedesign.studies.performance_limits.{name}", lambda *_, **__: None)
 
 

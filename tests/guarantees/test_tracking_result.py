@@ -48,7 +48,7 @@ def test_claims_that_no_course_leaves_stay(monkeypatch):
 )
 def test_a_claim_that_a_course_with_stick_leaves_is_that_of_any_gain(monkeypatch, slip, rate, left):
     found = stuck(monkeypatch, slip, rate)
-    assert not found.leaves_with_stick
+    assert not found.exceeded_on_stick_slip
     assert (found.proof.check(), found.proof.varying_gain) == (Verdict.PROVED, SLOW.varying_gain)
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "least_pressure", "largest_pressure"):
         assert getattr(found.proof.claims, name) == getattr(ANYHOW if name in left else SLOW.claims, name)
@@ -102,8 +102,8 @@ def test_a_law_that_would_wind_up_is_warned_of_unless_its_pressure_is_limited_at
 
 def test_the_verdict_of_a_result_is_that_of_its_proof_and_found_once(monkeypatch):
     """A proof that was read from a file is decided when it is written; bounds are not computed twice for this."""
-    computed, bounds = [], type(SLOW).recomputed
-    monkeypatch.setattr(type(SLOW), "recomputed", lambda proof: computed.append(proof) or bounds(proof))
+    computed, bounds = [], type(SLOW).theorem_bounds
+    monkeypatch.setattr(type(SLOW), "theorem_bounds", lambda proof: computed.append(proof) or bounds(proof))
     assert TrackingGuarantee(fault=REAL, proof=SLOW).to_dict()["verdict"] == "proved"
     sharper = replace(SLOW, claims=replace(SLOW.claims, slip_error=UpperBound(SLOW.claims.slip_error / 2)))
     assert TrackingGuarantee(fault=REAL, proof=sharper).to_dict()["verdict"] == "undecided"

@@ -34,8 +34,10 @@ def test_estimates_are_within_four_of_their_deviations(kind):
     made = KINDS[kind]()
     for seed in range(1 if "stiffness" in kind or "steps" in kind else 5):
         best = fitted(made, seed)
-        assert np.max(np.abs(best.fitted - truth_of(made, best)) / best.deviations) < 4
-        assert best.noise == pytest.approx(made.noise * (1 + 1 / 9 / 12) ** 0.5, rel=5 / (2 * best.freedom) ** 0.5)
+        assert np.max(np.abs(best.fitted - truth_of(made, best)) / best.standard_errors) < 4
+        assert best.noise == pytest.approx(
+            made.noise * (1 + 1 / 9 / 12) ** 0.5, rel=5 / (2 * best.degrees_of_freedom) ** 0.5
+        )
 
 
 @pytest.mark.slow

@@ -237,7 +237,7 @@ def test_a_profile_that_comes_upon_a_better_fit_hands_it_on():
 
 def test_fits_with_correlated_noise_compare_by_their_whitened_squares():
     one, other = (
-        SimpleNamespace(used=np.ones(10, dtype=bool), squares=squares, correlation=correlation, correlated=noise)
+        SimpleNamespace(used=np.ones(10, dtype=bool), sum_of_squares=squares, correlation=correlation, correlated=noise)
         for squares, correlation, noise in ((2.0, 2.0, None), (3.0, 5.0, object()))
     )
     assert advantage(one, other) == pytest.approx((1.5, 10 / 2 * np.log(1.5)), rel=1e-12)
@@ -313,7 +313,7 @@ def test_a_fit_without_an_outlier_is_that_of_the_others():
     others = np.delete(np.arange(30), 12)
     assert (~found.used).nonzero()[0].tolist() == [12]
     assert found.fitted == pytest.approx(np.polyfit(others, measured[others], 1)[::-1], rel=1e-6)
-    assert found.freedom == 29 - 2
+    assert found.degrees_of_freedom == 29 - 2
     residuals = measured[others] - np.polyval(np.polyfit(others, measured[others], 1), others)
     assert found.noise == pytest.approx((np.sum(residuals**2) / 27) ** 0.5, rel=1e-9)
 
@@ -323,7 +323,7 @@ def test_a_mean_of_many_measurements_weighs_by_the_root_of_their_number():
     found = made(Linear(np.ones((4, 1))), np.array([1.0, 2.0, -1.0, 50.0]), counts=counts, used=np.arange(4) < 3)
     assert found.scaled.tolist() == [2.0, 2.0, -3.0, 50.0]
     assert found.weights.tolist() == [2.0, 1.0, 3.0, 0.0]
-    assert (found.squares, found.freedom, found.noise) == (17.0, 2, 8.5**0.5)
+    assert (found.sum_of_squares, found.degrees_of_freedom, found.noise) == (17.0, 2, 8.5**0.5)
     assert found.accuracy == pytest.approx(3e-3 * 8.5**0.5 / (15 / 4) ** 0.5, rel=1e-14)
 
 
@@ -331,11 +331,11 @@ def test_the_threshold_is_fishers():
     """Of tables at 95 %: F(1, 10) = 4.965, F(2, 10) = 4.103; the excess at a distance d of the mean of n is n d²/s²."""
     draw = np.resize([0.5, -0.5], 11) + 0.0
     found = made(Linear(np.ones((11, 1))), draw, fitted=np.array([draw.mean()]))
-    assert found.freedom == 10
+    assert found.degrees_of_freedom == 10
     assert [found.threshold(1), found.threshold(2)] == pytest.approx([4.965, 2 * 4.103], abs=1e-3)
     assert found.correlation == 1.0  # what alternates is not counted as more than independent
     assert found.distance(found.fitted + 0.3) == pytest.approx(11 * 0.3**2 / np.var(draw, ddof=1), rel=1e-12)
-    assert found.deviations == pytest.approx([(np.var(draw, ddof=1) / 11) ** 0.5], rel=1e-12)
+    assert found.standard_errors == pytest.approx([(np.var(draw, ddof=1) / 11) ** 0.5], rel=1e-12)
 
 
 def test_samples_that_follow_each_other_count_as_fewer():
@@ -375,10 +375,10 @@ def test_samples_that_follow_each_other_widen_what_is_allowed():
     assert found.excess(16 + 3.0) == pytest.approx(3.0 / (4 * noise**2), rel=1e-14)
     assert found.distance(np.array([0.5])) == pytest.approx(10 * 0.25 / (4 * noise**2), rel=1e-12)
     assert found.distance(np.array([np.nan])) == np.inf
-    assert found.deviations == pytest.approx([2 * noise / 10**0.5], rel=1e-12)
+    assert found.standard_errors == pytest.approx([2 * noise / 10**0.5], rel=1e-12)
     across = made(Linear(np.array([[1.0, 1], [1, -1], [1, 1], [1, -1]])), np.array([3.0, 1.0, -3.0, -1.0]))
     vars(across)["correlation"] = 1.0
-    assert across.deviations == pytest.approx([across.noise / 2, across.noise / 2], rel=1e-12)
+    assert across.standard_errors == pytest.approx([across.noise / 2, across.noise / 2], rel=1e-12)
 
 
 def test_deviations_are_those_of_the_inverse_and_infinite_along_what_is_not_told():
@@ -386,10 +386,10 @@ def test_deviations_are_those_of_the_inverse_and_infinite_along_what_is_not_told
     measured = np.resize([1.0, -1.0], 8)
     known = made(Linear(matrix[:, :2]), measured)
     expected = np.sqrt(np.diag(np.linalg.inv(matrix[:, :2].T @ matrix[:, :2]))) * known.noise
-    assert known.deviations == pytest.approx(expected, rel=1e-9)
-    told = made(Linear(matrix), measured).deviations
+    assert known.standard_errors == pytest.approx(expected, rel=1e-9)
+    told = made(Linear(matrix), measured).standard_errors
     assert np.isfinite(told).tolist() == [True, True, False]
-    twice = made(Linear(matrix[:, [0, 1, 1]]), measured).deviations
+    twice = made(Linear(matrix[:, [0, 1, 1]]), measured).standard_errors
     assert np.isfinite(twice).tolist() == [True, False, False]
 
 

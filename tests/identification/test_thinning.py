@@ -148,8 +148,8 @@ def test_weights_are_the_numbers_of_samples():
         taken = None if record.counts is None else record.counts[setup.used]
         fits.append(fit(setup.experiment, record.friction[setup.used], seed=0, counts=taken))
     whole, part = fits
-    np.testing.assert_allclose(part.fitted, whole.fitted, atol=0.1 * np.min(whole.deviations))
-    np.testing.assert_allclose(part.deviations, whole.deviations, rtol=0.15)
+    np.testing.assert_allclose(part.fitted, whole.fitted, atol=0.1 * np.min(whole.standard_errors))
+    np.testing.assert_allclose(part.standard_errors, whole.standard_errors, rtol=0.15)
     assert part.noise == pytest.approx(whole.noise, rel=0.1)
     assert part.distance(part.fitted) == pytest.approx(0, abs=1e-6)
 

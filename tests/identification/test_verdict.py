@@ -197,8 +197,8 @@ def test_a_beginning_that_moves_more_than_the_step_and_does_not_fade_hides_the_s
 def best(squares, *names, chance=1.0):
     """A fit whose excess is that of its squares, with a threshold of 3, and a friction that spans 1."""
     return SimpleNamespace(
-        squares=squares,
-        freedom=100,
+        sum_of_squares=squares,
+        degrees_of_freedom=100,
         measured=np.array([0.0, 1.0]),
         excess=lambda other: other - squares,
         threshold=lambda fewer, _chance: 3.0 * fewer,

@@ -109,7 +109,7 @@ def test_just_below_the_proved_period_no_switching_diverges_and_at_the_refuted_o
 
 
 def test_the_law_that_runs_is_refuted_just_beyond_its_limit(near_limit):
-    assert near_limit.runs.verdict is Verdict.REFUTED
+    assert near_limit.verdict_at_step.verdict is Verdict.REFUTED
     assert radius(periods(PROBLEM, NEAR_LIMIT, 0.158, parts=1)) > 1
     between = varying_verdict(PROBLEM, NEAR_LIMIT, "0.157")
     assert between.verdict is Verdict.REFUTED

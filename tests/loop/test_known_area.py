@@ -47,7 +47,7 @@ def loop_of(lag, delay):
 def test_what_is_awaited_is_below_its_bound_and_near_it(lag, delay):
     """Of steps of one sign at every sample, or of a well that rises evenly: bY over the share, against left_out."""
     plain, loop = loop_of(lag, delay)
-    share = loop.at_once["slip_rate_error", "awaited"] / GAIN
+    share = loop.feedthrough["slip_rate_error", "awaited"] / GAIN
     left = max(loop.outputs["left_out"])
     if lag:  # behind = lag for u' = -1
         t = np.linspace(0, 0.05, 2001)
@@ -102,7 +102,7 @@ def test_a_loop_with_all_modes_is_the_loop_with_kicks_and_what_is_awaited(lag, d
     true_flow, true_jumps = extended(plain.flow, plain.segments)
     true_flow[1, own:] = float(GAIN) * SHARES[MODES:]
     with_kicks = extended(loop.flow, loop.segments)
-    share = float(loop.at_once["slip_rate_error", "awaited"] / GAIN)
+    share = float(loop.feedthrough["slip_rate_error", "awaited"] / GAIN)
     said = np.zeros(size)  # bY over the share: all that the steps so far will still bring, -(z - u) c/rate
     said[own:] = -(SHARES / RATES)[MODES:] / share
     entry = np.array(loop.inputs.get("awaited") or loop.fading["awaited"].entry, float)
@@ -123,7 +123,7 @@ def test_a_loop_with_all_modes_is_the_loop_with_kicks_and_what_is_awaited(lag, d
 
 def test_only_slip_rate_its_measurement_and_what_enters_are_changed():
     plain, loop = loop_of(F(0), F(0))
-    back = replace(loop, at_once={}, sampled={}, fading={"left_out": loop.fading["left_out"]})
+    back = replace(loop, feedthrough={}, sampled={}, fading={"left_out": loop.fading["left_out"]})
     kicked, jump = loop.segments[0].jump, plain.segments[0].jump
     assert replace(back, segments=plain.segments) == plain
     stepped = loop.states.index("stepped")

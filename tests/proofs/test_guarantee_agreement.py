@@ -25,7 +25,7 @@ def bounds_of_both(number):
     loop = checker.read_loop(document["loop"], task, start)
     slow = checker.read_slow(document["slow_gain"], task, loop) if "slow_gain" in document else None
     theirs, _ = checker.bounds(task, loop, slow, found.claims.slip_error)
-    ours = found.recomputed()
+    ours = found.theorem_bounds()
     return (ours.slip_error, ours.slip_rate_error), theirs[:2]
 
 

@@ -407,7 +407,7 @@ def test_lines_are_shown_after_ten_halvings_or_not_at_all(room, shown):
     for slopes in ((F(1, 2), F(1)), (F(0), F(1, 2))):
         root = ImplicitStep(pull=pull, slopes=slopes, remainder=F(1))
         other = checker.Root(plain(pull), list(slopes), F(1))
-        assert sector.holds(root, F(1, 2), F(1, 2), 2 - room) == shown
+        assert sector.sector_is_valid(root, F(1, 2), F(1, 2), 2 - room) == shown
         assert checker.root_within(other, F(1, 2), F(1, 2), 2 - room) == shown
 
 
@@ -425,7 +425,7 @@ def test_lines_that_the_root_leaves_at_one_end_are_not_shown(slopes, factor, roo
     """q = c(e1 + T·w), T = 1/2, u ≤ 1: the lines are (1 + c/2)ε − R − u/4 and, with the slope 1/4, − u/2 above."""
     pull = (Power(factor=(F(factor), F(factor)), exponent=F(1), argument="slip"),)
     rate, half = 1 + F(factor, 2) - room, F(1, 2)
-    assert sector.holds(ImplicitStep(pull=pull, slopes=slopes, remainder=F(1)), half, half, rate) == shown
+    assert sector.sector_is_valid(ImplicitStep(pull=pull, slopes=slopes, remainder=F(1)), half, half, rate) == shown
     assert checker.root_within(checker.Root(plain(pull), list(slopes), F(1)), half, half, rate) == shown
 
 

@@ -189,8 +189,8 @@ def test_both_derive_the_same_ranges_and_inputs_from_a_fault():
         half = task.half_ranges
         force, drift, coupling, shifted = checker.inputs(found, half["push"])
         ours = channels_of(task, None, held.step)
-        assert [c.own for c in ours] == [force, drift]
-        assert [c.shares for c in ours] == [half, {"slip_rate_error": coupling}]
+        assert [c.constant for c in ours] == [force, drift]
+        assert [c.coefficients for c in ours] == [half, {"slip_rate_error": coupling}]
         zero = {(y, k): (F(0),) for y in OUTPUTS for k in ("acceleration", "drift")}
         assert bounds_from(task, zero, None, held.step).push == shifted
 
@@ -218,7 +218,7 @@ def without_awaited(loop, theirs):
         own, given = fading.pop("awaited"), theirs.fade
         assert (own.first, own.height, own.rate, own.floor) == (given.event, given.height, given.rate, given.floor)
     assert (own.entry if loop.fading else inputs.pop("awaited")) == tuple(theirs.entry)
-    return replace(loop, sampled=sampled, fading=fading, inputs=inputs, at_once={})
+    return replace(loop, sampled=sampled, fading=fading, inputs=inputs, feedthrough={})
 
 
 @pytest.mark.usefixtures("coarse")

@@ -127,9 +127,9 @@ def test_the_spread_is_half_a_part_and_what_slip_and_reference_add():
     """κ = weakening·N̂/b; E = 1 mm, r′ the reference's largest rate."""
     found, e = SLOW.spread(TASK, F(1, 1000)), F(1, 1000)
     assert SLOPE == TASK.friction.weakening / TASK.friction.least  # N̂ is one number here
-    assert found.half == (TASK.beta[1] - 1) / 4 + 2 * SLOPE * e
-    assert float(found.aged) == pytest.approx(float(SLOPE * TASK.reference_rates[0]) / (np.e * 0.25), rel=1e-4)
-    assert float(found.aged) > float(SLOPE * TASK.reference_rates[0]) / (np.e * 0.25)
+    assert found.present == (TASK.beta[1] - 1) / 4 + 2 * SLOPE * e
+    assert float(found.past) == pytest.approx(float(SLOPE * TASK.reference_rates[0]) / (np.e * 0.25), rel=1e-4)
+    assert float(found.past) > float(SLOPE * TASK.reference_rates[0]) / (np.e * 0.25)
 
 
 def test_the_models_are_the_middles_of_the_parts():

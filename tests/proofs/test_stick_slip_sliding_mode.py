@@ -77,7 +77,7 @@ def test_a_weaker_sign_is_refused_by_both():
     which = next(i for i, term in enumerate(stored()["loop"]["pull"]) if (term["of"], term["power"]) == ("slip", "0"))
     weaker = changed(stored(), ((*PULL, which, "factor"), times("1/10")))
     assert refused(weaker, "the implicit step must be deadbeat in the set")
-    assert "deadbeat" in read_guarantee(weaker).recomputed().reason
+    assert "deadbeat" in read_guarantee(weaker).theorem_bounds().reason
 
 
 def test_without_its_root_the_same_file_is_about_a_linear_law():

@@ -20,7 +20,7 @@ LONGEST = LargestVaryingStep(proved=LowerBound("0.15769"), refuted=UpperBound("0
 
 def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
     runs = VaryingVerdict(verdict=verdict, step=F(step), witness=witness)
-    return SampledStability(runs=runs, longest=longest, radius=0.9)
+    return SampledStability(verdict_at_step=runs, longest=longest, radius=0.9)
 
 
 @pytest.mark.parametrize(

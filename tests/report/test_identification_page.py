@@ -46,7 +46,7 @@ def test_the_region_touches_the_ellipse_of_the_slopes(stepped):
     drawing = identification_figure(stepped)
     (axis,) = [axis for axis in drawing.axes if axis.get_xlabel().startswith("direct_effect")]
     names = [c.name for c in stepped.fit.experiment.coordinates]
-    far = stepped.fit.deviations * stepped.fit.threshold(2) ** 0.5
+    far = stepped.fit.standard_errors * stepped.fit.threshold(2) ** 0.5
     a, b = (names.index(name) for name in ("direct_effect", "evolution_effect"))
     assert np.ptp(np.log(axis.lines[0].get_xdata())) == pytest.approx(2 * far[a], rel=0.01)
     assert np.ptp(axis.lines[0].get_ydata()) == pytest.approx(2 * far[b], rel=0.01)

@@ -124,7 +124,7 @@ def test_a_held_pressure_is_not_what_is_proved(slow):
     held = simulate(FAULT, LAW, duration=1.0, scheme="implicit")
     assert grade(entry(held, FINE)) == "proved, but zero-order hold (scheme implicit) is not covered"
     runs = SimpleNamespace(verdict=Verdict.REFUTED)
-    unstable = SampledStability(runs=runs, longest=None, radius=1.1)
+    unstable = SampledStability(verdict_at_step=runs, longest=None, radius=1.1)
     assert (
         grade(entry(slow, FINE, zero_order_hold=unstable))
         == "proved for this loop and task; UNSTABLE with zero-order hold over T_s"

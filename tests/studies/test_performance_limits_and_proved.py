@@ -63,9 +63,9 @@ def designs(monkeypatch):
         "design_sampled_law": designed,
         "longest_step": longest_step,
         "design_at": lambda task, one: one.guarantee,
-        "continued": lambda *_, **__: None,
+        "design_near_longer_step": lambda *_, **__: None,
         "longest_delay": lambda task, step, **_: claimed(task, step, delay=longest["delay"]),
-        "farthest_rock": lambda task, step, **_: claimed(task, step, diffusion=F(5)),
+        "longest_diffusion_time": lambda task, step, **_: claimed(task, step, diffusion=F(5)),
     }
     for name, search in found.items():
         monkeypatch.setattr(f"quakedesign.studies.performance_limits.{name}", search)

@@ -175,7 +175,9 @@ def _tracking_entries(claim: TrackingProof | ContinuousProof) -> Any:
             measured=sampled_loop.jitter, delay=sampled_loop.delay_jitter, mean=sampled_loop.averaging
         )
     if sampled_loop.pump is not None and sampled_loop.pump.to_dict():
-        pump = made(PumpEntries, sampled_loop.pump, ramp=sampled_loop.ramp)
+        pump = made(
+            PumpEntries, sampled_loop.pump, ramp=sampled_loop.ramp if sampled_loop.pump.rate is not None else _ZERO
+        )
     implicit_step = (
         None
         if law.implicit_step is None

@@ -36,7 +36,7 @@ from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.norms import BALLS, Arithmetic, absolute, ball, column, hstack, matrix, upper
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import Channel, SampledLoop, channels_of
-from quakedesign.guarantees.exact.small_gain import Bounds, unshifted
+from quakedesign.guarantees.exact.small_gain import Bounds, shift_bound
 from quakedesign.loop import PeriodicLoop
 from quakedesign.plant.fault_plant import FaultPlant
 
@@ -145,15 +145,15 @@ def reached_bounds(task: FaultPlant, sampled_loop: SampledLoop, invariant_set: I
         except ParameterError as error:
             return NoProof(reason=str(error))
     largest = dict(zip(loop.outputs, outputs, strict=True))
-    shares = [sum((c * largest[y] for y, c in channel.shares.items()), _ZERO) for channel in channels]
+    shares = [sum((c * largest[y] for y, c in channel.coefficients.items()), _ZERO) for channel in channels]
     for channel, share, bound in zip(channels, shares, invariant_set.inputs, strict=True):
-        if channel.own + share > bound:
+        if channel.constant + share > bound:
             return NoProof(reason=f"the {channel.name} may exceed its bound in the invariant set")
     gains = (share / bound for share, bound in zip(shares, invariant_set.inputs, strict=True) if bound)
     return Bounds(
         slip_error=largest["slip_error"],
         slip_rate_error=largest["slip_rate_error"],
-        push=largest["push"] + unshifted(task),
+        push=largest["push"] + shift_bound(task),
         small_gain=max(gains, default=_ZERO),
     )
 

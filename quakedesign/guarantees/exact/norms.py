@@ -108,9 +108,9 @@ class SlowestMode:
     """Estimated slowest mode of a loop: both eigenvectors, and the sum of its remainder after 2^doublings periods."""
 
     doublings: int
-    seen: arb_mat
-    along: arb_mat
-    left: float
+    left_eigenvector: arb_mat
+    right_eigenvector: arb_mat
+    remainder: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -726,7 +726,7 @@ def _norms(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[Fraction, ...]]:
         for name in (*loop.inputs, *loop.sampled, *loop.fading, *loop.pulses):
             peaks = [reduce(add, rest, larger(*ends)) for part in responses_of.sums(name) for *ends, rest in part]
             bounds |= {(y, name): line for y, line in zip(loop.outputs, _upper_rows(peaks), strict=True)}
-        return bounds | {key: tuple(v + size for v in bounds[key]) for key, size in loop.at_once.items()}
+        return bounds | {key: tuple(v + size for v in bounds[key]) for key, size in loop.feedthrough.items()}
 
 
 class LoopResponses:
@@ -814,7 +814,10 @@ class _Past:
         columns = by.hstack(ends)
         if mode := periods.mode:
             return cls(
-                parts, periods.followed(columns, mode.doublings), mode.along, by.sums(mode.seen * columns) * mode.left
+                parts,
+                periods.followed(columns, mode.doublings),
+                mode.right_eigenvector,
+                by.sums(mode.left_eigenvector * columns) * mode.remainder,
             )
         place, seen = periods.seen_alone(row_sums(columns))
         sums = row_sums(seen * columns)

@@ -99,7 +99,7 @@ class PlantProof(Proof[Row]):
         """Peaks by the names of outputs and controls, in the units of the plant."""
         return dict(zip((*self.outputs, *self.controls), (*self.claims.outputs, *self.claims.controls), strict=True))
 
-    def recomputed(self) -> Row | NoProof:
+    def theorem_bounds(self) -> Row | NoProof:
         """Peaks of outputs and controls that the theorem gives for `inputs`."""
         try:
             largest = peaks(self.part, response_bounds(self.part.loop(self.law), self.pieces), self.inputs)
@@ -108,7 +108,7 @@ class PlantProof(Proof[Row]):
         failed = "a sector deviates by more than its number W_s, or its argument exceeds its bound"
         return NoProof(reason=failed) if largest is None else largest
 
-    def supported(self, bounds: Row) -> bool:
+    def follows_from(self, bounds: Row) -> bool:
         """Whether no peak exceeds its claim."""
         return all(a <= b for a, b in zip(bounds, (*self.claims.outputs, *self.claims.controls), strict=True))
 

@@ -36,7 +36,7 @@ class Proof(ABC, Generic[B]):
         Idealisation of its plant, as text; empty for the stick–slip plant and slow sliding.
     motion : str
         Condition of the slip-rate bound, as text.
-    lasts : str
+    validity : str
         Time range of the claims, as text.
     covers_healing : bool
         Whether friction at rest may exceed friction in slip, see `StickSlipProof.beside_healing`.
@@ -60,20 +60,20 @@ class Proof(ABC, Generic[B]):
     sampled: ClassVar[bool] = True
 
     @abstractmethod
-    def recomputed(self) -> "B | NoProof":
+    def theorem_bounds(self) -> "B | NoProof":
         """Bounds that the theorem gives, in ball and rational arithmetic, or the reason why it gives none."""
 
     @abstractmethod
-    def supported(self, bounds: B) -> bool:
+    def follows_from(self, bounds: B) -> bool:
         """Whether the claims follow from bounds of the theorem."""
 
     def check(self) -> Verdict:
         """PROVED if the claims follow from the bounds of the theorem; else UNDECIDED."""
-        return self.verdict_of(self.recomputed())
+        return self.verdict_of(self.theorem_bounds())
 
     def verdict_of(self, bounds: "B | NoProof") -> Verdict:
-        """Verdict for the bounds that `recomputed` returned."""
-        if isinstance(bounds, NoProof) or not self.supported(bounds):
+        """Verdict for the bounds that `theorem_bounds` returned."""
+        if isinstance(bounds, NoProof) or not self.follows_from(bounds):
             return Verdict.UNDECIDED
         return Verdict.PROVED
 
@@ -91,7 +91,7 @@ class Proof(ABC, Generic[B]):
         """Claimed bounds by name, in SI units."""
 
     @property
-    def lasts(self) -> str:
+    def validity(self) -> str:
         """Time range of the claims, as text."""
         return "for all t >= 0"
 
@@ -136,8 +136,8 @@ class NoProof:
     bounds: ClassVar[Mapping[str, LowerBound | UpperBound]] = MappingProxyType({})
     reason: str
     small_gain: UpperBound | None = None
-    needs: Fraction | None = None
-    pressed: bool = False
+    required_change: Fraction | None = None
+    only_pressure_fails: bool = False
 
     def check(self) -> Verdict:
         """UNDECIDED."""

@@ -265,21 +265,21 @@ class Channel:
     Attributes
     ----------
     name : str
-    own : Fraction
+    constant : Fraction
         F, in the unit of the input.
-    shares : mapping of str to Fraction
+    coefficients : mapping of str to Fraction
         c_y by the output.
     """
 
     name: str
-    own: Fraction
-    shares: Mapping[str, Fraction]
+    constant: Fraction
+    coefficients: Mapping[str, Fraction]
 
     def rounded(self) -> "Channel":
         """The channel in floats, for estimates: float products are twenty times as fast."""
-        shares: Mapping[str, Any] = {output: float(share) for output, share in self.shares.items()}
-        own: Any = float(self.own)
-        return Channel(name=self.name, own=own, shares=shares)
+        shares: Mapping[str, Any] = {output: float(share) for output, share in self.coefficients.items()}
+        own: Any = float(self.constant)
+        return Channel(name=self.name, constant=own, coefficients=shares)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -294,8 +294,8 @@ class GainSpread:
         Largest deviation at a time σ ago, divided by e^{ασ}.
     """
 
-    half: Fraction
-    aged: Fraction
+    present: Fraction
+    past: Fraction
 
 
 def channels_of(
@@ -313,15 +313,15 @@ def channels_of(
     force, drift, coupling = _task_inputs(task)
     half, implicit, aged = task.half_ranges, [], []
     if spread is not None:
-        half = {**half, "push": spread.half}
-        aged.append(Channel(name="aged", own=_ZERO, shares={"push": spread.aged}))
+        half = {**half, "push": spread.present}
+        aged.append(Channel(name="aged", constant=_ZERO, coefficients={"push": spread.past}))
     if implicit_step is not None:
         share = implicit_step.half_range / step
         own = implicit_step.remainder + share * (noise.get("slip_noise", _ZERO) + jitter * task.reference_rates[0])
-        implicit.append(Channel(name="root", own=own, shares={"slip_error": share}))
+        implicit.append(Channel(name="root", constant=own, coefficients={"slip_error": share}))
     return (
-        Channel(name="acceleration", own=force, shares=half),
-        Channel(name="drift", own=drift, shares={"slip_rate_error": coupling}),
+        Channel(name="acceleration", constant=force, coefficients=half),
+        Channel(name="drift", constant=drift, coefficients={"slip_rate_error": coupling}),
         *implicit,
         *aged,
         *_measurement_errors(task, noise, jitter),
@@ -340,22 +340,22 @@ def _measurement_errors(task: FaultPlant, noise: Mapping[str, Fraction], jitter:
         if name in noise:
             force, shares = moves[name]
             motion = {output: jitter * share for output, share in shares.items()} if jitter else {}
-            yield Channel(name=name, own=noise[name] + jitter * (rate + force), shares=motion)
+            yield Channel(name=name, constant=noise[name] + jitter * (rate + force), coefficients=motion)
 
 
 def reference_channels(task: FaultPlant, names: Collection[str]) -> Iterator[Channel]:
     """Channels of reference, initial state and late pressures, as far as `names` contains them."""
     for name in ("reference", "reference_rate"):
         if name in names:
-            yield Channel(name=name, own=task.reference_rates[0], shares={})
+            yield Channel(name=name, constant=task.reference_rates[0], coefficients={})
     if "reference_acceleration" in names:
-        yield Channel(name="reference_acceleration", own=task.reference_rates[1], shares={})
+        yield Channel(name="reference_acceleration", constant=task.reference_rates[1], coefficients={})
     if "reference_jerk" in names:
-        yield Channel(name="reference_jerk", own=task.reference_jerk, shares={})
+        yield Channel(name="reference_jerk", constant=task.reference_jerk, coefficients={})
     if START in names:
-        yield Channel(name=START, own=Fraction(1), shares={})
+        yield Channel(name=START, constant=Fraction(1), coefficients={})
     if LATE in names:
-        yield Channel(name=LATE, own=_ZERO, shares={"stepped": Fraction(1)})
+        yield Channel(name=LATE, constant=_ZERO, coefficients={"stepped": Fraction(1)})
 
 
 def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
@@ -366,13 +366,13 @@ def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel
     """
     fades = ("left_out", "left_out") in gains
     for channel in channels:
-        share = {"left_out": channel.shares["push"]} if "push" in channel.shares else {}
+        share = {"left_out": channel.coefficients["push"]} if "push" in channel.coefficients else {}
         if fades and channel.name == "acceleration":
-            yield from (channel, Channel(name="left_out", own=_ZERO, shares=share))
+            yield from (channel, Channel(name="left_out", constant=_ZERO, coefficients=share))
         else:
-            yield replace(channel, shares={**channel.shares, **share})
+            yield replace(channel, coefficients={**channel.coefficients, **share})
     for name in ("awaited", "awaited_told"):
-        yield Channel(name=name, own=_ZERO, shares={"left_out": Fraction(1)})
+        yield Channel(name=name, constant=_ZERO, coefficients={"left_out": Fraction(1)})
 
 
 def _task_inputs(task: FaultPlant) -> tuple[Fraction, Fraction, Fraction]:

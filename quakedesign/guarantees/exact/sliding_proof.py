@@ -43,7 +43,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
     def motion(self) -> str:
         """Slip range and stress for which the slip rate is bounded, as text."""
         stress = LowerBound(self.task.stress).quantity("Pa")
-        return f" {self.lasts}, under every shear stress disturbance of at most {stress}"
+        return f" {self.validity}, under every shear stress disturbance of at most {stress}"
 
     @property
     def bounds(self) -> Mapping[str, Bound]:
@@ -53,7 +53,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         return named | {"peak_slip_rate": self.peak_slip_rate, "least_pressure": least, "largest_pressure": largest}
 
     @property
-    def lasts(self) -> str:
+    def validity(self) -> str:
         """Short statement of the slip range of the claims."""
         return f"during the {LowerBound(self.task.distance):.4g} m of slip of the task"
 
@@ -70,7 +70,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         """The task on every cell."""
         return cells(self.task, self.cuts)
 
-    def recomputed(self) -> Mapping[str, Fraction] | NoProof:
+    def theorem_bounds(self) -> Mapping[str, Fraction] | NoProof:
         """Largest bounds over all cells that follow from the claims, by name, or the first reason for failure."""
         largest: dict[str, Fraction] = {}
         for cell in self.cells:
@@ -80,7 +80,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
             largest = {name: max(bound, largest.get(name, bound)) for name, bound in bounds.items()}
         return largest
 
-    def supported(self, bounds: Mapping[str, Fraction]) -> bool:
+    def follows_from(self, bounds: Mapping[str, Fraction]) -> bool:
         """Whether every bound lies below its claim."""
         return follows(bounds, self.claims)
 
@@ -133,7 +133,7 @@ class SlidingProof(Proof[Mapping[str, Fraction]]):
         return (
             f"{empty}from steady sliding at V = {float(task.rate):.4g} m/s, {_path(sampled_loop)}, "
             f"{under}, {_along(task)}{_box(task)}: the slip rate never "
-            f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.lasts}, in which the fault slides "
+            f"exceeds {ratio:.4g} V = {self.peak_slip_rate.quantity('m/s')} {self.validity}, in which the fault slides "
             f"forward throughout, the slip stays within {claims.slip_error.quantity('m')} of the reference, the "
             f"pressure in the fault between {low.quantity('Pa')} and "
             f"{high.quantity('Pa')}, at the valve between {least.quantity('Pa')} and {largest.quantity('Pa')} "

@@ -148,7 +148,7 @@ def bounds_from(
     more = _moved(task, sampled_loop, claims, model, late)
     gains = _once_settled(_with_what_adds_at_once(loop, model, gains, phases), phases, late)
     channels = [
-        replace(one, own=one.own + sum((c * more.get(y, _ZERO) for y, c in one.shares.items()), _ZERO))
+        replace(one, constant=one.constant + sum((c * more.get(y, _ZERO) for y, c in one.coefficients.items()), _ZERO))
         for one in channels_of(task, sampled_loop, claims, loop)
     ]
     small_gain, bounds = channel_bounds(channels, gains)
@@ -253,14 +253,14 @@ def channels_of(
         state = {"ageing": _half(states) / _middle(states)}
     own = task.stress + inertia(task, sampled_loop, claims) + regularisation(task, claims)
     channels = [
-        Channel(name="stress", own=own, shares={**stress, **left_out}),
-        Channel(name="rate", own=_ZERO, shares={"log_rate": bent}),
-        Channel(name="state", own=_ZERO, shares=state),
+        Channel(name="stress", constant=own, coefficients={**stress, **left_out}),
+        Channel(name="rate", constant=_ZERO, coefficients={"log_rate": bent}),
+        Channel(name="state", constant=_ZERO, coefficients=state),
     ]
     beside = {name: size for name, size in _moving(task).items() if size} | sampled_loop.noise
-    channels += [Channel(name=name, own=size, shares={}) for name, size in beside.items()]
+    channels += [Channel(name=name, constant=size, coefficients={}) for name, size in beside.items()]
     if loop.fading:
-        channels.append(Channel(name="left_out", own=_ZERO, shares={"left_out": _ONE}))
+        channels.append(Channel(name="left_out", constant=_ZERO, coefficients={"left_out": _ONE}))
     return tuple(channels)
 
 

@@ -231,9 +231,9 @@ def bounds_from(
     return Bounds(
         slip_error=Fraction(peaks["slip_error"]),
         slip_rate_error=Fraction(peaks["slip_rate_error"]),
-        push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + unshifted(task)),
+        push=Fraction(peaks["push"] + peaks.get("left_out", _ZERO) + shift_bound(task)),
         small_gain=Fraction(small_gain),
-        valve_push=Fraction(peaks["asked"] + unshifted(task)) if "asked" in peaks else None,
+        valve_push=Fraction(peaks["asked"] + shift_bound(task)) if "asked" in peaks else None,
         stepped=Fraction(peaks["stepped"]) if "stepped" in peaks else None,
     )
 
@@ -250,7 +250,7 @@ def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict
         raise ValueError(f"every input of a loop needs a bound. Received {', '.join(sorted(unbounded))} without one.")
     loops = [
         [
-            max(sum((c * gains[y, k.name][j] for y, c in i.shares.items()), _ZERO) for j in _parts(gains))
+            max(sum((c * gains[y, k.name][j] for y, c in i.coefficients.items()), _ZERO) for j in _parts(gains))
             for k in channels
         ]
         for i in channels
@@ -258,7 +258,7 @@ def channel_bounds(channels: Sequence[Channel], gains: Gains) -> tuple[Any, dict
     small_gain = spectral_radius(loops)
     if small_gain >= 1:
         return small_gain, None
-    inputs = _solved(loops, [channel.own for channel in channels])
+    inputs = _solved(loops, [channel.constant for channel in channels])
     return small_gain, {
         y: max(
             sum((gains[y, k.name][j] * v for k, v in zip(channels, inputs, strict=True)), _ZERO) for j in _parts(gains)
@@ -307,7 +307,7 @@ def _solved(matrix: Sequence[Sequence[Any]], own: Sequence[Any]) -> list[Any]:
     return [row[size] for row in rows]
 
 
-def unshifted(task: FaultPlant) -> Fraction:
+def shift_bound(task: FaultPlant) -> Fraction:
     """Bound of the shift of b·p* by a disturbance of class ``rate`` [m/s²]; 0 in class ``amplitude``."""
     if task.change is None:
         return _ZERO
@@ -315,7 +315,7 @@ def unshifted(task: FaultPlant) -> Fraction:
 
 
 def _none(small_gain: Any, channels: Sequence[Channel], gains: Gains) -> NoProof:
-    alone = {(i.name, y): c * max(gains[y, i.name]) for i in channels for y, c in i.shares.items()}
+    alone = {(i.name, y): c * max(gains[y, i.name]) for i in channels for y, c in i.coefficients.items()}
     (name, share), whole = max(alone.items(), key=lambda item: item[1]), UpperBound(small_gain)
     what = _WORDS.get(name, _LEFT_OUT)
     return NoProof(
@@ -375,8 +375,8 @@ class VaryingGain:
         law = task.friction
         slope = max(law.weakening, law.strengthening) * task.area_per_mass[1] / task.authority
         return GainSpread(
-            half=self._half(task) + 2 * slope * slip_error,
-            aged=slope * task.reference_rates[0] * _ONE_OVER_E / self.growth,
+            present=self._half(task) + 2 * slope * slip_error,
+            past=slope * task.reference_rates[0] * _ONE_OVER_E / self.growth,
         )
 
     def _half(self, task: FaultPlant) -> Fraction:
@@ -399,7 +399,7 @@ def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
     """Loop whose responses to the acceleration are multiplied by e^{ασ}."""
     flow = tuple(tuple(v + growth * (i == j) for j, v in enumerate(row)) for i, row in enumerate(loop.flow))
     entry = {"aged": loop.inputs["acceleration"]}
-    return replace(loop, flow=flow, inputs=entry, sampled={}, fading={}, pulses={}, at_once={}, start=())
+    return replace(loop, flow=flow, inputs=entry, sampled={}, fading={}, pulses={}, feedthrough={}, start=())
 
 
 # ----------------------------------------------------------------------
@@ -420,7 +420,7 @@ _BITS = 128
 _SECTOR_HALVINGS = 10
 
 
-def holds(implicit_step: ImplicitStep, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
+def sector_is_valid(implicit_step: ImplicitStep, step: Fraction, slip: Fraction, rate: Fraction) -> bool:
     """Whether the sector encloses the solution for |e1| ≤ slip [m] and |e2| ≤ rate [m/s]."""
     last = slip / step
     low, high = implicit_step.slopes

@@ -139,14 +139,14 @@ class StickSlipProof(Proof[StickSlipClaims]):
         stress = self.task.normal_stress - Fraction(self.claims.least_pressure)
         return self.task.area_per_mass[1] * stress
 
-    def recomputed(self) -> StickSlipClaims | NoProof:
+    def theorem_bounds(self) -> StickSlipClaims | NoProof:
         """Claims that the theorem gives."""
         try:
             return stick_slip_bounds(self.task, self.sampled_loop, self.invariant_set)
         except ParameterError as error:
             return NoProof(reason=str(error))
 
-    def supported(self, bounds: StickSlipClaims) -> bool:
+    def follows_from(self, bounds: StickSlipClaims) -> bool:
         """Whether the claims follow, and the task's disturbance includes the healing."""
         return self.claims.follow(bounds) and self.healing >= 0 and self.disturbance >= 0
 

@@ -84,7 +84,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, fraction_of, shortly
 from quakedesign.files import Json
 from quakedesign.guarantees.exact.norms import absolute, ball, majorant, matrix
-from quakedesign.guarantees.exact.small_gain import holds
+from quakedesign.guarantees.exact.small_gain import sector_is_valid
 from quakedesign.guarantees.exact.tracking_proof import above
 from quakedesign.laws.implicit_root import ImplicitStep
 from quakedesign.laws.stick_slip_law import StickSlipLaw
@@ -924,7 +924,7 @@ def _bounds(task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: Sti
     behind, before = lag + sampled_loop.slip_noise + moved, ahead - sampled_loop.slip_noise + moved
     if sampled_loop.law.pull:
         root = ImplicitStep(pull=sampled_loop.law.pull)
-        if not holds(root, sampled_loop.step, *sampled_loop.errors(task, max(behind, before), rate)):
+        if not sector_is_valid(root, sampled_loop.step, *sampled_loop.errors(task, max(behind, before), rate)):
             raise ParameterError("the implicit step may not be deadbeat everywhere in the polytope")
     feedback = feedback_range(task, sampled_loop, invariant_set)
     plant = ranges(task, ahead + moved, feedback, rate * sampled_loop.longest)

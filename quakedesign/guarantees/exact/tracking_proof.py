@@ -132,9 +132,9 @@ class Claims:
     def follow(self, task: FaultPlant, bounds: Bounds) -> bool:
         """Whether the claims follow from the bounds, and the fault stays closed."""
         tightest = Claims.of(task, bounds)
-        return self.covers(tightest) and not tightest.opens(task)
+        return self.covers(tightest) and not tightest.opening_reason(task)
 
-    def opens(self, task: FaultPlant) -> str:
+    def opening_reason(self, task: FaultPlant) -> str:
         """Reason why the fault may open; empty if the pressure stays below σ′."""
         if self.largest_pressure < task.normal_stress:
             return ""
@@ -295,7 +295,7 @@ class TrackingProof(Proof[Bounds]):
         """Law for `simulate` with its limit against windup."""
         return replace(self.sampled_loop.controller, rest_limit=self.rest_limit)
 
-    def recomputed(self) -> Bounds | NoProof:
+    def theorem_bounds(self) -> Bounds | NoProof:
         """Bounds that the theorem gives."""
         if self.varying_gain is None:
             return _bounds(self.task, self.sampled_loop, self.loop, self.invariant_set)
@@ -304,7 +304,7 @@ class TrackingProof(Proof[Bounds]):
             return gains
         return _bounds_with_varying_gain(self.task, self.sampled_loop, self.varying_gain, gains, self.claims.slip_error)
 
-    def supported(self, bounds: Bounds) -> bool:
+    def follows_from(self, bounds: Bounds) -> bool:
         """Whether the claims follow, and respect the sector of an implicit step and the limits of the pump."""
         return (
             _step_within(self.task, self.sampled_loop, self.claims)
@@ -392,11 +392,11 @@ def guarantee(
     ramp, longest = _FIRST * sampled_loop.step, sampled_loop.longest_ramp
     proof = _proved(task, replace(sampled_loop, ramp=ramp), varying_gain)
     for _ in range(_RAMPS):
-        if proof.available or proof.needs is None or ramp == longest:
+        if proof.available or proof.required_change is None or ramp == longest:
             break
-        if slow := sampled_loop.pump.too_slow(UpperBound(proof.needs), longest):
+        if slow := sampled_loop.pump.too_slow(UpperBound(proof.required_change), longest):
             return replace(proof, reason=slow)
-        ramp = min(above(proof.needs / sampled_loop.pump.rate * _RAMP_ROOM), longest)
+        ramp = min(above(proof.required_change / sampled_loop.pump.rate * _RAMP_ROOM), longest)
         proof = _proved(task, replace(sampled_loop, ramp=ramp), varying_gain)
     return proof
 
@@ -421,11 +421,13 @@ def _of_claims(
     if not _step_within(task, sampled_loop, claims):
         errors = f"errors up to {claims.slip_error:.3g} m and {claims.slip_rate_error:.3g} m/s"
         return NoProof(reason=f"the implicit step leaves its sector at {errors}")
-    if reason := claims.opens(task) or _beyond_the_pump(sampled_loop, claims):
+    if reason := claims.opening_reason(task) or _beyond_the_pump(sampled_loop, claims):
         slow = sampled_loop.pump is not None and bool(
             sampled_loop.pump.too_slow(claims.largest_step, sampled_loop.ramp)
         )
-        return NoProof(reason=reason, needs=claims.largest_step if slow else None, pressed=not slow)
+        return NoProof(
+            reason=reason, required_change=claims.largest_step if slow else None, only_pressure_fails=not slow
+        )
     return TrackingProof(
         task=task, sampled_loop=sampled_loop, claims=claims, varying_gain=varying_gain, invariant_set=invariant_set
     )
@@ -488,7 +490,7 @@ def _step_within(task: FaultPlant, sampled_loop: SampledLoop, claims: Claims) ->
     """Whether the sector of an implicit step, if there is one, is valid within the claims."""
     root = sampled_loop.law.implicit_step
     errors = sampled_loop.measured_errors(task, (claims.slip_error, claims.slip_rate_error))
-    return root is None or small_gain.holds(root, sampled_loop.step, *errors)
+    return root is None or small_gain.sector_is_valid(root, sampled_loop.step, *errors)
 
 
 def _beyond_the_pump(sampled_loop: SampledLoop, claims: Claims) -> str:
@@ -578,11 +580,11 @@ class ContinuousProof(Proof[Bounds]):
         """Claims by name, SI."""
         return self.claims.by_name
 
-    def recomputed(self) -> Bounds | NoProof:
+    def theorem_bounds(self) -> Bounds | NoProof:
         """Bounds that the theorem gives."""
         return _continuous_bounds(self.task, self.law)
 
-    def supported(self, bounds: Bounds) -> bool:
+    def follows_from(self, bounds: Bounds) -> bool:
         """Whether the claims follow, and the fault stays closed."""
         return self.claims.follow(self.task, bounds)
 
@@ -608,7 +610,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | 
     if not bounds.available:
         return bounds
     claims = Claims.of(task, bounds).rounded()
-    if reason := claims.opens(task):
+    if reason := claims.opening_reason(task):
         return NoProof(reason=reason)
     return ContinuousProof(task=task, law=law, claims=claims)
 

@@ -96,8 +96,8 @@ class _Floats:
             rows=np.array(list(loop.outputs.values()), dtype=float),
             inputs=np.array([loop.inputs.get(channel.name, none) for channel in channels], dtype=float),
             sampled=np.array([loop.sampled.get(channel.name, none) for channel in channels], dtype=float),
-            own=np.array([float(channel.own) for channel in channels]),
-            shares=np.array([[float(channel.shares.get(y, 0)) for y in loop.outputs] for channel in channels]),
+            own=np.array([float(channel.constant) for channel in channels]),
+            shares=np.array([[float(channel.coefficients.get(y, 0)) for y in loop.outputs] for channel in channels]),
             interval=(float(sampled_loop.step), float(sampled_loop.longest_step)),
             force=0.0 if task.change is None else float(task.amplitude),
         )

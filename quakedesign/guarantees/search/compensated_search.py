@@ -24,16 +24,16 @@ from quakedesign.fault.model import require_ordinary
 from quakedesign.files import Json
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
-from quakedesign.guarantees.exact.small_gain import Bounds, holds
+from quakedesign.guarantees.exact.small_gain import Bounds, sector_is_valid
 from quakedesign.guarantees.exact.stick_slip_proof import FaultProof, StickSlipProof
 from quakedesign.guarantees.exact.stick_slip_set import SampledStickSlip
 from quakedesign.guarantees.exact.tracking_proof import TrackingProof, guarantee
-from quakedesign.guarantees.search.float_bounds import BoundsEstimate, closeness, estimated, spectral_radius
+from quakedesign.guarantees.search.float_bounds import BoundsEstimate, distance, estimated, spectral_radius
 from quakedesign.guarantees.search.linear_design import (
     MOST_DELAY,
     OBJECTIVES,
     Closest,
-    Kind,
+    LawSearch,
     Longest,
     best_guarantee,
     search_near,
@@ -257,7 +257,7 @@ def compensated(
         if near is None or not near.bounds.available:
             continue
         errors = near.bounds.slip_error + sampled_loop.slip_noise, near.bounds.slip_rate_error + sampled_loop.rate_noise
-        within = holds(implicit_step, step, *errors)
+        within = sector_is_valid(implicit_step, step, *errors)
         proof = guarantee(task, wider) if within else None
         if proof is not None and proof.available:
             return proof
@@ -306,7 +306,7 @@ def _made(
 
 
 @dataclass(frozen=True, slots=True)
-class Deadbeat(Kind):
+class Deadbeat(LawSearch):
     """Sliding modes in the scheme ``compensated``; numbers: weight, B0 over the midpoint."""
 
     controller: SlidingMode
@@ -324,7 +324,7 @@ class Deadbeat(Kind):
             if not (0 < x[0] <= 1 and _BESIDE[0] <= x[1] <= _BESIDE[1]):
                 return 2 * _WORST
             sampled_loop = self.sampled_loop(task, x, step, setup=setup)
-            value = closeness(task, sampled_loop)[0]
+            value = distance(task, sampled_loop)[0]
             return value if value < _WORST else _WORST + min(spectral_radius(sampled_loop.loop(task)), 1.0)
 
         question = "nearly deadbeat", task, step, setup
@@ -351,19 +351,19 @@ class Deadbeat(Kind):
     def made(self, task: FaultPlant, step: Fraction, numbers: np.ndarray, setup: ExactSetup = PLAIN) -> Compensation:
         """Controller with these numbers, and its guarantee."""
         (weight, authority), sampled_loop = _settled(task, numbers), self.sampled_loop(task, numbers, step, setup=setup)
-        bounds = closeness(task, sampled_loop)[1]
+        bounds = distance(task, sampled_loop)[1]
         noise = setup.slip_noise, setup.rate_noise
         errors = None if bounds is None else (bounds.slip_error + noise[0], bounds.slip_rate_error + noise[1])
         return _made(task, self.controller, step, (weight, authority, errors), setup)
 
-    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
+    def low_pressure_loop(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
         """Loop with the smallest peak."""
         weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, setup=setup)
         law = _made(task, self.controller, step, (weight, authority, errors), setup).controller
         implicit_step = ImplicitStep(pull=implicit_pull(law, step, authority))
         return None if errors is None else _sampled(implicit_step, weight, authority, step, setup)
 
-    def continued(
+    def design_near_longer_step(
         self, task: FaultPlant, step: Fraction, longest: Longest | None, setup: ExactSetup = PLAIN
     ) -> Compensation | None:
         """Design for a T_s [s] up to the longest, near given numbers; None without a proof."""
@@ -595,7 +595,7 @@ def _smallest_scale(
 
     def deadbeat(slope: Fraction, implicit_step: Fraction) -> bool:
         pull = implicit_pull(controller.scaled(implicit_step**6), step, authority)
-        return holds(ImplicitStep(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
+        return sector_is_valid(ImplicitStep(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
 
     for slope in slopes:
         index = bisect_left(_ROOTS, True, key=partial(deadbeat, slope))

@@ -24,8 +24,8 @@ from quakedesign.guarantees.search.compensated_search import (
     sticking_loop,
 )
 from quakedesign.guarantees.search.linear_design import (
-    continued,
     design_at,
+    design_near_longer_step,
     design_sampled_law,
     longest_delay,
     longest_step,
@@ -109,7 +109,7 @@ def sampled_design(
     proof = design_sampled_law(task, step, objective=objective, **wanted)
     longest = longest_step(task, **wanted)
     if not proof.available:
-        proof = continued(task, step, longest, **wanted) or proof
+        proof = design_near_longer_step(task, step, longest, **wanted) or proof
     reason = proof.reason if not proof.available else ""
     if not proof.available and longest is not None:
         proof = design_at(task, longest)
@@ -143,7 +143,7 @@ def sampled_sliding_mode(
     made = design_compensated(task, law, step, objective=objective, setup=setup)
     longest = longest_step(task, kind=laws, setup=setup)
     if not made.proof.available:
-        made = laws.continued(task, step, longest, setup=setup) or made
+        made = laws.design_near_longer_step(task, step, longest, setup=setup) or made
     reason = made.proof.reason if not made.proof.available else ""
     if reason and longest is not None:
         made = laws.at(task, longest, objective)

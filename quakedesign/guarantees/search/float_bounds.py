@@ -75,7 +75,7 @@ def slowly_estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstim
             return None
         every.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
     whole = {key: tuple(v for gains in every for v in gains[key]) for key in every[0]}
-    spread = GainSpread(half=_SPREAD * (high - low), aged=Fraction(0))
+    spread = GainSpread(present=_SPREAD * (high - low), past=Fraction(0))
     bounds = bounds_from(
         task,
         whole,
@@ -88,7 +88,7 @@ def slowly_estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstim
     return BoundsEstimate(bounds, max(whole["slip_error", "drift"]))
 
 
-def closeness(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bounds | None]:
+def distance(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bounds | None]:
     """Small gain [-] with bounds if a proof is expected; else 1 + the small gain at zero error.
 
     For friction that depends on the slip alone the input gain varies slowly. Its deviation depends on the bound of the
@@ -98,7 +98,7 @@ def closeness(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bound
     if task.friction.rate_slope:
         values = estimated(task, sampled_loop)
         bounds = None if values is None else values.bounds
-        return _closeness(bounds, inf if bounds is None else _small(bounds))
+        return _distance(bounds, inf if bounds is None else _small(bounds))
     whole: dict[tuple[str, str], tuple[float, ...]] = {}
     for model in (PARTS.models(task)[0], PARTS.models(task)[-1]):
         gains = gains_of(sampled_loop.loop(task, model))
@@ -108,7 +108,7 @@ def closeness(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bound
     whole |= {(y, "aged"): values for (y, name), values in whole.items() if name == "acceleration"}
     slip_error, least = 0.0, inf
     for turn in range(_TURNS):
-        spread = replace(PARTS.spread(task, Fraction(slip_error)), aged=Fraction(0))
+        spread = replace(PARTS.spread(task, Fraction(slip_error)), past=Fraction(0))
         bounds = bounds_from(
             task,
             whole,
@@ -120,21 +120,21 @@ def closeness(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bound
         )
         least = min(least, _small(bounds))
         if not bounds.available or bounds.slip_error <= slip_error:
-            return _closeness(bounds, least)
+            return _distance(bounds, least)
         slip_error = max(1.01 * float(bounds.slip_error), _LEAP * slip_error * (turn >= _FEW))
-    return _closeness(None, least)
+    return _distance(None, least)
 
 
-def closeness_of_bounds(bounds: Bounds | NoProof) -> tuple[float, Bounds | None]:
+def distance_of_bounds(bounds: Bounds | NoProof) -> tuple[float, Bounds | None]:
     """Closeness of given bounds."""
-    return _closeness(bounds, _small(bounds))
+    return _distance(bounds, _small(bounds))
 
 
 def _small(bounds: Bounds | NoProof) -> float:
     return inf if bounds.small_gain is None else float(bounds.small_gain)
 
 
-def _closeness(bounds: Bounds | NoProof | None, least: float) -> tuple[float, Bounds | None]:
+def _distance(bounds: Bounds | NoProof | None, least: float) -> tuple[float, Bounds | None]:
     return (_small(bounds), bounds) if bounds is not None and bounds.available else (1 + least, None)
 
 
@@ -152,7 +152,7 @@ def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | N
     values = {
         (y, name): tuple(line) for name, part in lines.items() for y, line in zip(loop.outputs, part, strict=True)
     }
-    return values | {key: tuple(v + float(size) for v in values[key]) for key, size in loop.at_once.items()}
+    return values | {key: tuple(v + float(size) for v in values[key]) for key, size in loop.feedthrough.items()}
 
 
 class _FloatMatrix(np.ndarray):
@@ -200,7 +200,12 @@ def _slowest(period: _FloatMatrix) -> SlowestMode:
         raise unstable()
     doublings = int(np.ceil(np.log2(max(np.log(_FORGOTTEN) / np.log(max(others, 0.1)), 2))))
     left = decay**2**doublings / (1 - decay)
-    return SlowestMode(doublings=doublings, seen=floats(seen[None]), along=floats(along[:, None]), left=left)
+    return SlowestMode(
+        doublings=doublings,
+        left_eigenvector=floats(seen[None]),
+        right_eigenvector=floats(along[:, None]),
+        remainder=left,
+    )
 
 
 FLOATS: Arithmetic = cast("Any", Arithmetic)(

@@ -36,8 +36,8 @@ from quakedesign.guarantees.search.aperiodic_search import aperiodic_guarantee, 
 from quakedesign.guarantees.search.float_bounds import (
     PARTS,
     BoundsEstimate,
-    closeness,
-    closeness_of_bounds,
+    distance,
+    distance_of_bounds,
     estimated,
     own_poles,
     short,
@@ -77,7 +77,7 @@ def best_guarantee(task: FaultPlant, sampled_loop: SampledLoop) -> TrackingProof
         return proof
     anyhow = guarantee(task, sampled_loop)
     return (
-        anyhow if anyhow.available or anyhow.pressed else proof
+        anyhow if anyhow.available or anyhow.only_pressure_fails else proof
     )  # the pressure is easier to reduce than the small-gain factor
 
 
@@ -141,14 +141,14 @@ class Closest:
     sampled_loop : SampledLoop
     """
 
-    closeness: float
+    distance: float
     numbers: np.ndarray
     sampled_loop: SampledLoop
 
     @property
     def small_gain(self) -> float:
         """Small gain at zero errors, or at the fixed point of the errors [-]."""
-        return self.closeness if self.closeness < 1 else self.closeness - 1
+        return self.distance if self.distance < 1 else self.distance - 1
 
 
 def closest(
@@ -251,7 +251,7 @@ def design_sampled_law(
         limit = (allowance or laws.allowance) * float(seen.bounds.slip_rate_error)
         _, x = min((laws.least_drift(start, limit) for start in (x, starts[1])), key=lambda reached: reached[0])
     proof = best_guarantee(task, laws.sampled_loop(x))
-    if not proof.available and seen is not None and seen.bounds.available and proof.pressed:
+    if not proof.available and seen is not None and seen.bounds.available and proof.only_pressure_fails:
         leaner = best_guarantee(task, laws.sampled_loop(laws.least_pressure(x)[1]))
         proof = leaner if leaner.available else proof
     noise = {name: v for name, v in laws.template.noise.items() if v}
@@ -336,9 +336,9 @@ class _Laws:
         """Closeness to a guarantee, and the bounds if one is expected."""
         if self.template.longest_step:
             seen = self.seen(x)
-            return (inf, None) if seen is None else closeness_of_bounds(seen.bounds)
+            return (inf, None) if seen is None else distance_of_bounds(seen.bounds)
         try:
-            return closeness(self.task, self.sampled_loop(x)) if self.family.admits(x) else (inf, None)
+            return distance(self.task, self.sampled_loop(x)) if self.family.admits(x) else (inf, None)
         except LinAlgError:  # of a Riccati equation
             return inf, None
 
@@ -514,7 +514,7 @@ DesignProblem = tuple[FaultPlant, Fraction, ExactSetup]
 """Task, T_s [s] and loop setup of a design."""
 
 
-class Kind(ABC):
+class LawSearch(ABC):
     """A family of laws for a search for the largest feasible value of a quantity."""
 
     @abstractmethod
@@ -526,12 +526,12 @@ class Kind(ABC):
         """Proof about a law that is close enough to a guarantee."""
 
     @abstractmethod
-    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
+    def low_pressure_loop(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
         """Loop of a law with small pressure changes; None without a law."""
 
 
 @dataclass(frozen=True, slots=True)
-class Linear(Kind):
+class LinearLawSearch(LawSearch):
     """Linear laws with a disturbance estimate from the measurements."""
 
     measured: str = MEASURED[0]
@@ -544,7 +544,7 @@ class Linear(Kind):
         """Proof with a slowly varying input gain if that helps."""
         return best_guarantee(task, candidate.sampled_loop)
 
-    def leanest(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
+    def low_pressure_loop(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
         """Loop with the smallest change of pressure near the smallest peak."""
         laws = _Laws.of(task, step, self.measured, setup)
         if isinstance(laws, NoProof):
@@ -554,7 +554,7 @@ class Linear(Kind):
 
 
 def longest_step(
-    task: FaultPlant, *, measured: str = MEASURED[0], kind: Kind | None = None, setup: ExactSetup = PLAIN
+    task: FaultPlant, *, measured: str = MEASURED[0], kind: LawSearch | None = None, setup: ExactSetup = PLAIN
 ) -> Longest | None:
     """Guarantee at nearly the longest T_s that has one; None if the search fails.
 
@@ -569,7 +569,7 @@ def longest_step(
         Kind of the laws; linear ones unless given.
     """
     late = sum(map(float, setup.path.values()))
-    return _farthest(kind or Linear(measured), lambda step: (task, step, setup), _first_step(task, late), None)
+    return _farthest(kind or LinearLawSearch(measured), lambda step: (task, step, setup), _first_step(task, late), None)
 
 
 def _first_step(task: FaultPlant, late: float = 0.0) -> Fraction:
@@ -580,7 +580,7 @@ def _first_step(task: FaultPlant, late: float = 0.0) -> Fraction:
     return Fraction(f"{_SHARE / pace / (1 + pace * late):.3g}")
 
 
-def continued(
+def design_near_longer_step(
     task: FaultPlant,
     step: Fraction,
     longest: Longest | None,
@@ -609,7 +609,7 @@ def longest_delay(
     step: Fraction,
     *,
     measured: str = MEASURED[0],
-    kind: Kind | None = None,
+    kind: LawSearch | None = None,
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
     """Guarantee with nearly the longest delay, at most 7 periods; None if the search fails."""
@@ -617,11 +617,11 @@ def longest_delay(
     def problem_with(delay: Fraction) -> DesignProblem:
         return task, step, replace(setup, delay=delay)
 
-    longest = _farthest(kind or Linear(measured), problem_with, Fraction(0), MOST_DELAY * step, unit=step / 2)
+    longest = _farthest(kind or LinearLawSearch(measured), problem_with, Fraction(0), MOST_DELAY * step, unit=step / 2)
     return None if longest is None else longest.guarantee
 
 
-def farthest_rock(
+def longest_diffusion_time(
     task: FaultPlant, step: Fraction, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | None:
     """Guarantee with nearly the largest L²/D of a diffusion path; None if the search fails."""
@@ -629,7 +629,7 @@ def farthest_rock(
     def problem_with(time: Fraction) -> DesignProblem:
         return task, step, replace(setup, diffusion=time)
 
-    farthest = _farthest(Linear(measured), problem_with, max(_first_step(task), step), None)
+    farthest = _farthest(LinearLawSearch(measured), problem_with, max(_first_step(task), step), None)
     return None if farthest is None else farthest.guarantee
 
 
@@ -638,7 +638,7 @@ def nearest_setup(
     step: Fraction,
     *,
     measured: str = MEASURED[0],
-    kind: Kind | None = None,
+    kind: LawSearch | None = None,
     pressed: bool = False,
     setup: ExactSetup = PLAIN,
 ) -> tuple[str, TrackingProof] | None:
@@ -649,7 +649,7 @@ def nearest_setup(
     of `LIMITING` without which a design has a guarantee at T_s; None if there is none. For a pump rate the value is
     nearly the lowest sufficient one, for the box a factor of all half-widths.
     """
-    laws = kind or Linear(measured)
+    laws = kind or LinearLawSearch(measured)
     if pressed and (less := _less_pressed(laws, task, step, setup)) is not None:
         return less
     pump = setup.pump
@@ -697,9 +697,11 @@ def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fr
     return first, second, third
 
 
-def _less_pressed(laws: Kind, task: FaultPlant, step: Fraction, setup: ExactSetup) -> tuple[str, TrackingProof] | None:
+def _less_pressed(
+    laws: LawSearch, task: FaultPlant, step: Fraction, setup: ExactSetup
+) -> tuple[str, TrackingProof] | None:
     """Smallest pump, or largest disturbance, for which a low-pressure law is proved."""
-    pump, sampled_loop = setup.pump, laws.leanest(task, step, setup=setup)
+    pump, sampled_loop = setup.pump, laws.low_pressure_loop(task, step, setup=setup)
     if sampled_loop is None:
         return None
     if pump is not None and pump.limits is not None:
@@ -741,7 +743,7 @@ def with_lowest_rate(proof: TrackingProof) -> TrackingProof:
 
 
 def _farthest(
-    laws: Kind,
+    laws: LawSearch,
     problem_with: Callable[[Fraction], DesignProblem],
     first: Fraction,
     most: Fraction | None,
@@ -784,7 +786,7 @@ def _farthest(
                 return None
             bad, before = (time, small), small
         open_end = (_LOOSE if unit else _CLOSE) * bad[0] if bad is not None else Fraction(0)
-        edge = good is not None and good.closeness > _EDGE and not unit
+        edge = good is not None and good.distance > _EDGE and not unit
         if good is not None and (at == most or edge or (bad is not None and bad[0] - at <= open_end)):
             break
         time = _time_between(good, at, bad, most, unit)
@@ -801,7 +803,7 @@ def _farthest(
 
 
 def _within(candidate: Closest | NoProof) -> bool:
-    return isinstance(candidate, Closest) and candidate.closeness < 1
+    return isinstance(candidate, Closest) and candidate.distance < 1
 
 
 def _time_between(

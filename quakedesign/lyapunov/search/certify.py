@@ -224,7 +224,7 @@ class Bracket:
     # Smallest number at which it failed; None if none was tried, as a limit makes a trial unnecessary
     high: Fraction | None = None
     best: Screened | None = None  # Solution at `low`
-    answers: int = 0  # Number of evaluations
+    evaluations: int = 0  # Number of evaluations
 
     def closed(self, limit: Fraction | None) -> bool:
         """Whether `low` is within the tolerance of `high` or of a limit."""
@@ -234,12 +234,12 @@ class Bracket:
     def updated(self, x: Fraction, answer: Screened | None) -> "Bracket":
         """Bracket after one more evaluation."""
         if answer is not None and answer.feasible:
-            return Bracket(low=x, high=self.high, best=answer, answers=self.answers + 1)
-        return Bracket(low=self.low, high=x, best=self.best, answers=self.answers + 1)
+            return Bracket(low=x, high=self.high, best=answer, evaluations=self.evaluations + 1)
+        return Bracket(low=self.low, high=x, best=self.best, evaluations=self.evaluations + 1)
 
 
 def last_success(
-    ask: Callable[[Fraction], tuple[Screened | None, float]],
+    evaluate: Callable[[Fraction], tuple[Screened | None, float]],
     first: Fraction,
     *,
     floor: Fraction = Fraction(0),
@@ -271,7 +271,7 @@ def last_success(
     """
     bracket, x = Bracket(), first
     for _ in range(_MOST):
-        answer, slope = ask(x)
+        answer, slope = evaluate(x)
         bracket = bracket.updated(x, answer)
         enough = most is not None and bracket.low is not None and bracket.low >= most
         if bracket.closed(limit) or enough or bracket.high == floor or (only_above and bracket.low is None):
@@ -291,12 +291,12 @@ def _root(x: Fraction, answer: Screened | None, slope: float) -> Fraction | None
 def _next(bracket: Bracket, x: Fraction, root: Fraction | None, floor: Fraction, limit: Fraction | None) -> Fraction:
     """Next number to try: near the tangent's root, on the side where the bracket needs an end; else the middle."""
     low, high = bracket.low, bracket.high
-    astray = root is None or root <= floor or bracket.answers > _BELIEVED
-    if low is None and bracket.answers > 1 and astray:
+    astray = root is None or root <= floor or bracket.evaluations > _BELIEVED
+    if low is None and bracket.evaluations > 1 and astray:
         return floor
     ceiling = None if limit is None else first_below(limit)
     middle = _middle(x, low, high, floor, ceiling)
-    if root is None or (bracket.answers > _BELIEVED and bracket.answers % 3 == 0):
+    if root is None or (bracket.evaluations > _BELIEVED and bracket.evaluations % 3 == 0):
         return middle
     near = abs(root - x) < _NEAR * x
     guess = root * (1 - _BELOW) if not near or x == high else root * (1 + _ABOVE)
@@ -486,7 +486,7 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
     return min(limits, default=None)
 
 
-def against(loop: Loop, refuted: Certificate | None) -> str:
+def counterexample_kind(loop: Loop, refuted: Certificate | None) -> str:
     """Kind of counterexample to a loop without a proof.
 
     ``"exact"`` for a given equilibrium away from the origin, ``"simulated"`` for a growing run, else ``"none"``.
@@ -517,7 +517,7 @@ def _largest(line: _Line, subject: Subject, degrees: tuple[int, ...], began: flo
     if certificate is None:
         loop = line.at(line.floor)
         certificate = refute(loop, subject)
-        kind = against(loop, certificate)
+        kind = counterexample_kind(loop, certificate)
     return CertifiedLimit(
         quantity=line.quantity,
         value=value,

@@ -74,7 +74,9 @@ def test_inputs_beside_the_disturbance_have_the_bounds_of_the_reference():
         "start": (F(1), {}),
         "late": (F(0), {"stepped": F(1)}),
     }
-    found = {channel.name: (channel.own, channel.shares) for channel in reference_channels(TASK, set(expected))}
+    found = {
+        channel.name: (channel.constant, channel.coefficients) for channel in reference_channels(TASK, set(expected))
+    }
     assert found == expected
     assert len({rates[0], rates[1], jerk, F(0)}) == 4
     for name in expected:
@@ -85,10 +87,10 @@ def test_inputs_beside_the_disturbance_have_the_bounds_of_the_reference():
 def test_the_truncation_error_of_a_layer_acts_where_the_pressure_does(fades):
     """As an input of its own where it fades after each step, otherwise within the acceleration."""
     push, slip = {"push": F(1, 3)}, {"slip_error": F(1, 5)}
-    channels = [Channel(name="acceleration", own=F(7), shares=push), Channel(name="aged", own=F(2), shares=push),
-                Channel(name="drift", own=F(1), shares=slip)]  # fmt: skip
+    given = (("acceleration", F(7), push), ("aged", F(2), push), ("drift", F(1), slip))
+    channels = [Channel(name=name, constant=own, coefficients=shares) for name, own, shares in given]
     gains = {("left_out", "left_out"): (F(1),)} if fades else {}
-    found = {channel.name: (channel.own, dict(channel.shares)) for channel in through_layer(channels, gains)}
+    found = {channel.name: (channel.constant, dict(channel.coefficients)) for channel in through_layer(channels, gains)}
     left = {"left_out": F(1, 3)}
     assert found["acceleration"] == (7, push if fades else push | left)
     assert found["aged"] == (2, push | left)
@@ -225,9 +227,9 @@ def test_a_negative_input_of_a_sector_proves_nothing():
 def test_a_claim_may_be_as_large_as_its_bound():
     proof = read_guarantee(PENDULUM)
     bounds = (*proof.claims.outputs, *proof.claims.controls)
-    assert proof.supported(bounds)
+    assert proof.follows_from(bounds)
     for i, bound in enumerate(bounds):
-        assert not proof.supported((*bounds[:i], bound + F(1, 10**9), *bounds[i + 1 :]))
+        assert not proof.follows_from((*bounds[:i], bound + F(1, 10**9), *bounds[i + 1 :]))
 
 
 def test_a_statement_about_a_plant_names_nothing_that_is_absent():
@@ -314,9 +316,9 @@ def test_a_statement_about_the_stick_slip_plant_names_what_it_covers():
 def test_a_claim_with_more_healing_than_disturbance_is_undecided(healing):
     """The stated disturbance, less the healing, would be negative; or the healing itself is."""
     proof = load_guarantee(FOLDER / "stick_slip_real-fault.json")
-    assert proof.supported(proof.claims)
-    assert not replace(proof, healing=healing).supported(proof.claims)
-    assert not proof.supported(replace(proof.claims, slip_ahead=UpperBound(proof.claims.slip_ahead + F(1, 10**9))))
+    assert proof.follows_from(proof.claims)
+    assert not replace(proof, healing=healing).follows_from(proof.claims)
+    assert not proof.follows_from(replace(proof.claims, slip_ahead=UpperBound(proof.claims.slip_ahead + F(1, 10**9))))
 
 
 def test_a_statement_about_slow_sliding_names_what_it_covers():

@@ -193,11 +193,15 @@ def test_without_disturbance_and_ranges_the_claims_are_the_peaks_of_the_free_res
     found = guarantee(still, held)
     ways = [np.array([1e-5, 4e-5]), np.array([1e-5, -4e-5])]
     seen = np.max([abs(exact_course(held, still.model, still.authority, e, 60)) for e in ways], axis=(0, 1))
-    claimed = np.array([found.claims.slip_error, found.claims.slip_rate_error, found.recomputed().push], dtype=float)
+    claimed = np.array(
+        [found.claims.slip_error, found.claims.slip_rate_error, found.theorem_bounds().push], dtype=float
+    )
     assert np.all(seen <= claimed)
     assert np.all(claimed <= 1.004 * seen)
     half = guarantee(still, replace(held, initial_slip=F("0.5e-5"), initial_slip_rate=F("2e-5")))
-    assert float(half.recomputed().slip_error) == pytest.approx(float(found.recomputed().slip_error) / 2, rel=1e-12)
+    assert float(half.theorem_bounds().slip_error) == pytest.approx(
+        float(found.theorem_bounds().slip_error) / 2, rel=1e-12
+    )
 
 
 def test_a_larger_start_is_guaranteed_less_and_none_is_rest():
@@ -207,7 +211,7 @@ def test_a_larger_start_is_guaranteed_less_and_none_is_rest():
     for name in ("slip_error", "slip_rate_error", "peak_slip_rate", "largest_pressure"):
         assert getattr(rest.claims, name) < getattr(near.claims, name) < getattr(far.claims, name)
     assert near.claims.least_pressure < rest.claims.least_pressure
-    assert near.recomputed().small_gain == pytest.approx(float(rest.recomputed().small_gain), rel=1e-3)
+    assert near.theorem_bounds().small_gain == pytest.approx(float(rest.theorem_bounds().small_gain), rel=1e-3)
     assert rest.sentence().startswith("on the plant without stick, from rest, with zero-order hold over")
     assert near.sentence().startswith(
         "on the plant without stick, from every initial state within 1e-05 m and 4e-05 m/s of rest, with zero"

@@ -110,7 +110,7 @@ NOISY = edited(
 
 
 def both_bounds(raw):
-    ours = parse_guarantee(json.dumps(raw)).recomputed()
+    ours = parse_guarantee(json.dumps(raw)).theorem_bounds()
     task = checker.read_task(raw)
     loop = checker.read_loop(raw["loop"], task, [F(0)] * 2)
     peaks, small = checker.bounds_within(task, loop, checker.read_reach(raw["reach"], loop))
@@ -256,7 +256,7 @@ def test_other_files_have_no_longest_interval(name, longest, said):
 def test_what_is_wrong_with_a_set_is_said():
     alike = changed(("reach", "at_samples", 3, 2), lambda basis: [basis[0]] * len(basis))
     assert "must be independent" in standalone(alike)
-    assert "must be linearly independent" in parse_guarantee(json.dumps(alike)).recomputed().reason
+    assert "must be linearly independent" in parse_guarantee(json.dumps(alike)).theorem_bounds().reason
     assert "bounds of the inputs must be" in standalone(changed(("reach", "inputs", 0), "-1"))
     for new, said in (
         (lambda lines: [line * 5 for line in lines], "must have 1 to 32 pieces"),
@@ -391,7 +391,7 @@ def test_a_set_that_is_left_by_a_hundred_thousandth_is_refused_by_both():
     beyond = [max(bounds) for bounds in zip(*rows_of(left, len(left["reach"]["facets"])), strict=True)]
     assert all(1 < bound < 1 + 1e-4 for bound in beyond)
     assert "must stay in the set" in standalone(left)
-    assert "may leave the set" in parse_guarantee(json.dumps(left)).recomputed().reason
+    assert "may leave the set" in parse_guarantee(json.dumps(left)).theorem_bounds().reason
 
 
 @pytest.mark.parametrize(

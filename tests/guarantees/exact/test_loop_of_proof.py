@@ -81,7 +81,7 @@ def test_the_loop_of_another_model_has_the_input_gain_of_that_model_behind_a_dif
     """The response that is left out acts on the fault by the input gain, so twice as much with twice the gain."""
     held = replace(HELD, lag=F(1, 10), diffusion=F(1, 50))
     other = replace(TASK.model, gain=2 * TASK.model.gain)
-    own, found = (held.loop(TASK, model).at_once["slip_rate_error", "awaited"] for model in (None, other))
+    own, found = (held.loop(TASK, model).feedthrough["slip_rate_error", "awaited"] for model in (None, other))
     assert found == 2 * own > 0
 
 
@@ -141,7 +141,7 @@ def test_the_shear_of_a_disturbance_is_that_which_is_covered_for_every_area_per_
 
 def test_a_proof_in_continuous_time_is_not_of_a_sampled_loop():
     assert (TrackingProof.sampled, ContinuousProof.sampled) == (True, False)
-    assert (TrackingProof.covers_healing, NONE.pressed) == (False, False)
+    assert (TrackingProof.covers_healing, NONE.only_pressure_fails) == (False, False)
 
 
 def test_a_file_states_a_pump_with_its_limits_and_the_ramp_of_its_rate():
@@ -218,7 +218,7 @@ def test_a_ramp_grows_to_what_the_pump_needs_and_no_further(rate, needs, ramps, 
     def proved(_, held, __):
         tried.append(held.ramp)
         ends = len(tried) == 2 and held.ramp < held.longest_ramp
-        return proof() if needs == 5 and (rate == 10**9 or ends) else replace(NONE, needs=needs)
+        return proof() if needs == 5 and (rate == 10**9 or ends) else replace(NONE, required_change=needs)
 
     monkeypatch.setattr(tracking_proof, "_proved", proved)
     found = guarantee(TASK, replace(HELD, pump=Pump(rate=rate)))
@@ -231,15 +231,15 @@ def test_a_result_tells_whether_the_pump_is_too_slow_or_the_pressure_too_large(m
     monkeypatch.setattr(tracking_proof, "certified_bounds", lambda *_: STEPPED)
     claims = Claims.of(TASK, STEPPED).rounded()
     slow = guarantee(TASK, replace(HELD, pump=Pump(rate=F(1)), ramp=F(1, 20)))
-    assert (slow.needs, slow.pressed) == (claims.largest_step, False)
+    assert (slow.required_change, slow.only_pressure_fails) == (claims.largest_step, False)
     small = guarantee(TASK, replace(HELD, pump=Pump(least=F(-1), largest=F(1))))
-    assert (small.needs, small.pressed) == (None, True)
+    assert (small.required_change, small.only_pressure_fails) == (None, True)
     monkeypatch.setattr(tracking_proof, "certified_bounds", lambda *_: replace(STEPPED, push=TASK.authority * 10**9))
     opened = guarantee(TASK, HELD)
-    assert (opened.needs, opened.pressed) == (None, True)
+    assert (opened.required_change, opened.only_pressure_fails) == (None, True)
 
 
 def test_a_claim_of_the_pressure_touches_the_effective_normal_stress_and_opens_the_fault():
     for size, opens in ((TASK.normal_stress, True), (TASK.normal_stress - 1, False)):
         claims = replace(CLAIMS, largest_pressure=UpperBound(F(size)), least_pressure=LowerBound(F(0)))
-        assert bool(claims.opens(TASK)) is opens
+        assert bool(claims.opening_reason(TASK)) is opens

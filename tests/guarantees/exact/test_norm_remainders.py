@@ -85,7 +85,7 @@ def test_a_sampled_input_lies_within_the_distance_of_its_chords():
 
 def test_the_direct_effect_of_an_input_is_added():
     plain = norms(chain((20, 0, -1)))["x", "w"]
-    direct = norms(chain((20, 0, -1), at_once={("x", "w"): F(1, 3)}))["x", "w"]
+    direct = norms(chain((20, 0, -1), feedthrough={("x", "w"): F(1, 3)}))["x", "w"]
     assert [a - b for a, b in zip(direct, plain, strict=True)] == [F(1, 3)] * 16
 
 

@@ -138,11 +138,11 @@ def test_inputs_must_stay_within_the_bounds_of_a_set(own, bound, small, monkeypa
     """|a| ≤ F + (1/2)·3 + 1·1 = F + 5/2, the second input has bound 0; the pressure is shifted by 1/3."""
     outputs = [F(3), F(1), F(4)]
     channels = (
-        Channel(name="acceleration", own=F(own), shares={"slip_error": F(1, 2), "slip_rate_error": F(1)}),
-        Channel(name="drift", own=F(0), shares={}),
+        Channel(name="acceleration", constant=F(own), coefficients={"slip_error": F(1, 2), "slip_rate_error": F(1)}),
+        Channel(name="drift", constant=F(0), coefficients={}),
     )
     monkeypatch.setattr(invariant_set, "channels_of", lambda *_: channels)
-    monkeypatch.setattr(invariant_set, "unshifted", lambda _: F(1, 3))
+    monkeypatch.setattr(invariant_set, "shift_bound", lambda _: F(1, 3))
     mapped = SimpleNamespace(of=lambda *_: SimpleNamespace(outputs=lambda *_: outputs))
     monkeypatch.setattr(invariant_set, "_SampleMap", mapped)
     held = SimpleNamespace(loop=lambda _: loop_of(), step=F(1), longest_step=F(2), noise={})

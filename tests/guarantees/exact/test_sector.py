@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from quakedesign.errors import ParameterError
-from quakedesign.guarantees.exact.small_gain import holds
+from quakedesign.guarantees.exact.small_gain import sector_is_valid
 from quakedesign.laws import ImplicitStep, Power
 
 STEP = F("0.2")
@@ -61,7 +61,7 @@ def test_what_is_shown_is_true_of_all_roots_and_what_is_true_by_a_margin_is_show
     u = np.linspace(0, float(F(size) / STEP), 400)
     above, below = (roots(q, u * float(STEP), sign * float(rate)) for sign in (1, -1))
     room = np.min([float(F(remainder)) - float(low) * u - above, below + float(high) * u + float(F(remainder))])
-    shown = holds(root, STEP, F(size), rate)
+    shown = sector_is_valid(root, STEP, F(size), rate)
     if shown:
         assert room >= -1e-12
     if room > 0.02 * float(F(size) / STEP):
@@ -72,16 +72,16 @@ def test_a_deadbeat_root_is_exact_where_the_sign_holds_it():
     """c3 ≥ R + u + c2·√u + c4 up to E/T keeps e1 + T·w at 0: for all smaller errors and, just beyond, no longer."""
     root = ImplicitStep(pull=twisting())
     last = F("0.001")  # 0.001 + 1.1·√0.001 = 0.0357854 of the 0.05 that both signs leave
-    assert holds(root, STEP, last * STEP, F("0.0142"))
-    assert not holds(root, STEP, last * STEP, F("0.0143"))
+    assert sector_is_valid(root, STEP, last * STEP, F("0.0142"))
+    assert not sector_is_valid(root, STEP, last * STEP, F("0.0143"))
 
 
 def test_a_factor_is_taken_at_the_end_that_hurts():
     root = ImplicitStep(pull=twisting())
     wide = tuple(Power(factor=(t.factor[0], t.factor[1] * F(3, 2)), exponent=t.exponent, argument=t.argument)
                  for t in root.pull)  # fmt: skip
-    assert not holds(ImplicitStep(pull=wide), STEP, F("0.001") * STEP, F("0.0142"))
-    assert holds(ImplicitStep(pull=wide), STEP, F("0.0001") * STEP, F("0.0005"))
+    assert not sector_is_valid(ImplicitStep(pull=wide), STEP, F("0.001") * STEP, F("0.0142"))
+    assert sector_is_valid(ImplicitStep(pull=wide), STEP, F("0.0001") * STEP, F("0.0005"))
 
 
 @pytest.mark.parametrize(

@@ -59,8 +59,8 @@ def test_the_spread_is_that_of_the_steeper_slope(slopes):
     """κ = 5·(3/2)/2, half a part 1/2; σ ≤ e^{ασ}/(eα), with four digits of 1/e from above."""
     friction = replace(FRICTION, weakening=F(slopes[0]), strengthening=F(slopes[1]))
     found = SLOW.spread(replace(BY_HAND, friction=friction), F(1, 3))
-    assert found.half == F(1, 2) + 2 * F(15, 4) / 3
-    assert found.aged == F(15, 4) * 2 * 9 * F(ceil(10**4 * exp(-1)), 10**4)
+    assert found.present == F(1, 2) + 2 * F(15, 4) / 3
+    assert found.past == F(15, 4) * 2 * 9 * F(ceil(10**4 * exp(-1)), 10**4)
 
 
 def loop_of(rate):
@@ -84,12 +84,14 @@ def test_gains_of_one_part_follow_those_of_the_other(monkeypatch):
 
 
 def test_a_spread_takes_the_place_of_the_half_range_and_brings_an_input_of_the_past():
-    spread = GainSpread(half=F(1, 3), aged=F(1, 5))
+    spread = GainSpread(present=F(1, 3), past=F(1, 5))
     plain, (first, *others) = channels_of(TASK, None, F(1)), channels_of(TASK, None, F(1), {}, spread)
-    assert first == replace(plain[0], shares={**TASK.half_ranges, "push": F(1, 3)})
+    assert first == replace(plain[0], coefficients={**TASK.half_ranges, "push": F(1, 3)})
     assert [channel.name for channel in plain] == ["acceleration", "drift"]
     assert others[0] == plain[1]
-    assert [(channel.name, channel.own, channel.shares) for channel in others[1:]] == [("aged", 0, {"push": F(1, 5)})]
+    assert [(channel.name, channel.constant, channel.coefficients) for channel in others[1:]] == [
+        ("aged", 0, {"push": F(1, 5)})
+    ]
 
 
 def test_a_loop_of_another_model_has_its_gain():
@@ -119,7 +121,7 @@ def test_bounds_are_asked_for_the_spread_of_the_slip_error_that_is_claimed(asked
     answers, questions = asked
     answers.append(BOUNDS)
     claim = TrackingProof(task=TASK, sampled_loop=HELD, claims=claims_of(F(1, 3)), varying_gain=SLOW)
-    assert claim.recomputed() is BOUNDS
+    assert claim.theorem_bounds() is BOUNDS
     spread = SLOW.spread(TASK, F(1, 3))
     assert questions == [(TASK, {key: 2 * v for key, v in GAINS.items()}, None, F(1, 10), HELD.noise, spread, F(0))]
 
@@ -182,7 +184,7 @@ def test_loops_that_are_not_stable_have_no_bounds(asked, monkeypatch):
 
     monkeypatch.setattr(module, "norms", refuse)
     claim = TrackingProof(task=TASK, sampled_loop=HELD, claims=claims_of(F(1)), varying_gain=SLOW)
-    for found in (claim.recomputed(), guarantee(TASK, HELD, SLOW)):
+    for found in (claim.theorem_bounds(), guarantee(TASK, HELD, SLOW)):
         assert (
             found.reason == "with zero-order hold over 0.1 s even the nominal loop is not stable, or decays too slowly"
         )

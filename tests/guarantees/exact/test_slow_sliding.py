@@ -200,8 +200,8 @@ def test_both_checkers_state_the_same_loop_exactly(path, friction, swing):
         4 + bool(held.slip_noise) + bool(swing) :
     ]
     channels, (own, shares) = small_gain.channels_of(one, held, claims(), ours), standalone.shares_of(theirs, cell)
-    assert [channel.own for channel in channels] == own
-    assert [[c.shares.get(name, 0) for name in OUTPUTS[: len(theirs.outputs)]] for c in channels] == shares
+    assert [channel.constant for channel in channels] == own
+    assert [[c.coefficients.get(name, 0) for name in OUTPUTS[: len(theirs.outputs)]] for c in channels] == shares
     assert list(small_gain.after_a_step(ours)) == standalone.since_step(theirs)
     moved = small_gain._moved(one, held, claims(), model, F(3))
     assert [moved[name] for name in OUTPUTS[:3]] == cell.soon(F(3))
@@ -280,7 +280,7 @@ def test_what_the_loop_leaves_out_of_the_equations_stays_below_its_shares():
             seen = {"log_rate": y, "log_state": z, "push": q, "ageing": slope * y + bent * z}
             seen["strength"] = float(model.direct) * y + float(model.evolution) * z
             for name, value in left.items():
-                bound = sum(float(c) * abs(seen[output]) for output, c in channels[name].shares.items())
+                bound = sum(float(c) * abs(seen[output]) for output, c in channels[name].coefficients.items())
                 worst[name] = max(worst[name], abs(value) / bound)
     assert all(0.9 < ratio <= 1 + 1e-9 for ratio in worst.values()), worst
 
@@ -291,14 +291,14 @@ def test_what_the_loop_leaves_out_of_the_slip_law_stays_below_its_share():
     held, model = SampledLoop(law=STIFF, step=F(200), lag=F(10)), small_gain.model_of(one, given)
     loop = small_gain.loop_of(held, model, one)
     channels = {c.name: c for c in small_gain.channels_of(one, held, given, loop)}
-    assert set(channels["state"].shares) == {"ageing"}
+    assert set(channels["state"].coefficients) == {"ageing"}
     assert loop.inputs["rate"][:2] == (model.rate, 0)
     slope, evolving, fast = map(float, (model.slope, model.evolution_slope, model.state_rate))
     ratios = []
     for length, y, z in itertools.product((0.8e-3, 1.1e-3), (-0.5, 0.5), (-0.2, 0.2)):
         evolved = float(RATE) / length * math.exp(y) * (y + z) / fast
-        assert abs(math.expm1(y) - slope * y) <= float(channels["rate"].shares["log_rate"]) * abs(y) * (1 + 1e-9)
-        bound = float(channels["state"].shares["ageing"]) * abs(evolving * (y + z))
+        assert abs(math.expm1(y) - slope * y) <= float(channels["rate"].coefficients["log_rate"]) * abs(y) * (1 + 1e-9)
+        bound = float(channels["state"].coefficients["ageing"]) * abs(evolving * (y + z))
         ratios.append(abs(evolved - evolving * (y + z)) / bound)
     assert sorted(ratios)[-4:] == pytest.approx([1.0] * 4)  # the shortest slips at +Y, the longest at -Y
 
@@ -598,7 +598,7 @@ def test_every_cell_must_give_the_claims(place, monkeypatch):
     given = iter([below, below])
     assert (len(two.cells), two.check()) == (2, Verdict.PROVED)
     given = iter(of_cells)
-    assert two.recomputed() == of_cells[place]
+    assert two.theorem_bounds() == of_cells[place]
     given = iter(of_cells)
     assert two.check() is Verdict.UNDECIDED
 

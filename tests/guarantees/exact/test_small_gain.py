@@ -93,7 +93,9 @@ def test_the_inputs_are_the_fixed_point_of_what_the_outputs_make_of_them(task, r
     sizes = dict.fromkeys((c.name for c in channels), 0.0)
     for _ in range(1000):
         peaks = {y: sum(float(given[y, k][0]) * v for k, v in sizes.items()) for y in task.half_ranges}
-        sizes = {c.name: float(c.own) + sum(float(s) * peaks[y] for y, s in c.shares.items()) for c in channels}
+        sizes = {
+            c.name: float(c.constant) + sum(float(s) * peaks[y] for y, s in c.coefficients.items()) for c in channels
+        }
     found = bounds(task, given, root, STEP, noise)
     assert isinstance(found, Bounds)
     assert float(found.slip_error) == pytest.approx(peaks["slip_error"], rel=1e-9)
@@ -113,9 +115,9 @@ def test_the_root_of_a_noisy_step_may_lie_wider_by_the_noise():
     """|w + γe1/T_s| ≤ δγ|e1 + n1|/T_s + ε."""
     root = ImplicitStep(pull=PULL, slopes=(F("0.9"), F(1)), remainder=F(1, 10**6))
     found = {c.name: c for c in channels_of(TASK, root, STEP, NOISE)}
-    assert found["root"].own == F(1, 10**6) + F(1, 20) / STEP * NOISE["slip_noise"]
-    assert [found[name].own for name in NOISE] == list(NOISE.values())
-    assert not any(found[name].shares for name in NOISE)
+    assert found["root"].constant == F(1, 10**6) + F(1, 20) / STEP * NOISE["slip_noise"]
+    assert [found[name].constant for name in NOISE] == list(NOISE.values())
+    assert not any(found[name].coefficients for name in NOISE)
 
 
 def test_a_loop_through_the_implicit_step_can_fail_by_itself():
@@ -163,10 +165,10 @@ def test_what_is_measured_at_another_time_is_off_by_what_moves_until_then():
     found = {c.name: c for c in channels_of(TASK, root, STEP, noise, None, jitter)}
     first, second = TASK.reference_rates
     force = TASK.reference_force + TASK.amplitude
-    assert found["slip_noise"].own == F(1, 3) + jitter * first
-    assert found["slip_noise"].shares == {"slip_rate_error": jitter}
-    assert found["rate_noise"].own == jitter * (second + force)
+    assert found["slip_noise"].constant == F(1, 3) + jitter * first
+    assert found["slip_noise"].coefficients == {"slip_rate_error": jitter}
+    assert found["rate_noise"].constant == jitter * (second + force)
     largest = [max(map(abs, ends)) for ends in (TASK.slip_chord, TASK.rate_chord, TASK.beta)]
-    assert list(found["rate_noise"].shares) == ["slip_error", "slip_rate_error", "push"]
-    assert list(found["rate_noise"].shares.values()) == [jitter * v for v in largest]
-    assert found["root"].own == F(1, 9) + (F(1, 3) + jitter * first) * F(1, 4) / STEP
+    assert list(found["rate_noise"].coefficients) == ["slip_error", "slip_rate_error", "push"]
+    assert list(found["rate_noise"].coefficients.values()) == [jitter * v for v in largest]
+    assert found["root"].constant == F(1, 9) + (F(1, 3) + jitter * first) * F(1, 4) / STEP

@@ -234,7 +234,7 @@ def test_bounds_are_asked_for_the_loop_its_root_and_the_noise_that_there_is(monk
     monkeypatch.setattr(statement, "certified_bounds", lambda *given: asked.append(given) or NONE)
     late = replace(ROOTED, delay=F(1, 3), lag=F(1, 5), rate_noise=F(1, 9))
     claim = TrackingProof(task=TASK, sampled_loop=late, claims=CLAIMS)
-    assert claim.recomputed() is NONE
+    assert claim.theorem_bounds() is NONE
     assert asked == [(TASK, claim.loop, SIGN, {"rate_noise": F(1, 9)}, F(0))]
     assert tuple(claim.loop.sampled) == ("root", "rate_noise")
     assert [segment.duration for segment in claim.loop.segments] == [F(1, 3), F(2, 3)]

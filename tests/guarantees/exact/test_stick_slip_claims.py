@@ -225,7 +225,7 @@ NOISY_FILE = FILE.with_name("stick_slip_noise_real-fault.json")
 
 def test_noise_of_the_slip_is_part_of_the_statement():
     noisy = load_guarantee(NOISY_FILE)
-    bounds = noisy.recomputed()
+    bounds = noisy.theorem_bounds()
     assert noisy.claims.follow(bounds)
     assert bounds.peak_slip_rate < F("1.93e-4")  # 3e-4 and 6e-5 m were asked for, with noise of the slip rate besides
     assert max(bounds.slip_behind, bounds.slip_ahead) < F("4.2e-5")
@@ -408,7 +408,7 @@ def test_limit_and_worst_case_take_only_the_disturbance_beside_healing(proof):
 
 @pytest.mark.parametrize("share", [-1, 1 + F(1, 10**6)])
 def test_healing_stands_for_a_part_of_the_disturbance(proof, share, monkeypatch):
-    monkeypatch.setattr(StickSlipProof, "recomputed", lambda found: found.claims)
+    monkeypatch.setattr(StickSlipProof, "theorem_bounds", lambda found: found.claims)
     most = F(proof.covered_healing())
     assert replace(proof, healing=most).check() is Verdict.PROVED
     assert replace(proof, healing=share * most).check() is Verdict.UNDECIDED

@@ -149,7 +149,7 @@ def test_events_are_moved_as_far_as_they_may_be_and_keep_their_order(changes, de
 def test_the_floats_of_a_design_know_of_jitter():
     claim = proved("jitter")
     anyhow = guarantee(claim.task, claim.sampled_loop)
-    bounds, guessed = anyhow.recomputed(), estimated(claim.task, claim.sampled_loop).bounds
+    bounds, guessed = anyhow.theorem_bounds(), estimated(claim.task, claim.sampled_loop).bounds
     assert float(guessed.slip_rate_error) == pytest.approx(float(bounds.slip_rate_error), rel=0.04)
     assert float(guessed.stepped) == pytest.approx(float(bounds.stepped), rel=0.04)
 

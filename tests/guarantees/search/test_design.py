@@ -143,7 +143,7 @@ def test_where_stick_leaves_the_bounds_the_answer_says_so():
     found = TrackingGuarantee(fault=load_fault("real-fault"), proof=claim, stick_search=beyond)
     assert found.lines()[-1].startswith("on the stick-slip plant a run was found that exceeds the bounds")
     within = replace(found, stick_search=replace(beyond, slip_error=0.99 * float(claim.claims.slip_error)))
-    assert not within.leaves_with_stick
+    assert not within.exceeded_on_stick_slip
 
 
 @few("row", ROWS, every=5)
@@ -326,7 +326,7 @@ def test_the_first_words_are_that_nothing_is_guaranteed_at_the_step_that_was_ask
     monkeypatch.setattr(state_feedback, "design_sampled_law", lambda *_, **__: none)
     monkeypatch.setattr(state_feedback, "longest_step", lambda *_, **__: shorter)
     monkeypatch.setattr(state_feedback, "design_at", lambda *_: shorter)
-    for search in ("continued", "nearest_setup"):
+    for search in ("design_near_longer_step", "nearest_setup"):
         monkeypatch.setattr(state_feedback, search, lambda *_, **__: None)
     found = qd.guarantee(load_fault("real-fault"), step=F("0.5"), plant="printed")
     assert not found.proved

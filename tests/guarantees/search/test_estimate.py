@@ -25,7 +25,7 @@ def loop_of(*segments):
         inputs={"flows": (F(1), F(0), F(-2))},
         outputs=ROWS,
         sampled={"enters": (F(0), F(2), F(1))},
-        at_once={("z", "flows"): F(1, 7)},
+        feedthrough={("z", "flows"): F(1, 7)},
         start=((F(1, 2), F(0), F(0)), (F(0), F(0), F(1, 3))),
     )
 

@@ -16,7 +16,7 @@ from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup
 from quakedesign.guarantees.search import linear_design as longest_times
 from quakedesign.guarantees.search.linear_design import (
     Closest,
-    continued,
+    design_near_longer_step,
     longest_delay,
     longest_step,
     nearest_setup,
@@ -141,10 +141,10 @@ def test_it_does_not_depend_on_the_sampling_time_of_the_fault(longest):
 
 
 def test_a_design_that_is_missed_at_its_step_is_continued_from_a_longer_one(task, longest):
-    found = continued(task, F("0.87"), longest)
+    found = design_near_longer_step(task, F("0.87"), longest)
     assert (found.sampled_loop.step, found.check()) == (F("0.87"), Verdict.PROVED)
-    assert continued(task, 2 * longest.guarantee.sampled_loop.step, longest) is None
-    assert continued(task, F("0.87"), None) is None
+    assert design_near_longer_step(task, 2 * longest.guarantee.sampled_loop.step, longest) is None
+    assert design_near_longer_step(task, F("0.87"), None) is None
 
 
 @pytest.mark.slow

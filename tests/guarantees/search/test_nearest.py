@@ -17,9 +17,9 @@ from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import linear_design
 from quakedesign.guarantees.search.compensated_search import design_compensated
 from quakedesign.guarantees.search.default_designs import deadbeat, sampled_sliding_mode
-from quakedesign.guarantees.search.float_bounds import closeness
+from quakedesign.guarantees.search.float_bounds import distance
 from quakedesign.guarantees.search.linear_design import (
-    Linear,
+    LinearLawSearch,
     design_sampled_law,
     longest_delay,
     longest_step,
@@ -78,11 +78,11 @@ def test_the_pressure_is_the_reason_where_it_alone_fails(pressed, monkeypatch, t
     """Without a slowly varying gain the pressure fails or the gain does; with one the gain does."""
     slow, plain = (
         NoProof(reason="small gain 2"),
-        NoProof(reason="opens", pressed=True) if pressed else NoProof(reason="1"),
+        NoProof(reason="opens", only_pressure_fails=True) if pressed else NoProof(reason="1"),
     )
     monkeypatch.setattr(linear_design, "varying_gain", lambda task, held: "slow")
     monkeypatch.setattr(linear_design, "guarantee", lambda task, held, gain=None: slow if gain else plain)
-    found = best_guarantee(task, Linear().leanest(task, F(1, 2)))
+    found = best_guarantee(task, LinearLawSearch().low_pressure_loop(task, F(1, 2)))
     assert found is (plain if pressed else slow)
 
 
@@ -96,7 +96,7 @@ def test_the_largest_disturbance_that_does_not_open_the_fault_is_named():
     assert 0 < near.task.amplitude < uncertain_plant(pushed).amplitude
     more = best_guarantee(replace(near.task, amplitude=near.task.amplitude * F(9, 8)), near.sampled_loop)
     assert isinstance(more, NoProof)
-    assert more.pressed
+    assert more.only_pressure_fails
     assert lines(found)[0].startswith("with a disturbance of at most 0.")
     assert found.to_dict()["nearest"]["value"] == str(near.task.amplitude)
 
@@ -107,7 +107,7 @@ def test_a_law_of_less_pressure_is_designed_where_the_usual_one_asks_for_too_muc
     step = F("0.5")
     usual = design_sampled_law(task, step)
     low, high = usual.claims.pressures[-1]
-    leaner = best_guarantee(task, Linear().leanest(task, step)).claims.pressures[-1]
+    leaner = best_guarantee(task, LinearLawSearch().low_pressure_loop(task, step)).claims.pressures[-1]
     assert low < leaner[0] <= leaner[1] < high
     pump = Pump(least=(low + leaner[0]) / 2, largest=(high + leaner[1]) / 2)
     assert isinstance(best_guarantee(task, replace(usual.sampled_loop, pump=pump)), NoProof)
@@ -176,7 +176,7 @@ def test_the_longest_step_of_sliding_modes_is_within_a_tenth_of_the_best_of_all_
     longer = step * F(10, 9)
     for weight, ratio in product(np.linspace(0.02, 0.6, 30), ratios):
         held = sliding.sampled_loop(task, np.array([weight, ratio]), longer)
-        assert closeness(task, held)[0] >= 1
+        assert distance(task, held)[0] >= 1
     assert isinstance(design_compensated(task, sliding.controller, longer).proof, NoProof)
 
 

@@ -175,7 +175,7 @@ def test_the_noisy_run_of_a_design_stays_within_its_guarantee():
 
 def test_a_delay_is_designed_for_with_the_slip_alone():
     near = closest(uncertain_plant(REAL), STEP, measured="slip", setup=ExactSetup(slip_noise=NOISE, delay=F("0.1")))
-    assert near.closeness < 1
+    assert near.distance < 1
     found = best_guarantee(uncertain_plant(REAL), near.sampled_loop)
     assert found.sampled_loop.law.of_slip_alone
     assert (found.sampled_loop.slip_noise, found.sampled_loop.delay) == (NOISE, F("0.1"))

@@ -114,7 +114,7 @@ def test_a_search_leaves_from_the_corners_and_the_floats_of_a_design_know_the_st
         assert claim.claims.slip_rate_error / 1.6 <= seen.slip_rate_error <= claim.claims.slip_rate_error
         assert seen.slip_error <= claim.claims.slip_error
     assert claim.claims.slip_error <= 1.6 * errors[False].slip_error
-    guessed, bounds = estimated(claim.task, claim.sampled_loop).bounds, started("fast", slow=False).recomputed()
+    guessed, bounds = estimated(claim.task, claim.sampled_loop).bounds, started("fast", slow=False).theorem_bounds()
     assert float(guessed.slip_rate_error) == pytest.approx(float(bounds.slip_rate_error), rel=0.01)
     assert float(guessed.slip_error) == pytest.approx(float(bounds.slip_error), rel=0.01)
 

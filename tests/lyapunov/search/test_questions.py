@@ -100,7 +100,7 @@ def test_what_speaks_against_gains_is_told():
         loop = closed_loop("super-twisting", gains, lipschitz=lipschitz)
         refuted = refute(loop, "super-twisting")
         assert refuted is None or refuted.check() is Verdict.REFUTED
-        kinds.append(questions.against(loop, refuted))
+        kinds.append(questions.counterexample_kind(loop, refuted))
     assert kinds == ["simulated", "exact", "none"]
 
 
