@@ -213,7 +213,7 @@ def without_awaited(loop, theirs):
     """A loop without what is awaited of a layer, in which that is as the other checker has it."""
     sampled, fading, inputs = dict(loop.sampled), dict(loop.fading), dict(loop.inputs)
     assert sampled.pop("awaited_told") == tuple(theirs.told)
-    assert loop.at_once == {("slip_rate_error", "awaited"): theirs.at_once}
+    assert loop.feedthrough == {("slip_rate_error", "awaited"): theirs.at_once}
     if loop.fading:
         own, given = fading.pop("awaited"), theirs.fade
         assert (own.first, own.height, own.rate, own.floor) == (given.event, given.height, given.rate, given.floor)
@@ -282,13 +282,13 @@ def same_pulse(task, ours, theirs, held):
     assert [NOISES[k] for k in theirs.told] == [name for name in NOISES if name in ours.sampled]
     if "late" not in ours.pulses:
         assert theirs.pulse is None
-        assert "late" not in {name for _, name in ours.at_once}
+        assert "late" not in {name for _, name in ours.feedthrough}
         return None
     own, given = ours.pulses["late"], theirs.pulse
     assert (own.first, own.early, own.late) == (given.event, given.early, given.late)
     assert (own.before, own.after) == (given.before, given.after)
     assert list(own.entry) == checker.pulse_entry(theirs, sum(task.beta) / 2)
-    assert ours.at_once == {("asked" if held.lag else "push", "drift"): own.late}
+    assert ours.feedthrough == {("asked" if held.lag else "push", "drift"): own.late}
     return own.first, held.lag > 0
 
 

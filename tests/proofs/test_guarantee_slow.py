@@ -262,7 +262,7 @@ def _bounds_with(task, slow, slope):
     slip = F(0)
     for _ in range(40):
         half = (task.beta[1] - task.beta[0]) / (2 * slow.parts) + 2 * slope * slip
-        spread = replace(slow.spread(task, F(0)), half=half)
+        spread = replace(slow.spread(task, F(0)), present=half)
         found = statement.best_bounds(task, gains, None, STEP, {}, spread)
         slip = F(f"{float(found.slip_error):.3e}") * F(1001, 1000)
     assert slip > found.slip_error
