@@ -172,7 +172,8 @@ def test_where_no_scale_makes_the_step_deadbeat_there_is_no_guarantee(monkeypatc
     stored = load_guarantee(PROOFS / "stick_slip_cta_real-fault.json")
     linear = replace(stored, sampled_loop=replace(stored.sampled_loop, law=replace(stored.sampled_loop.law, pull=())))
     monkeypatch.setattr(COMPENSATED, "design_stick_slip", lambda *_, **__: linear)
-    monkeypatch.setattr(COMPENSATED, "sector_is_valid", lambda root, *_: root.slopes[0] < 1)  # nearly deadbeat is not enough
+    # nearly deadbeat is not enough
+    monkeypatch.setattr(COMPENSATED, "sector_is_valid", lambda step, *_: step.slopes[0] < 1)
     base = control_law("cta").base_gains()[0].law.with_divisor(stored.task.authority)
     found = COMPENSATED.design_sticking(stored.task, base, stored.sampled_loop.step)
     assert found.reason == "the implicit step is deadbeat for no scale that is tried"
