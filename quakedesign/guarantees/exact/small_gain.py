@@ -72,13 +72,13 @@ from quakedesign.plant.fault_plant import FaultPlant
 # these bounds. Measurements quantised in steps of q have errors of at most q/2.
 #
 # **Implicit step.** In this paragraph w is the solution of the implicit step, not the damping. By the sector bounds of
-# the last chapter −T_s·w/e1 lies between the slopes γ0 and γ1 up to ε; γ is their midpoint, δγ half their difference.
-# The law is linear except for the sampled input ``root``, w_k + γe1/T_s at the samples: |w_k + γe1/T_s| ≤ δγ|e1|/T_s +
-# ε wherever |e1| ≤ E and |e2| ≤ R (`holds`). E and R are the claims themselves. Suppose that the claims follow from
-# these bounds of the inputs. If all samples of e before kT_s are within the claims, the input ``root`` obeys its bound
-# up to kT_s, as it depends on these samples alone. So e is within the claims up to kT_s and, as e is continuous, so is
-# the sample at kT_s. By induction all samples are. If there is noise, the step is solved for e1 + n1 and e2 + n2: E +
-# N1 and R + N2 replace E and R, and δγN1/T_s is added to ε. ∎
+# the last chapter w lies between −γ0·e1/T_s and −γ1·e1/T_s up to ε; γ is their midpoint, δγ half their difference. The
+# law is linear except for the sampled input ``root``, w_k + γe1/T_s at the samples: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε
+# wherever |e1| ≤ E and |e2| ≤ R (`sector_is_valid`). E and R are the claims themselves. Suppose that the claims follow from these
+# bounds of the inputs. If all samples of e before kT_s are within the claims, the input ``root`` obeys its bound up to
+# kT_s, as it depends on these samples alone. So e is within the claims up to kT_s and, as e is continuous, so is the
+# sample at kT_s. By induction all samples are. If there is noise, the step is solved for e1 + n1 and e2 + n2: E + N1
+# and R + N2 replace E and R, and δγN1/T_s is added to ε. ∎
 #
 # **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve pressure leave p_{k−1} within A
 # of the due time of p_k and move to p_k monotonically, within at most Θ and at a rate of at least |p_k − p_{k−1}|/Θ.
@@ -101,23 +101,24 @@ from quakedesign.plant.fault_plant import FaultPlant
 # + J·r′, R by N2 + J·|r″|, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a mean of e with non-negative weights
 # of sum 1 over times within J of kT_s: it obeys every bound that all these values obey. ∎
 #
-# **Slowly varying input gain.** For friction of the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) − x1(t)| ≤
-# κ(2E + r′σ), σ = t − τ, κ = μ′·N̂/b, while |e1| ≤ E. Divide the range of β into parts with midpoints β_i and
+# **Slowly varying input gain.** For friction that depends on the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) −
+# x1(t)| ≤ κ(2E + r′σ), σ = t − τ, κ = μ′·N̂/b, while |e1| ≤ E. Divide the range of β into parts with midpoints β_i and
 # half-widths δ. Fix t, let β(t) be in part i, and take β_i in place of β0 in the nominal loop up to t: |β(τ) − β_i| ≤ δ
 # + 2κE + κr′σ, and σ ≤ e^{ασ}/(eα) for every α > 0. So (β − β_i)v is bounded by two terms: (δ + 2κE)|v|, as before with
-# a smaller c, and ``aged``, an input that enters as a does, with c = κr′/(eα) for v. The gains of ``aged`` are those of
-# the loop with α added to the diagonal of its flow matrix, whose responses are e^{ασ} times as large. All gains are the
-# largest over the parts. E is the claim on the slip error, which must exceed the resulting bound: e1 is continuous and
-# initially below E, so it never reaches E. ∎
+# a smaller c, and ``aged``, an input that enters like ``acceleration``, with c = κr′/(eα) for v. The gains of ``aged``
+# are those of the loop with α added to the diagonal of its flow matrix, whose responses are e^{ασ} times as large.
+# Every gain is the largest over the parts. E is the claim on the slip error, which must exceed the resulting bound: e1
+# is continuous and initially below E, so it never reaches E. ∎
 #
 # **Diffusion path.** In this paragraph R is b times the truncation error of the modes [m/s²], |R| ≤ sup|y| with the
 # output y = ``left_out``, and bY is its integral as in `loop.diffusion_layer`. Of β(v + R) the loop contains β0·v and,
-# with the state e2 − β0·bY in place of e2, the known part of β0·R. So (β − β0)R enters as a does; its c for y is that
-# of a for v. If the well pressure is continuous, this is part of a. If it has steps, R decays after every step and is a
-# separate input. With a slowly varying gain, past values of R are treated as those of v, with the same c. There are two
-# more inputs, with F = 0 and c = 1 for y: ``awaited``, β0·bY in the derivatives of e1 and of that state, and
-# ``awaited_told``, its effect on the measurement at the samples. It acts as noise does, because e2 is measured, not
-# that state. The bound of e2 is that of the state plus that of β0·bY, the direct feedthrough of ``awaited``. ∎
+# with the state e2 − β0·bY in place of e2, the known jumps due to β0·R. So (β − β0)R enters like ``acceleration``; its
+# c for y is that of ``acceleration`` for v. If the well pressure is continuous, this term is part of ``acceleration``.
+# If it has steps, R decays after every step and is a separate input. With a slowly varying gain, past values of R are
+# treated as those of v, with the same c. There are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0·bY in
+# the derivatives of e1 and of that state, and ``awaited_told``, its effect on the measurement at the samples. It acts
+# like noise, because e2 is measured, not that state. The bound of e2 is that of the state plus that of β0·bY, the
+# direct feedthrough of ``awaited``. ∎
 
 _ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")

@@ -9,10 +9,10 @@ exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ 
 rests, its state is constant. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is
 checked.
 
-**Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion
-is one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the
-block before the next sample, and the period ends with y = 0. So each period is either the *sliding* map, with y ≥ 0
-and ξ ≥ 0 at its end, or the *rest* map with a slip δ until the last stop.
+**Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is
+one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block
+before the next sample, and the period ends with y = 0. So each period follows either the *sliding* map, with y ≥ 0 and
+ξ ≥ 0 at its end, or the *rest* map with a slip δ until the last stop.
 
 **Sliding map.** With S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
 linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
@@ -31,14 +31,15 @@ The possible δ and U depend on r′ at the sample. The condition of rest is tak
 both ends of the range of r′ suffice.
 
 **Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. It may be 0 for r′ up to max|r″|T/2. So
-where a facet function n_l·z after the period decreases with it, the end r′ = 0 stands for all these r′.
+where a facet function n_l·z after the period decreases with this increment, the end r′ = 0 covers all these r′.
 
 **Input gain.** Let m1 be the factor of ξ in a facet function after a slide, M·ξ the bound used for m1·ξ, X1 the slip
-due to a constant unit force, and J the addition of the ranges to the factor of H − bβU (FORMAT.md, *Sliding map*). For
-β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ + (|n3·s|ψ/b)·ξ, with M the chord of m1
-and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1 the chord of β·m1 may stand for β·M if
-the term −bβU·X1 of the last ξ is omitted; the same holds for J. Where U < 0 replace m1 by the chord of β·m1, over β:
-all terms with U are convex in β. So |n3·s|ψ/b counts with y and H alone.
+due to a constant unit force, and J the contribution of the ranges of slope and damping to the factor of H − bβU
+(FORMAT.md, *Sliding map*). For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ +
+(|n3·s|ψ/b)·ξ, with M the chord of m1 and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1
+the chord of β·m1 may replace β·M if the term −bβU·X1 of the ξ in (|n3·s|ψ/b)·ξ is omitted; the same holds for J. Where
+U < 0 replace m1 by the chord of β·m1, divided by β: all terms with U are convex in β, and |n3·s|ψ/b enters the terms
+with y and H alone.
 
 **Sliding mode.** The target rate is r′ + w, w the solution of the implicit step. That step is shown to be deadbeat, w =
 −e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
@@ -46,28 +47,28 @@ all terms with U are convex in β. So |n3·s|ψ/b counts with y and H alone.
 
 **Law.** The law is `StickSlipLaw`, D its level. In a period d = D + p*(x1) changes by the law's update of D and, as p*
 changes with the slip, by −σξ [Pa], σ = S_chord/(bβ). State at the samples: z = (e1, y, d). A polytope {z: n_l·z ≤ 1, y
-≥ 0} is invariant if no facet function exceeds 1 after either map. Its largest value is that of a linear function on a
-polytope, bounded by multipliers of three or four constraints, which a file names.
+≥ 0} is invariant if no facet function exceeds 1 after either map. A facet function after a map is linear on a polytope;
+its maximum is bounded by multipliers of three or four constraints, which a file names.
 
 **Noise.** The measured slip is x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is measured exactly, including whether it
-is 0. Let e1 be the slip minus the reference plus N, and let d exclude m·n of its own sample, m and c the slip and
-return gains. Then this noise acts in one period alone: v is the target rate for r′ + c(N − n) in place of r′, a value
-in [0, max r′ + 2cN]; the reference moves up to 2cNT less than T times this value; U is m·n larger. Where the innovation
-is limited, it adds between −mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, never less than without limit; otherwise d
-contains no noise. Initially e1 = N and d = 0, as x⁻ = 0 and the first innovation, n, is not limited. All d from 0 to
-m·N are required to lie in the polytope.
+is 0. Let e1 be the slip minus the reference plus N, and let d exclude the noise term m·n of the same sample; m is
+slip_gain and c is return_rate. Then this noise acts in one period alone: v is the target rate for r′ + c(N − n) in
+place of r′, a value in [0, max r′ + 2cN]; the reference moves up to 2cNT less than T times this value; U is m·n larger.
+Where the innovation is limited, it adds between −mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, and never less than the
+unlimited innovation would; otherwise d contains no noise. Initially e1 = N and d = 0, as x⁻ = 0 and the first
+innovation, n, is not limited. All d from 0 to m·N are required to lie in the polytope.
 
 **Aperiodic sampling.** Each interval between samples is any h from T to T_m; T is a constant of the law. The bound of a
 facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|m(h − s)ds over [0, h]. Here g is its
 response to an impulse, and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. m ≥ 0 is
-required up to T_m, also beyond the interval that follows the state, so that one formula of V holds for all h. g is
+required up to T_m, also beyond the end of the actual interval, so that one formula of V is valid for all h. g is
 Lipschitz, so V″ ≥ −B almost everywhere, and V is below its chord over Δ plus Δ²B/8: bounds at five intervals suffice,
 with B from |l″|, |g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so both ends suffice. A shorter
-period that ends at rest can be extended to T_m, as nothing releases the block in the added time; so the bound of T_m on
-the slip until a stop covers it.
+period that ends at rest can be extended to T_m, as nothing releases the block in the added time; so the bound for T_m
+of the slip until a stop covers it.
 
-**Peaks.** Between samples y stays below the larger of its values at both ends, the later one under the largest force,
-as y″ = −wy′ + Sy admits no maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
+**Peaks.** Between samples y is at most the larger of its initial value and its final value under the largest force, as
+y″ = −wy′ + Sy admits no interior maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
 
 from collections.abc import Callable, Iterator, Sequence
