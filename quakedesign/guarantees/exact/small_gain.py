@@ -74,11 +74,11 @@ from quakedesign.plant.fault_plant import FaultPlant
 # **Implicit step.** In this paragraph w is the solution of the implicit step, not the damping. By the sector bounds of
 # the last chapter w lies between −γ0·e1/T_s and −γ1·e1/T_s up to ε; γ is their midpoint, δγ half their difference. The
 # law is linear except for the sampled input ``root``, w_k + γe1/T_s at the samples: |w_k + γe1/T_s| ≤ δγ|e1|/T_s + ε
-# wherever |e1| ≤ E and |e2| ≤ R (`sector_is_valid`). E and R are the claims themselves. Suppose that the claims follow from these
-# bounds of the inputs. If all samples of e before kT_s are within the claims, the input ``root`` obeys its bound up to
-# kT_s, as it depends on these samples alone. So e is within the claims up to kT_s and, as e is continuous, so is the
-# sample at kT_s. By induction all samples are. If there is noise, the step is solved for e1 + n1 and e2 + n2: E + N1
-# and R + N2 replace E and R, and δγN1/T_s is added to ε. ∎
+# wherever |e1| ≤ E and |e2| ≤ R (`sector_is_valid`). E and R are the claims themselves. Suppose that the claims follow
+# from these bounds of the inputs. If all samples of e before kT_s are within the claims, the input ``root`` obeys its
+# bound up to kT_s, as it depends on these samples alone. So e is within the claims up to kT_s and, as e is continuous,
+# so is the sample at kT_s. By induction all samples are. If there is noise, the step is solved for e1 + n1 and e2 + n2:
+# E + N1 and R + N2 replace E and R, and δγN1/T_s is added to ε. ∎
 #
 # **Jitter.** Let sample k be measured within J of kT_s, the first at 0. Let the valve pressure leave p_{k−1} within A
 # of the due time of p_k and move to p_k monotonically, within at most Θ and at a rate of at least |p_k − p_{k−1}|/Θ.
