@@ -160,3 +160,9 @@ def test_a_bound_below_the_smallest_normal_float_is_rounded_up(exponent):
 def test_the_form_of_zero_is_zero():
     assert (form({}, 2, 3).least(), form({}, 2, 3).largest()) == (0, 0)
     assert float(largest_ratio([([form({}, 2, 2), form(power(2, 2), 2, 2)], [F(1), F(-1)])])) < 1e-9
+
+
+def test_values_at_the_corners_are_the_coefficients_of_pure_powers():
+    """6x² + 10xy + 9y² has the values 6 and 9, whatever scale its integer coefficients share."""
+    assert form({(2, 0): 6, (1, 1): 10, (0, 2): 9}, 2, 2).at_corners() == [6, 9]
+    assert form({(1, 0): 6, (0, 1): 9}, 2, 1).at_corners() == [6, 9]
