@@ -126,11 +126,11 @@ def row_24(residual: Callable = lambda k, v, t: k * v * t) -> Finding:
     left = sp.simplify(acceleration.subs({z: rest, rate: 0}) - residual(k, v, t))
     fault = load_fault("real-fault")
     rates = fault.reference.operation_time * fault.specific_stiffness
-    plate = 1e-9  # a fast plate boundary, 3 cm a year
+    plate = 1e-9  # a fast plate boundary, 3.2 cm a year
     return Finding(
         left == 0 and sp.simplify(acceleration.subs({z: rest, rate: 0})) != 0,
-        f"residual − k̂v∞t = {left}; a plate of 3 cm/year adds {rates * plate:.2g} m/s² over the real fault's task, "
-        f"against {fault.disturbance.amplitude:.2g} m/s² of the sine",
+        f"residual − k̂v∞t = {left}; a plate rate of 1 nm/s (3.2 cm/year) adds {rates * plate:.2g} m/s² over the real "
+        f"fault's task, against {fault.disturbance.amplitude:.2g} m/s² of the sine",
     )
 
 

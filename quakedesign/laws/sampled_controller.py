@@ -68,7 +68,7 @@ def cut_off(
     commanded : Expr
         [Pa].
     states : tuple of Expr
-        Their values before it.
+        Before this sample.
     slip, reference : Expr
         [m].
     width, per_slip, resolution : Expr
@@ -110,7 +110,7 @@ def winds_up(law: LinearLaw) -> bool:
 def warning_at_rest(law: LinearLaw, step: Fraction, *, limited: bool = False) -> str:
     """Warning about a law whose pressure grows while the fault is at rest, or empty.
 
-    It is empty for other laws, and for one that only ramps if a limit at rest bounds its pressure (`limited`).
+    Empty for other laws and, if a limit at rest bounds the pressure (`limited`), for one that only ramps.
     """
     time = growth_at_rest(law, step)
     if time:
@@ -261,8 +261,8 @@ def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Exp
 # ----------------------------------------------------------------------
 # Implicit step with an estimate of the disturbance in place of integral states; simulated and proved.
 #
-# Both functions take floats, SymPy and CasADi expressions. The estimate d follows the change of the slip rate over the
-# last period beyond T_s·B0·p. The pressure is −d plus that which drives the slip rate to the solution w.
+# Both functions take floats, SymPy and CasADi expressions. The estimate d follows the change of e2 over the last period
+# beyond T_s·B0·p. The pressure is −d plus that which drives e2 to the solution w.
 
 _STATES = ("rate_error_before", "push_before", "disturbance")
 

@@ -1,7 +1,7 @@
 """Loop setup: sampling, delay, actuator, diffusion path and noise between a law and the fault.
 
-`LoopSetup` is read by the guarantee, the simulation, the command line and the documentation: each field carries its
-unit, its help text and its JSON key.
+`LoopSetup` is read by the guarantee, the simulation, the command line and the documentation: each quantity carries its
+unit and its help text.
 """
 
 from collections.abc import Iterator
@@ -122,8 +122,8 @@ def quantity(unit: str, text: str, default: Fraction | None = Fraction(0)) -> An
 class LoopSetup:
     """Loop setup: sampling, delay, actuator, diffusion path, noise, initial errors.
 
-    Every field is given as a number in the SI unit, a decimal or p/q as text, or a text with a unit, such as
-    ``LoopSetup(step="184 ms", slip_noise="5 um")``, and is stored as a `Fraction` in the SI unit; None if not given.
+    A quantity is given as a number in the SI unit, a decimal or p/q as text, or a text with a unit, such as
+    ``LoopSetup(step="184 ms", slip_noise="5 um")``, and stored as a `Fraction` in the SI unit; 0 or None if not given.
 
     Attributes
     ----------

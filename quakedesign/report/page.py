@@ -188,12 +188,12 @@ def _slowly(entry: "Entry") -> list[str]:
     cells = "one cell" if len(proof.cells) == 1 else f"{len(proof.cells)} cells"
     return [
         "The pressure at the well is p plus a planned pressure, which the nominal fault needs along its reference and "
-        "which grows at the rate kV/(μ* A).",
+        "which grows at the rate kV/(μ* A)",
         "How the bound is proved: with v = V e^y and θ = (D_c/V) e^z, the loop about slow sliding at V is linear "
         "except for the exponentials. The model omits inertia and some diffusion modes. The exponentials lie in "
         "sectors for |y| ≤ Y; the omitted parts are bounded. L1 norms of the linear loop then bound all errors in "
         "terms of the claims, and the resulting bounds lie within the claims (small gain). The claims hold "
-        f"{proof.validity}. The box of constants is divided into {cells}.",
+        f"{proof.validity}. The box of constants is divided into {cells}",
     ]
 
 

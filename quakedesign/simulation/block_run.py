@@ -42,7 +42,7 @@ class BlockRun:
     rest : ndarray
         Fraction of time at rest of every block [-].
     reversed, opened : bool
-        Whether a block would have slipped backward, or an effective normal stress became negative.
+        Whether a block would have slipped backward, or an effective normal stress reached 0.
     """
 
     times: np.ndarray

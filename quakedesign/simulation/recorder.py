@@ -68,7 +68,7 @@ class Recorder:
 
     loop: ClosedLoop
     scheme: Scheme
-    step: float  # T_s [s]
+    step: float  # [s]
     initial: tuple[float, float] = (0.0, 0.0)  # Initial x1 [m] and x2 [m/s]; at rest unless given
 
     @cached_property
@@ -246,7 +246,7 @@ class Metrics:
     peak_slip_rate : float or None
         Largest |x2| of the whole run [m/s].
     max_h_rate : float or None
-        Largest |Δh/Δt| between successive steps of the whole run [unit of ν per s].
+        Largest |Δh/Δt| between successive steps of the whole run [m/s³].
     max_pressure, min_pressure : float or None
         Over the whole run [Pa].
     settled_from : float

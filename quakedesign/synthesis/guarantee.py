@@ -60,7 +60,7 @@ def guarantees_of(
     executor : Executor, optional
         Any other executor of `concurrent.futures` that is used instead.
     tell : callable, optional
-        Called with the current task and the completed fraction [-].
+        Called with a progress text and the completed fraction [-].
 
     Raises
     ------
@@ -85,7 +85,7 @@ def _called(call: Callable[[], Result]) -> Result | QuakedesignError:
 
 STICK_SLIP, PRINTED = PLANTS = StickSlipProof.plant, TrackingProof.plant
 BLOCK_LAWS = ("centralised", "decentralised")
-"""Of several blocks: the pressure of each well depends on all measurements, or only on those of its block."""
+"""Of several blocks: the pressure of each well depends on all measurements, or only on its own."""
 _PUMP = ("saturation", "withdrawal", "rate_limit")
 _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", *_PUMP)
 

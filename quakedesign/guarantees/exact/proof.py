@@ -126,9 +126,9 @@ class NoProof:
         Names the quantity that fails.
     small_gain : UpperBound or None
         Small gain, at least 1; None where something else fails, such as the stability of the nominal loop.
-    needs : Fraction, optional
+    required_change : Fraction, optional
         Pressure change between samples that the pump would have to make [Pa].
-    pressed : bool
+    only_pressure_fails : bool
         Whether the pressure alone prevents a proof: it exceeds a pump limit, or opens the fault.
     """
 

@@ -288,9 +288,9 @@ class GainSpread:
 
     Attributes
     ----------
-    half : Fraction
+    present : Fraction
         Largest deviation at the present time.
-    aged : Fraction
+    past : Fraction
         Largest deviation at a time σ ago, divided by e^{ασ}.
     """
 

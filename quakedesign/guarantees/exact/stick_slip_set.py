@@ -272,7 +272,7 @@ class SampledStickSlip:
 
     @property
     def initial_errors(self) -> tuple[Fraction, Fraction]:
-        """Bounds of the initial errors [m, m/s], as `SampledLoop.start`: rest."""
+        """Bounds [m, m/s], as `SampledLoop.initial_errors`: 0 at rest."""
         return Fraction(0), Fraction(0)
 
 
@@ -418,7 +418,7 @@ def ranges(task: FaultPlant, ahead: Fraction, feedback: Range, moved: Fraction) 
 
     The slip is at most `ahead` [m] beyond the target, and at most `moved` [m] in a period.
 
-    β changes within a period by at most N̂|μ′|/b·`moved`, so that σ exceeds s/(bβ) by at most this relative amount.
+    β changes within a period by at most N̂|μ′|/b·`moved`, so σ exceeds S_chord/(bβ) by at most this fraction.
 
     Raises
     ------
@@ -667,7 +667,7 @@ def _carried(
         feedback, feedback0, (q1, q0) = feedback_row(sampled_loop, fastest + noise, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
         # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2.
-        # r' in the law contains noise, so that the reference may move `noise` less.
+        # r' in the law contains noise, so the reference may move `noise`·T less.
         moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
         late = abs(n1) * number(bend * step**2 / 2) + (abs(n1) + n1) * number(noise * step / 2)
         late = back.array(moves.tolist()) * late
@@ -879,7 +879,7 @@ class Verifier:
         return np.asarray(largest + constants)
 
     def _rest(self, left: np.ndarray, off: np.ndarray) -> np.ndarray:
-        """Bound of the remainder of the multipliers, within `cut_off`, by the signs of e1, y and δ."""
+        """Bound of the remainder of the multipliers, within `off`, by the signs of e1, y and δ."""
         left = left * np.array([self.sign, 1, 1, 1][: left.shape[1]])
         left[:, 2] = abs(left[:, 2])
         return np.asarray((np.maximum(left + off, 0) * self.sizes).sum(axis=1))

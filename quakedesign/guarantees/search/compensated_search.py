@@ -125,7 +125,7 @@ _RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # ratios of B0 to the m
 _ROOM = Fraction(5, 4)  # largest peak of `tracking` over the smallest
 _SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8", "0.7", "0.6"))
 _REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # shares of a deadbeat slip-rate error
-_NEARLY = 2  # number of these slopes accepted as nearly deadbeat in the choice of a scale
+_NEARLY = 2  # number of _SLOPES accepted as nearly deadbeat in the choice of a scale
 _MARGIN = Fraction(21, 20)
 _DEADBEAT = ImplicitStep(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
 _STARTS = (0.2, 0.75), (0.35, 1.0)  # weight, and B0 over the midpoint of the input gain, for long and short T_s
@@ -279,7 +279,7 @@ def design_compensated(
     gains. So weight and authority are chosen for the deadbeat step, on a grid of `weights`. ``peak``: the smallest
     estimated slip-rate error. ``tracking``: the smallest slip error under a drifting disturbance, among laws whose
     estimated slip-rate error is at most 1.25 times the smallest. λ = ρ⁶ is then the smallest scale for which the step
-    is nearly deadbeat for all claimed errors.
+    is nearly deadbeat for 1.05 times all estimated errors.
     """
     require_ordinary(step=step)
     return _made(task, controller, step, _deadbeat(task, step, objective, weights, setup=setup), setup)
@@ -590,7 +590,7 @@ def _smallest_scale(
     errors: tuple[Fraction, Fraction],
     slopes: tuple[Fraction, ...],
 ) -> Fraction | None:
-    """Smallest λ of the ladder whose solution lies in the sector up to a deadbeat step."""
+    """Smallest λ of the ladder with γ from the first possible slope to 1; else None."""
     slip, rate = (_MARGIN * v for v in errors)
 
     def deadbeat(slope: Fraction, implicit_step: Fraction) -> bool:

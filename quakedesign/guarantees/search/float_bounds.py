@@ -126,7 +126,7 @@ def distance(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bounds
 
 
 def distance_of_bounds(bounds: Bounds | NoProof) -> tuple[float, Bounds | None]:
-    """Closeness of given bounds."""
+    """Distance of given bounds."""
     return _distance(bounds, _small(bounds))
 
 

@@ -115,14 +115,14 @@ def _decay(loop: PeriodicLoop) -> float:
 OBJECTIVES = ("tracking", "peak")
 _EVALUATIONS = 150
 _FEW = 45  # evaluations near a law that has a guarantee at another T_s or delay
-_SURE = 0.9  # closeness that is sufficient
+_SURE = 0.9  # distance that is sufficient
 _NARROW = 1.25  # `allowance` with aperiodic sampling: a larger one increases the bound of the slip error too
 _FEWER = 80  # evaluations with aperiodic sampling
 _CREEPING = 0.1  # weight of slip error per period over that of slip-rate error, to avoid slow convergence
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most that a file may have
 _MOST_GROWTH = 50.0  # logarithm of growth per period that no sampled law stabilises; far above it predictions overflow
 _FAILED = 1e6
-_HOPELESS = 1.2  # no other start is tried if a search ends with a small gain above this
+_HOPELESS = 1.2  # diffusion path: no other start is tried above this final small gain
 _SETTLES = 0.9  # largest decay factor per period of the law's poles, fault at rest, except the integral's
 _WIDE = 0.05  # initial range around a small number
 _FAR, _ENOUGH = 3.0, 40  # a search stops if the small gain is still above _FAR after _ENOUGH evaluations
@@ -134,7 +134,7 @@ class Closest:
 
     Attributes
     ----------
-    closeness : float
+    distance : float
         Distance from a guarantee in floats: below 1 if a proof is expected, else the small-gain factor plus 1.
     numbers : numpy.ndarray
         Parameters of the law in its family.
@@ -333,7 +333,7 @@ class _Laws:
         return search_near(("near peak", *self.problem), cost, start, evaluations=_FEW, wide=True)[1]
 
     def close(self, x: np.ndarray) -> tuple[float, Bounds | None]:
-        """Closeness to a guarantee, and the bounds if one is expected."""
+        """Distance from a guarantee; bounds if a proof is expected."""
         if self.template.longest_step:
             seen = self.seen(x)
             return (inf, None) if seen is None else distance_of_bounds(seen.bounds)
@@ -348,9 +348,9 @@ class _Laws:
         return seen.bounds if seen is not None and not seen.bounds.available else None
 
     def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
-        """Smallest peak cost near a start, with its numbers; ends early far from a guarantee.
+        """Smallest peak cost near a start, with its numbers.
 
-        With a diffusion path every evaluation takes 0.1 s.
+        With a diffusion path, at 0.1 s an evaluation, it ends early far from a guarantee.
         """
         far = _FAR * _FAILED if self.template.diffusion else inf
         settings = self._effort | settings
@@ -497,7 +497,7 @@ _LONGEST_TIMES_FAR = 2.0  # small gain above which a time is halved
 
 RATE, SATURATION, LONGEST, BOX, AMPLITUDE = "rate_limit", "saturation", "longest_step", "box", "amplitude"
 LIMITING = (RATE, LONGEST, "delay_jitter", "jitter", "averaging", "delay", "lag", "diffusion", BOX)
-"""Quantities that may be too large for any design, those easiest to change first; pressures are checked before them."""
+"""Quantities that may prevent any design, those easiest to change first; pressures are checked before them."""
 _LONGEST_TIMES_FEWER = 8  # attempts, each with a second start where the first fails
 _ANY_RATE = Fraction(10**30)  # [Pa/s]
 
@@ -565,8 +565,8 @@ def longest_step(
     task : FaultPlant
     measured, setup
         As in `design_sampled_law`.
-    kind : Kind, optional
-        Kind of the laws; linear ones unless given.
+    kind : LawSearch, optional
+        Family of laws; linear unless given.
     """
     late = sum(map(float, setup.path.values()))
     return _farthest(kind or LinearLawSearch(measured), lambda step: (task, step, setup), _first_step(task, late), None)
@@ -754,7 +754,7 @@ def _farthest(
 
     Parameters
     ----------
-    laws : Kind
+    laws : LawSearch
     problem_with : callable
         Plant, T_s and setup of the design for a time [s].
     first : Fraction
