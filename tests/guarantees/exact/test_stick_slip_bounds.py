@@ -3,6 +3,7 @@
 from dataclasses import replace
 from fractions import Fraction as F
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.optimize import linprog
 
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.guarantees import load_guarantee
 from quakedesign.guarantees.exact import stick_slip_set as module
 from quakedesign.guarantees.exact.stick_slip_set import COMBINATIONS, SLICES, StickSlipClaims, Verifier, gap
 
@@ -174,3 +176,33 @@ def test_claims_hold_if_every_bound_is_within_them():
         assert not CLAIMS.follow(replace(CLAIMS, **{name: UpperBound(getattr(CLAIMS, name) + F(1, 10**9))}))
         assert CLAIMS.follow(replace(CLAIMS, **{name: UpperBound(getattr(CLAIMS, name) - F(1, 10**9))}))
     assert not CLAIMS.follow(replace(CLAIMS, least_pressure=LowerBound(F(-8))))
+
+
+# ----------------------------------------------------------------------
+# The set and the loop.
+
+STORED = load_guarantee(Path(__file__).parents[3] / "proofs" / "certificates" / "stick_slip_real-fault.json")
+
+
+@pytest.mark.parametrize("place", range(5))
+@pytest.mark.parametrize("change", ["sign", "axis", "zero", "second"])
+def test_the_first_five_facets_bound_e1_y_and_d(place, change):
+    """Along +e1, +y, +d, −e1 and −d, in this order, each alone."""
+    found, axis = STORED.invariant_set, (0, 1, 2, 0, 2)[place]
+    row = list(found.facets[place])
+    value = row[axis]
+    assert value * (1, 1, 1, -1, -1)[place] > 0
+    other = (axis + 1) % 3
+    row[axis] = {"sign": -value, "axis": F(0), "zero": F(0), "second": value}[change]
+    row[other] = value if change in ("axis", "second") else F(0)
+    facets = (*found.facets[:place], tuple(row), *found.facets[place + 1 :])
+    with pytest.raises(ParameterError, match=r"begin with facets along \+e1, \+y, \+d, -e1 and -d alone"):
+        replace(found, facets=facets)
+
+
+def test_the_errors_of_an_implicit_step_count_noise_and_the_rate_of_the_reference():
+    """|e1 + n| ≤ |e1| + N, and |y − r′| ≤ max(y, max r′), as both rates are not negative."""
+    fastest = STORED.task.reference_rates[0]
+    noisy = replace(STORED.sampled_loop, slip_noise=STORED.sampled_loop.law.rest_slip / 3)
+    assert noisy.errors(STORED.task, F(5), 2 * fastest) == (5 + noisy.slip_noise, 2 * fastest)
+    assert noisy.errors(STORED.task, F(5), fastest / 2) == (5 + noisy.slip_noise, fastest)
