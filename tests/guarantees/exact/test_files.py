@@ -17,7 +17,7 @@ from quakedesign.checking import check_files
 from quakedesign.errors import CertificateError
 from quakedesign.exact import UpperBound
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import SampledLoop, continuous_peaks, guarantee
+from quakedesign.guarantees import SampledLoop, continuous_peaks, guarantee, read_guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, save_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.lqg import family_of
@@ -512,3 +512,12 @@ def test_what_is_claimed_too_low_is_undecided_by_itself():
         replace(found, claims=replace(found.claims, slip_error=UpperBound(found.claims.slip_error / 2))).check()
         is Verdict.UNDECIDED
     )
+
+
+@pytest.mark.parametrize("kind", ["another", "not-sos", "", None])
+def test_a_file_of_another_kind_is_not_read_as_a_guarantee(kind):
+    raw = json.loads((Path(__file__).parents[3] / "proofs" / "certificates" / "guarantee_real-fault.json").read_text())
+    with pytest.raises(CertificateError, match="kind must be"):
+        read_guarantee(raw | {"kind": kind})
+    with pytest.raises(CertificateError, match="kind must be guarantee"):
+        read_guarantee({key: entry for key, entry in raw.items() if key != "kind"})
