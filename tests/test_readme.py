@@ -60,7 +60,9 @@ def test_every_command_explains_itself(name, capsys):
     with pytest.raises(SystemExit) as end:
         main([name, "--help"])
     assert end.value.code == 0
-    assert "--json" in capsys.readouterr().out
+    out = capsys.readouterr().out
+    assert "--json" in out
+    assert "--empty-" not in out
 
 
 def test_every_verdict_on_a_polynomial_in_it_is_the_one_given():

@@ -13,7 +13,7 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from cyclopts import App
+from cyclopts import App, Parameter
 from rich.console import Console
 from rich.text import Text
 
@@ -56,6 +56,7 @@ app = App(
     help="Design controllers that let a fault slip slowly instead of in an earthquake, and prove that they do.",
     version_flags=["--version"],
     suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(negative=""),  # no --no-… and --empty-… options
 )
 
 

@@ -5,7 +5,7 @@ They design, prove, simulate and compare the controllers of one fault and write 
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from cyclopts import Parameter
 
@@ -85,7 +85,7 @@ class DesignOptions(WellOptions):
     box: Box = None
     disturbance: Shaking = None
     objective: Literal["tracking", "peak"] = "tracking"
-    continuous: Annotated[bool, Parameter(negative="")] = False
+    continuous: bool = False
     measured: Literal["slip-and-rate", "slip"] = "slip-and-rate"
     disturbance_class: DisturbanceClass = "amplitude"
     scheme: str | None = None
@@ -93,8 +93,8 @@ class DesignOptions(WellOptions):
     spread: str = "0"
     published_scheme: str = "continuous"
     plant: Literal["stick-slip", "printed"] | None = None
-    whole_task: Annotated[bool, Parameter(negative="")] = False
-    accept_poor_fit: Annotated[bool, Parameter(negative="")] = False
+    whole_task: bool = False
+    accept_poor_fit: bool = False
 
     def problem(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
         """Fault of a name, and the arguments of `designed_comparison`; checked before heavy libraries load."""
@@ -159,7 +159,7 @@ def design(
     out: Path | None = None,
     format: Formats = ("svg",),
     force: Force = False,
-    verbose: Annotated[bool, Parameter(negative="")] = False,
+    verbose: bool = False,
     output: Output = PLAIN,
 ) -> int:
     """Design, prove and simulate controllers, compare them with published gains, and write a report.
@@ -251,7 +251,7 @@ def compare(
     /,
     *,
     options: DesignOptions = _FIGURES_AS_USUAL,
-    verbose: Annotated[bool, Parameter(negative="")] = False,
+    verbose: bool = False,
     output: Output = PLAIN,
 ) -> int:
     """Do the same as `design`, but only print the comparison; no files are written.

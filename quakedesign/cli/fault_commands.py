@@ -43,9 +43,7 @@ def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> in
 
 
 @app.command
-def derive(
-    fault: FaultName, /, *, latex: Annotated[bool, Parameter(negative="")] = False, output: Output = PLAIN
-) -> int:
+def derive(fault: FaultName, /, *, latex: bool = False, output: Output = PLAIN) -> int:
     """Derive the equations of a fault from its force balance.
 
     Parameters
@@ -150,7 +148,7 @@ def init(
     /,
     *,
     law: str = "exponential-slip-weakening",
-    schema: Annotated[bool, Parameter(negative="")] = False,
+    schema: bool = False,
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
@@ -186,7 +184,7 @@ def init(
     return 0
 
 
-_AROUND = (
+_SOURCE = (
     "Preset or .toml file, from which the file to write takes all but the friction; without T_s and disturbance if "
     "only the identified friction has a state."
 )
@@ -208,11 +206,11 @@ def identify(
     states: Whole = 1,
     trend: Literal["auto", "displacement", "time", "none"] = "auto",
     seed: Whole = 0,
-    fault: Annotated[FaultName, Parameter(help=_AROUND)] = "lab-fault",
+    fault: Annotated[FaultName, Parameter(help=_SOURCE)] = "lab-fault",
     out: Path | None = None,
     figure: Path | None = None,
     force: Force = False,
-    verbose: Annotated[bool, Parameter(negative="")] = False,
+    verbose: bool = False,
     output: Output = PLAIN,
 ) -> int:
     """Identify friction parameters, with confidence regions, from a laboratory record.

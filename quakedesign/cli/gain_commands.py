@@ -179,7 +179,7 @@ def _print(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> 
 # ----------------------------------------------------------------------
 # The command that maps certified gains.
 
-Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
+Numbers = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
 
 @app.command(name="map")

@@ -60,7 +60,7 @@ def guarantee(
     spread: str = "0",
     box: Box = None,
     disturbance: Shaking = None,
-    accept_poor_fit: Annotated[bool, Parameter(negative="")] = False,
+    accept_poor_fit: bool = False,
     workers: Whole = 1,
     scheduler: Scheduler = None,
     out: Path | None = None,

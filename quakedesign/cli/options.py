@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # Values of options: numbers with units, exact numbers, whole numbers, gains.
 
 # Negative decimals are accepted anyway. With leading hyphens allowed, later options would be read as values.
-Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")]
+Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
 
 def _gains(_type: object, tokens: Sequence[Token]) -> tuple[str, ...]:
@@ -47,7 +47,7 @@ def _gains(_type: object, tokens: Sequence[Token]) -> tuple[str, ...]:
     return texts
 
 
-Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains, negative="")]
+Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_gains)]
 
 
 def quantity(unit: str) -> Callable[[object, Sequence[Token]], float]:
@@ -174,9 +174,9 @@ Scheduler = Annotated[
 ]
 Formats = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
-    Parameter(consume_multiple=True, negative="", help="File formats of the figures, one or several: svg, pdf, png."),
+    Parameter(consume_multiple=True, help="File formats of the figures, one or several: svg, pdf, png."),
 ]
-Force = Annotated[bool, Parameter(negative="", help="Replace the output of an earlier run.")]
+Force = Annotated[bool, Parameter(help="Replace the output of an earlier run.")]
 
 
 @Parameter(name="*")
@@ -198,11 +198,11 @@ class Output:
         Allow fault files to run code: friction as module:Class. Only for files that you trust.
     """
 
-    json: Annotated[bool, Parameter(negative="")] = False
-    quiet: Annotated[bool, Parameter(negative="")] = False
+    json: bool = False
+    quiet: bool = False
     log_level: Literal["warning", "info", "debug"] = "warning"
-    no_cache: Annotated[bool, Parameter(negative="")] = False
-    allow_code: Annotated[bool, Parameter(negative="")] = False
+    no_cache: bool = False
+    allow_code: bool = False
 
     def __post_init__(self) -> None:
         if self.no_cache:

@@ -31,7 +31,7 @@ COLUMNS = (
     "slip error [m]",
     "rate error [m/s]",
     "RMS p [MPa]",
-    "tot. var. p [GPa]",
+    "Σ|Δp| [GPa]",
     "at rest",
     "on tra- jectory",
 )

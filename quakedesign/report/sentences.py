@@ -223,9 +223,9 @@ def margin_lines(analysis: Analysis) -> list[str]:
     if slope is not None and slope.certified:
         lines.append(f"friction-slope margin {slope.certified:.5g} certified; unstable from {slope.limit:.5g} on")
     if span is not None:
-        end = f"unstable at {span.low_limit:.4g}"
+        low = f"{span.low:.4g} (unstable at {span.low_limit:.4g})"
         lines.append(
-            f"certified ranges of beta: {span.low:.4g} to the box's upper end ({end}); its lower end to {span.high:.4g}"
+            f"certified ranges of beta: from {low} to the box's upper end; from its lower end to {span.high:.4g}"
         )
     return lines
 

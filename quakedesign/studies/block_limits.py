@@ -221,10 +221,10 @@ def _sliding(chain: BlockChain) -> tuple[np.ndarray, ...]:
     The last two matrices give ln(v/V) as a function of these states and of the stresses.
     """
     for place, block in enumerate(chain.blocks, start=1):
-        if block.friction.stress_exponents[0]:
+        if sensitivity := getattr(block.friction, "stress_sensitivity", 0.0):
             raise ParameterError(
-                "limits of slow sliding need stress_sensitivity 0. Received "
-                f"{float(block.friction.stress_exponents[0]):g} in block {place}. Simulate this fault."
+                f"limits of slow sliding need stress_sensitivity 0. Received {sensitivity:g} in block {place}. "
+                "Simulate this fault."
             )
     models, N = [sliding_model(fault) for fault in chain.faults], len(chain.blocks)
     strength, weakening, aged, friction = (

@@ -234,7 +234,7 @@ def _limit_lines(largest: CertifiedLimit) -> list[str]:
     value = f"{LowerBound(largest.value)} (exactly {largest.value})"
     text = f"largest {names[largest.quantity]}: {value}, V of degree {largest.degree}"
     if largest.beyond is None and largest.sharp:
-        return [text, "this is within 1e-4 of the limit for every Lyapunov function"]
+        return [text, "this is within a relative 1e-4 of the limit of every Lyapunov function"]
     if largest.beyond is None:
         return [text, "the search ended there without reaching an upper limit"]
     beyond = f"at {UpperBound(largest.beyond)} no function of degree {degrees} was found"

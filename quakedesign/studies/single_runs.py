@@ -224,7 +224,7 @@ def run_sliding(
     method: str = "cvodes",
     claim: SlidingProof | None = None,
 ) -> tuple[SlidingRun, dict[str, Any]]:
-    """Run the e-LQR of `sliding_law`, or of a guarantee, on a fault in steady sliding at first; also returns its JSON.
+    """Run the e-LQR of `sliding_law`, or of a guarantee, from steady sliding; also returns its JSON.
 
     Parameters
     ----------

@@ -345,9 +345,10 @@ def _sliding(
     if path and not setup.diffusion:
         raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit diffusion for a well near the fault.")
     if setup.delay or setup.lag:
+        received = f"delay {float(setup.delay):g} s and lag {float(setup.lag):g} s with {fault.friction.name}"
         raise ParameterError(
-            f"a design for friction with a state has no delay or lag, only a diffusion path. Received a delay or lag "
-            f"with {fault.friction.name}. Omit delay and lag, or use guarantee, which takes both."
+            "a design for friction with a state has no delay or lag, only a diffusion path. "
+            f"Received {received}. Omit delay and lag, or use guarantee, which takes both."
         )
     if why := method_of(law).without_state:
         raise UnsupportedError(f"{why}. Received {law.name}. Design an elqr.")

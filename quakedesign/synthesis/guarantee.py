@@ -172,13 +172,14 @@ def guarantee(
     setup = setup.with_given(**entered)
     if plant is not None:
         require_known(plant, PLANTS, "plant")
+    uncertainty = exact_value(spread, "", "spread")
     chosen: dict[str, object] = {
-        f"plant {plant!r}": plant not in (None, PRINTED),
-        f"objective {objective!r}": objective != OBJECTIVES[0],
-        f"class {disturbance_class!r}": disturbance_class != CLASSES[0],
-        "gains": len(gains),
-        "scheme": scheme is not None,
-        "spread": exact_value(spread, "", "spread"),
+        "plant": None if plant == PRINTED else plant,
+        "objective": None if objective == OBJECTIVES[0] else objective,
+        "class": None if disturbance_class == CLASSES[0] else disturbance_class,
+        "gains": bool(len(gains)),
+        "scheme": scheme,
+        "spread": uncertainty,
     }
     if isinstance(fault, BlockChain):
         fault = replace(fault, fault=with_accepted_fit(fault.fault, accept_poor_fit))
@@ -186,11 +187,11 @@ def guarantee(
         if fault.has_state:
             designed = controller in ("elqr", *BLOCK_LAWS)
             other = dict.fromkeys(sorted(setup.given().keys() - {"step", "lag"}), True)
-            wrong = chosen | other | {"law": law is not None, f"controller {controller!r}": not designed}
-            if stress is None or any(wrong.values()):
+            wrong = chosen | other | {"law": law is not None, "controller": None if designed else controller}
+            if stress is None or _names(wrong):
                 raise ParameterError(
                     "a guarantee of blocks in slow sliding needs stress (--stress) and lag (--lag, near D_c/(10 V)), "
-                    f"and takes only step (--step, near D_c/(20 V)) besides. Received {_names(wrong, 'no stress')}."
+                    f"and takes only step (--step, near D_c/(20 V)) besides. Received {_names(wrong) or 'no stress'}."
                 )
             blocks = SlidingBlocks(chain=fault, lag=setup.lag, stress=exact_value(stress, "Pa", "stress"))
             assert setup.step is not None
@@ -200,10 +201,10 @@ def guarantee(
     if isinstance(fault, UncertainPlant):
         of_blocks = law is None and not len(gains) and "slope of block 1" in fault.sectors
         named = isinstance(controller, str) and (controller == "elqr" or (of_blocks and controller in BLOCK_LAWS))
-        wrong = chosen | {"gains": False, "stress": stress is not None, f"controller {controller!r}": not named}
-        if any(wrong.values()):
+        wrong = chosen | {"gains": False, "stress": stress, "controller": None if named else controller}
+        if received := _names(wrong):
             raise ParameterError(
-                f"options of a fault do not apply to an uncertain plant. Received {_names(wrong)}. Omit these."
+                f"options of a fault do not apply to an uncertain plant. Received {received}. Omit these."
             )
         proof = guarantee_plant(fault, law, gains, setup, decentralised=controller == BLOCK_LAWS[1])
         return PlantGuarantee(proof=proof)
@@ -218,12 +219,11 @@ def guarantee(
         raise ParameterError("law and controller are the same argument. Received both. Omit controller.")
     slides = fault.friction.equilibrium is STEADY_SLIDING
     if law is not None:
-        wrong = chosen | {f"{fault.friction.name} friction": slides, "stress": stress is not None}
-        wrong[f"class {disturbance_class!r}"] = False
-        if any(wrong.values()):
+        wrong = chosen | {"class": None, "stress": stress, f"{fault.friction.name} friction": slides}
+        if received := _names(wrong):
             raise ParameterError(
                 "a given law has guarantees on the plant without stick, for friction without a state. Received "
-                f"{_names(wrong)}. Omit these, or use a fault whose friction has no state."
+                f"{received}. Omit these, or use a fault whose friction has no state."
             )
         require_known(disturbance_class, CLASSES, "class")
         task = uncertain_plant(fault, rate_limited=disturbance_class == "rate")
@@ -235,29 +235,27 @@ def guarantee(
         family = control_law(controller)
         takes_gains = method_of(family).takes_base_gains
         wrong = {
-            f"controller {family.name!r}": not takes_gains and family.name != "elqr",
-            "gains": not takes_gains and len(gains),
-            f"scheme {scheme!r}": scheme not in ((None, STICK_SLIP) if takes_gains else (None,)),
-            "stress": stress is not None,
-            "spread": chosen["spread"],
+            "controller": None if takes_gains or family.name == "elqr" else family.name,
+            "gains": not takes_gains and bool(len(gains)),
+            "scheme": None if takes_gains and scheme == STICK_SLIP else scheme,
+            "stress": stress,
+            "spread": uncertainty,
         }
-        if any(wrong.values()):
+        if received := _names(wrong):
             raise ParameterError(
                 "a guarantee on the stick-slip plant needs a designed elqr or a sliding mode in the scheme stick-slip, "
-                f"and friction without a state. Received {_names(wrong)}. Omit these."
+                f"and friction without a state. Received {received}. Omit these."
             )
         require_known(objective, OBJECTIVES, "objective")
         mode = method_of(family).base_law(uncertain_plant(fault), family, _exact_texts(gains))
         return guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
     stress_bound = None if stress is None else exact_value(stress, "Pa", "stress")
-    uncertainty = exact_value(spread, "", "spread")
     if slides:
-        wrong = chosen | dict.fromkeys(sorted(setup.given().keys() - set(_OF_SLOW_SLIDING)), True)
-        wrong["spread"] = False
-        if any(wrong.values()):
+        wrong = chosen | dict.fromkeys(sorted(setup.given().keys() - set(_OF_SLOW_SLIDING)), True) | {"spread": None}
+        if received := _names(wrong):
             raise ParameterError(
                 "slow sliding has a guarantee for a designed law of the slip alone, from steady sliding, under a "
-                f"stress of bounded amplitude. Received {_names(wrong)}. Omit these options."
+                f"stress of bounded amplitude. Received {received}. Omit these options."
             )
         tell: Any = {} if progress is None else {"tell": progress}
         return guarantee_sliding(
@@ -305,9 +303,14 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
     return replace(result, proof=NoProof(reason=slow))
 
 
-def _names(wrong: Mapping[str, object], otherwise: str = "") -> str:
-    """Names of what was given and does not apply."""
-    return ", ".join(name for name, is_wrong in wrong.items() if is_wrong) or otherwise
+def _names(wrong: Mapping[str, object]) -> str:
+    """Names of what was given and does not apply, with the values that are not None, zero or a truth value."""
+    given = {name: value for name, value in wrong.items() if value is not None and value != 0}
+    return ", ".join(name if value is True else f"{name} {_shown(value)}" for name, value in given.items())
+
+
+def _shown(value: object) -> str:
+    return str(value) if isinstance(value, Fraction) else repr(value)
 
 
 def _exact_texts(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:

@@ -370,7 +370,7 @@ def test_what_a_law_is_designed_for_stands_where_nothing_is_given(monkeypatch):
 
 @pytest.mark.parametrize("given", [{"pressure": "1 MPa"}, {"start": "steady"}, {"hold": 1.0}, {"share": 0.5}])
 def test_a_controlled_run_sets_pressure_and_start_itself(given):
-    with pytest.raises(ParameterError, match="are for runs without a controller"):
+    with pytest.raises(ParameterError, match=f"are for runs without a controller. Received --{next(iter(given))} with"):
         StateOptions(**given).of_control()
     assert StateOptions(**given).of_free().keys() == given.keys()
     with pytest.raises(ParameterError, match=r"need friction with a state\. Received exponential-slip-weakening"):

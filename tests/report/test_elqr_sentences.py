@@ -61,6 +61,5 @@ def test_margins_are_rounded_towards_what_is_proved_and_limits_away_from_it():
     decay, slope, span = margin_lines(found)
     assert "0.5555 1/s certified" in decay
     assert slope == "friction-slope margin 1.2345 certified; unstable from 1.2346 on"
-    assert (
-        span == "certified ranges of beta: 0.7001 to the box's upper end (unstable at 0.6999); its lower end to 5.699"
-    )
+    upper, lower = "from 0.7001 (unstable at 0.6999) to the box's upper end", "from its lower end to 5.699"
+    assert span == f"certified ranges of beta: {upper}; {lower}"

@@ -9,7 +9,8 @@ from thinned import few
 from quakedesign.errors import ParameterError
 from quakedesign.laws.dia import DiscontinuousIntegral
 from quakedesign.lyapunov import Verdict
-from quakedesign.studies.certified import certified
+from quakedesign.lyapunov.search.certify import CertifiedLimit
+from quakedesign.studies.certified import _limit_lines, certified
 
 KEYS = {
     "verdict", "lipschitz", "gain_range", "decay", "settling", "limit", "counterexample", "dual", "certificate",
@@ -39,7 +40,7 @@ def test_the_largest_bound_is_told_with_what_limits_it_and_the_scale_for_a_large
     assert answer.certificate.loop.uncertain["d"][1] == value
     said = "\n".join(answer.lines)
     assert f"(exactly {value})" in said
-    assert "the search finds none of degree 3, 4, 6, 8, 10" in said
+    assert "no function of degree 3, 4, 6, 8, 10 was found" in said
     assert "lambda >=" in said
 
 
@@ -142,3 +143,23 @@ def test_gains_that_no_certificate_can_express_are_undecided_with_the_reason():
 def test_bad_wishes_get_one_clear_message(wish, message):
     with pytest.raises(ParameterError, match=message):
         certified(*TWISTING, **wish)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ({"value": None}, ["nothing is proved with Lyapunov functions of degree 2, 4"]),
+        ({"limit": F(1)}, ["the search ended there without reaching an upper limit"]),
+        ({"limit": F(50005, 10**5)}, ["this is within a relative 1e-4 of the limit of every Lyapunov function"]),
+        ({"beyond": F(50005, 10**5)}, ["at 0.50005 no function of degree 2, 4 was found"]),
+        ({"beyond": F(3, 5)}, ["at 0.6 no function of degree 2, 4 was found; between the two values nothing is known"]),
+    ],
+)
+def test_the_lines_about_a_largest_value_say_what_limits_it(numbers, said):
+    """Of the value 1/2; four digits of it are known if the next number is at most 1/2·(1 + 1e-4)."""
+    found = CertifiedLimit(
+        quantity="lipschitz", value=F(1, 2), beyond=None, limit=None, degrees=(2, 4), degree=4, certificate=None,
+        counterexample="none", solves=0, seconds=0,
+    )  # fmt: skip
+    first = ["largest bound on |h'|: 0.5 (exactly 1/2), V of degree 4"] * (numbers.get("value", F(1, 2)) is not None)
+    assert _limit_lines(replace(found, **numbers)) == first + said

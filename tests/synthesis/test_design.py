@@ -210,3 +210,18 @@ def test_a_step_of_the_setup_is_the_sampling_time_of_the_fault(real):
     qd.design(real, Noted, step="140 ms", delay="1 ms")
     qd.design(replace(real, sampling_time=0.14), Noted, delay="1 ms")
     assert seen == 3 * [(replace(real, sampling_time=0.14), qd.LoopSetup(delay="1 ms"))]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"objective": "peak"}, "objective 'peak'"),
+        ({"disturbance_class": "rate"}, "class 'rate'"),
+        ({"slip_noise": "1 um"}, "noise"),
+        ({"rate_noise": "1 um/s", "objective": "peak"}, "objective 'peak', noise"),
+        ({"continuous": True}, "continuous"),
+    ],
+)
+def test_a_design_for_slow_sliding_rejects_what_does_not_apply(more, said):
+    with pytest.raises(ParameterError, match=f"designed for the sampled loop without noise.* Received {said}. Omit"):
+        qd.design(qd.load_fault("crustal-patch"), "elqr", diffusion="800 s", **more)

@@ -8,7 +8,8 @@ import quakedesign as qd
 from quakedesign.errors import ParameterError, UnitError
 from quakedesign.loop.loop_setup import LoopSetup
 
-REAL = qd.load_fault("real-fault")
+REAL, LAB, CRUSTAL = map(qd.load_fault, ("real-fault", "lab-fault", "crustal-patch"))
+STATIC_LAW = qd.SampledLaw.from_gains([1, 1, 1], step="0.1")
 GAINS = ("6.96e8", "2.53e8", "6.02e8", "2.16e8")
 
 
@@ -48,12 +49,59 @@ def test_what_is_no_quantity_and_belongs_to_another_friction_is_refused(more, er
         qd.guarantee(REAL, gains=GAINS, **more)
 
 
+PLANT = ({"plant": "stick-slip"}, "plant 'stick-slip'")
+OBJECTIVE = ({"objective": "peak"}, "objective 'peak'")
+CLASS = ({"disturbance_class": "rate"}, "class 'rate'")
+GIVEN = ({"gains": GAINS}, "gains")
+SCHEME = ({"scheme": "explicit"}, "scheme 'explicit'")
+SPREAD = ({"spread": "0.1"}, "spread 1/10")
+STRESS = ({"stress": "25 kPa"}, "stress '25 kPa'")
+
+
 @pytest.mark.parametrize(
-    "more", [{"gains": GAINS}, {"objective": "peak"}, {"rate_noise": "1 um/s"}, {"jitter": "1 ms"}]
+    ("more", "said"),
+    [OBJECTIVE, CLASS, GIVEN, SCHEME, ({"rate_noise": "1 um/s"}, "rate_noise"), ({"jitter": "1 ms"}, "jitter")],
 )
-def test_slow_sliding_refuses_what_it_has_no_use_for(more):
-    with pytest.raises(ParameterError, match="slow sliding has a guarantee for a designed law of the slip alone"):
-        qd.guarantee(qd.load_fault("crustal-patch"), lag="1 s", **more)
+def test_slow_sliding_rejects_what_does_not_apply(more, said):
+    with pytest.raises(ParameterError, match=f"slow sliding has a guarantee .*Received {said}. Omit"):
+        qd.guarantee(CRUSTAL, lag="1 s", spread="0.1", **more)
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [PLANT, OBJECTIVE, CLASS, SCHEME, SPREAD, STRESS, ({"controller": "cta"}, "controller 'cta'")],
+)
+def test_an_uncertain_plant_rejects_options_of_a_fault(more, said):
+    with pytest.raises(ParameterError, match=f"do not apply to an uncertain plant. Received {said}. Omit"):
+        qd.guarantee(qd.UncertainPlant(A=[[-1]], B=[[1]]), gains=[[1]], step="0.1", **more)
+
+
+@pytest.mark.parametrize(("more", "said"), [PLANT, OBJECTIVE, GIVEN, SCHEME, SPREAD, STRESS])
+def test_a_given_law_rejects_options_of_a_design(more, said):
+    with pytest.raises(ParameterError, match=f"a given law has guarantees .*Received {said}. Omit"):
+        qd.guarantee(LAB, law=STATIC_LAW, **more)
+
+
+def test_a_given_law_needs_friction_without_a_state():
+    with pytest.raises(ParameterError, match=r"Received rate-and-state-aging friction\. Omit"):
+        qd.guarantee(CRUSTAL, law=STATIC_LAW, disturbance_class="rate")
+
+
+@pytest.mark.parametrize(
+    ("controller", "more", "said"),
+    [
+        ("elqr", *GIVEN),
+        ("elqr", *SCHEME),
+        ("elqr", *SPREAD),
+        ("elqr", *STRESS),
+        ("cta", *SCHEME),
+        ("cta", *STRESS),
+        (qd.SampledLaw, {}, "controller 'user-law'"),
+    ],
+)
+def test_the_stick_slip_plant_rejects_what_does_not_apply(controller, more, said):
+    with pytest.raises(ParameterError, match=f"a guarantee on the stick-slip plant .*Received {said}. Omit"):
+        qd.guarantee(LAB, controller, plant="stick-slip", **more)
 
 
 def test_a_pump_withdraws_as_much_as_it_injects_unless_told():

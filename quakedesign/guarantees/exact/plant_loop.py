@@ -320,6 +320,8 @@ class _AllResponses:
                 now = now * leap
             done, check = check, 2 * check
             far = absolute(BALLS.part(now, height - size, height))
+            if not all(v < 1 << 80 for v in far.entries()):  # lost precision: more periods cannot show decay
+                raise _unstable()
             totals = [_total(sums, i, len(own), rest) for i, rest in enumerate(left)]
             wholes = [_raised(BALLS.part(total, height - size, height)) for total in totals]
             most = _raised(BALLS.part(free, height - size, height))

@@ -17,7 +17,7 @@ from scipy.linalg import expm
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.norms import START, Arithmetic, LoopResponses, SlowestMode, unstable
 from quakedesign.guarantees.exact.proof import NoProof
-from quakedesign.guarantees.exact.sampled_loop import GainSpread, SampledLoop
+from quakedesign.guarantees.exact.sampled_loop import Gains, GainSpread, SampledLoop
 from quakedesign.guarantees.exact.small_gain import Bounds, VaryingGain, bounds_from
 from quakedesign.laws import LinearLaw
 from quakedesign.loop import PeriodicLoop
@@ -51,16 +51,7 @@ def estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | N
     gains = gains_of(sampled_loop.loop(task))
     if gains is None:
         return None
-    bounds = bounds_from(
-        task,
-        gains,
-        sampled_loop.law.implicit_step,
-        sampled_loop.step,
-        sampled_loop.noise,
-        None,
-        sampled_loop.timing_error,
-    )
-    return BoundsEstimate(bounds, max(gains["slip_error", "drift"]))
+    return BoundsEstimate(_bounds(task, sampled_loop, gains), max(gains["slip_error", "drift"]))
 
 
 def slowly_estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | None:
@@ -76,16 +67,15 @@ def slowly_estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstim
         every.append(gains | {(y, "aged"): v for (y, name), v in gains.items() if name == "acceleration"})
     whole = {key: tuple(v for gains in every for v in gains[key]) for key in every[0]}
     spread = GainSpread(present=_SPREAD * (high - low), past=Fraction(0))
-    bounds = bounds_from(
-        task,
-        whole,
-        sampled_loop.law.implicit_step,
-        sampled_loop.step,
-        sampled_loop.noise,
-        spread,
-        sampled_loop.timing_error,
-    )
-    return BoundsEstimate(bounds, max(whole["slip_error", "drift"]))
+    return BoundsEstimate(_bounds(task, sampled_loop, whole, spread), max(whole["slip_error", "drift"]))
+
+
+def _bounds(
+    task: FaultPlant, sampled_loop: SampledLoop, gains: Gains, spread: GainSpread | None = None
+) -> Bounds | NoProof:
+    """Bounds of a sampled loop with given gains."""
+    law, noise = sampled_loop.law, sampled_loop.noise
+    return bounds_from(task, gains, law.implicit_step, sampled_loop.step, noise, spread, sampled_loop.timing_error)
 
 
 def distance(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bounds | None]:
@@ -109,15 +99,7 @@ def distance(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bounds
     slip_error, least = 0.0, inf
     for turn in range(_TURNS):
         spread = replace(PARTS.spread(task, Fraction(slip_error)), past=Fraction(0))
-        bounds = bounds_from(
-            task,
-            whole,
-            sampled_loop.law.implicit_step,
-            sampled_loop.step,
-            sampled_loop.noise,
-            spread,
-            sampled_loop.timing_error,
-        )
+        bounds = _bounds(task, sampled_loop, whole, spread)
         least = min(least, _small(bounds))
         if not bounds.available or bounds.slip_error <= slip_error:
             return _distance(bounds, least)

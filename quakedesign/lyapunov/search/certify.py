@@ -345,13 +345,13 @@ class CertifiedLimit:
     degree: int | None  # Degree of V in the certificate
     # Proof for the value; without a proof, the exact counterexample, if one is known
     certificate: Certificate | None
-    counterexample: str  # Kind of counterexample if nothing is proved, see `against`; else ``"none"``
+    counterexample: str  # Kind of counterexample if nothing is proved, see `counterexample_kind`; else ``"none"``
     solves: int
     seconds: float
 
     @property
     def sharp(self) -> bool:
-        """Whether the value is the largest for its family of V to four digits, or within 1e-4 of the limit."""
+        """Whether the value is the largest for its family of V to four digits, or within a relative 1e-4 of `limit`."""
         ends = [end for end in (self.beyond, self.limit) if end is not None]
         return self.value is not None and any(end <= self.value * (1 + TOLERANCE) for end in ends)
 
