@@ -325,7 +325,7 @@ class Reached:
         raise TooLong
 
     def run(self, items) -> bytes:
-        """Run tests, each with its own fixtures."""
+        """Run tests, each with its own fixtures, up to one that is stopped: its fixtures may be left half built."""
         result = {}
         signal.signal(signal.SIGVTALRM, self.stop)
         for item in items:
@@ -340,6 +340,8 @@ class Reached:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0)
             verdict = None if self.stopped else passed  # the clock of the timer may run a little ahead of the other
             result[item.nodeid] = time.process_time() - start, verdict, dict(self.lines)
+            if verdict is None:
+                break
         return pickle.dumps(result)
 
 
@@ -433,9 +435,12 @@ class Mutation:
             result = pickle.loads(stored.read_bytes())
             if result.keys() == {item.nodeid for item in items}:
                 return result
-        _, answer = in_child(lambda: Reached(set(map(str, self.paths)), self.caches).run(items), 0)
-        stored.write_bytes(answer)
-        return pickle.loads(answer)
+        result = {}
+        while left := items[len(result) :]:
+            reached = Reached(set(map(str, self.paths)), self.caches)
+            result |= pickle.loads(in_child(lambda reached=reached, left=left: reached.run(left), 0)[1])
+        stored.write_bytes(pickle.dumps(result))
+        return result
 
     def try_out(self, mutant: Mutant, functions, modules, items) -> tuple[str, str]:
         """Run tests on a mutant; a failure counts where the same tests succeed without it."""
