@@ -484,6 +484,7 @@ class Period:
     of_rate: tuple[Any, Any]  # ξ and y at the end, per initial y
     of_force: tuple[Any, Any]  # and per constant force
     impulses: tuple[np.ndarray, np.ndarray]  # ξ and y after an impulse, at the nodes
+    weights: np.ndarray  # integrals of the hat functions of the nodes times t^j, j = 0 to 3
     bent: tuple[Any, Any]
     margin: tuple[Any, ...]  # for factors of ξ and y: excess of a bound between two checked intervals
 
@@ -507,7 +508,7 @@ class Period:
         for interval in sampled_loop.intervals:
             whole = back.exponential(tuple(tuple(v * interval for v in row) for row in tall))
             ends = [tuple(tuple(v * interval / NODES * i for v in row) for row in flow) for i in range(NODES + 1)]
-            nodes = list(map(back.exponential, ends))
+            nodes, h = list(map(back.exponential, ends)), interval / NODES
             period = cls(
                 back=back,
                 task=task,
@@ -517,6 +518,7 @@ class Period:
                 of_rate=(whole[0][1], whole[1][1]),
                 of_force=(whole[0][2], whole[1][2]),
                 impulses=(back.array([node[0][1] for node in nodes]), back.array([node[1][1] for node in nodes])),
+                weights=back.array([[weight * h ** (j + 1) for weight in line] for j, line in enumerate(_WEIGHTS)]),
                 bent=sizes[2],
                 margin=margin,
             )
@@ -533,10 +535,10 @@ class Period:
         above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
         sizes = abs(of_slip[:, None] * self.impulses[0] + of_rate[:, None] * self.impulses[1]) + above[:, None]
         sizes = sizes[:, ::-1]  # from the start of the period on
-        return [
-            sum((sizes[:, i] * number(weight * h ** (j + 1)) for i, weight in enumerate(line)), 0 * sizes[:, 0])
-            for j, line in enumerate(_WEIGHTS)
-        ]
+        total = 0 * sizes[:, :1]
+        for size, weights in zip(sizes.T, self.weights.T, strict=True):
+            total = total + size[:, None] * weights
+        return list(total.T)
 
     def more(self, whole: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Contribution of the ranges of slope and damping to the factors of y and H − bβU."""

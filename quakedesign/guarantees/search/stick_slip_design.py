@@ -355,15 +355,20 @@ def _normals(points: np.ndarray, count: int) -> np.ndarray:
     return np.asarray(np.vstack([axes, selected]) / size)
 
 
+def _floats(constraints: list[Constraint]) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and right-hand sides of constraints."""
+    rows, ends = zip(*constraints, strict=True)
+    return np.array(rows, dtype=float), np.array(ends, dtype=float)
+
+
 def _corners(
-    constraints: list[Constraint], size: np.ndarray, inside: np.ndarray | None = None
+    plain: np.ndarray, ends: np.ndarray, size: np.ndarray, inside: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Vertices of a polytope, their constraints, and all rows; None for an empty one.
 
     A probable interior point saves a linear program.
     """
-    rows = np.array([row for row, _ in constraints], dtype=float) * size
-    ends = np.array([end for _, end in constraints], dtype=float)
+    rows = plain * size
     length = np.linalg.norm(rows, axis=1)
     rows, ends = rows / length[:, None], ends / length
     dimension = rows.shape[1]
@@ -384,7 +389,7 @@ def _corners(
         return None
     finite = np.isfinite(meet.intersections).all(axis=1)
     facets = np.array([facet for facet, sound in zip(meet.dual_facets, finite, strict=True) if sound])
-    return meet.intersections[finite] * size, facets, np.array([row for row, _ in constraints], dtype=float)
+    return meet.intersections[finite] * size, facets, plain
 
 
 def _basis(rows: np.ndarray, ends: np.ndarray, factors: np.ndarray) -> tuple[int, ...] | None:
@@ -418,6 +423,14 @@ def _wide_periods(task: FaultPlant, sampled_loop: SampledStickSlip, size: tuple[
     most = most + law.rate_gain * rate + level + sampled_loop.pressure_noise
     plant = ranges(task, slip, (-most, most), rate * sampled_loop.longest)
     return Period.deciding(FLOATS, task, sampled_loop, plant, rate / _ROOM, (-most / _ROOM, most / _ROOM))
+
+
+@lru_cache(maxsize=64)
+def _wide_constraints(
+    task: FaultPlant, sampled_loop: SampledStickSlip, size: tuple[float, ...]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Constraints of slices and combinations besides the facets, for the same ranges."""
+    return list(map(_floats, polytopes(task, sampled_loop, (), _wide_periods(task, sampled_loop, size)[0].plant)))
 
 
 @dataclass
@@ -458,20 +471,24 @@ class _Growing:
         box = 1 / np.abs(self.facets[:5].sum(axis=1))
         return np.array([max(box[0], box[3]), box[1], max(box[2], box[4])])
 
+    @property
+    def _rounded(self) -> tuple[float, ...]:
+        """Sizes, rounded to two digits, as ranges are slow to compute."""
+        return tuple(float(f"{float(v):.1e}") for v in self.size)
+
     def periods(self) -> list[Period]:
-        """Periods with slightly widened ranges; sizes are rounded to two digits, as ranges are slow to compute."""
-        return _wide_periods(self.task, self.sampled_loop, tuple(float(f"{float(v):.1e}") for v in self.size))
+        """Periods with slightly widened ranges."""
+        return _wide_periods(self.task, self.sampled_loop, self._rounded)
 
     def images(self) -> "_Images | None":
         """Largest n·z of every normal n after a period, with the best multipliers; None for an empty polytope."""
-        periods = self.periods()
-        plant = periods[0].plant
-        facets = [tuple(Fraction(float(v)) for v in row) for row in self.facets]
+        periods, facets = self.periods(), self.facets
         sizes = np.append(self.size, self.size[1] * float(self.sampled_loop.longest))
         corners = []
-        for place, constraints in enumerate(polytopes(self.task, self.sampled_loop, facets, plant)):
-            tall = len(constraints[0][0])
-            at = _corners(constraints, sizes[:tall], self.centres.get(place))
+        for place, (rows, ends) in enumerate(_wide_constraints(self.task, self.sampled_loop, self._rounded)):
+            tall = rows.shape[1]
+            rows = np.vstack([np.pad(facets, ((0, 0), (0, tall - 3))), rows])
+            at = _corners(rows, np.append(np.ones(len(facets)), ends), sizes[:tall], self.centres.get(place))
             if at is None and tall == 3:
                 return None
             if at is not None:
@@ -677,7 +694,7 @@ class _Growing:
         sizes = np.append(self.size, self.size[1] * float(self.sampled_loop.longest))
         groups = polytopes(self.task, self.sampled_loop, facets, periods[0].plant)
         for constraints in groups:
-            at = _corners(constraints, sizes[: len(constraints[0][0])])
+            at = _corners(*_floats(constraints), sizes[: len(constraints[0][0])])
             if at is None:
                 return None
             bases.append([tuple(int(v) for v in basis) for basis in at[1]])
