@@ -1,5 +1,6 @@
 """The loop as matrices, against a schedule written out by hand."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 from random import Random
 
@@ -23,6 +24,8 @@ from quakedesign.laws import (
 )
 from quakedesign.laws.sampled_law import steady_states
 from quakedesign.loop import sampled_error_loop
+from quakedesign.loop.error_loop import starts
+from quakedesign.loop.periodic import Instants, Pulse
 
 STEP = F(1, 5)
 MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
@@ -194,6 +197,54 @@ def test_times_that_make_no_loop_are_refused(wrong, said):
     given = {"step": STEP} | wrong
     with pytest.raises(ParameterError, match=said):
         sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, **given)
+
+
+LATE = Instants(measured=F(1, 50), arrived=F(1, 40), ramp=F(3, 80))
+
+
+@pytest.mark.parametrize(("delay", "lag"), [("0", "0"), ("1/20", "0"), ("1/5", "1/4"), ("27/100", "1/4")])
+def test_a_late_pressure_is_a_pulse_about_its_arrival(delay, lag):
+    """It enters where the valve does: e2 with the gain of the push, or the lag. The drift goes on meanwhile."""
+    given = {"delay": F(delay), "lag": F(lag)}
+    loop = sampled_error_loop(INTEGRALS, MODEL, AUTHORITY, STEP, **given, instants=LATE)
+    (pulse,) = loop.pulses.values()
+    entry = named(loop, pulse.entry)
+    assert entry == ({"behind": 4} if F(lag) else {"e2": F(12, 5) / 2})
+    assert pulse == Pulse(
+        entry=pulse.entry,
+        first=0 if F(delay) % STEP == 0 else 1,
+        early=F(1, 40),
+        late=F(1, 16),
+        before=F(1, 40),
+        after=F(1, 40) + F(3, 160),
+    )
+    assert loop.feedthrough == {("asked" if F(lag) else "push", "drift"): F(1, 16)}
+    assert named(loop, loop.outputs["stepped"]) == {"stepped": 1}
+
+
+def test_without_late_pressures_there_is_no_pulse():
+    for instants in (Instants(), Instants(measured=F(1, 50))):
+        loop = sampled_error_loop(INTEGRALS, MODEL, AUTHORITY, STEP, instants=instants)
+        assert loop.pulses == loop.feedthrough == {}
+        assert named(loop, loop.outputs["stepped"]) == {"stepped": 1}
+    assert "stepped" not in sampled_error_loop(INTEGRALS, MODEL, AUTHORITY, STEP).outputs
+
+
+def test_timing_errors_stay_within_the_interval_and_have_no_diffusion_path():
+    with pytest.raises(ParameterError, match="must begin and end within one sampling interval"):
+        sampled_error_loop(INTEGRALS, MODEL, AUTHORITY, STEP, delay=F(1, 50), instants=LATE)
+    with pytest.raises(ParameterError, match=r"no guarantee with a diffusion path\. Received L\^2/D = 3 s"):
+        sampled_error_loop(INTEGRALS, MODEL, AUTHORITY, STEP, diffusion=F(3), instants=LATE)
+
+
+def test_a_loop_starts_with_errors_and_with_what_its_law_makes_of_measured_ones():
+    first = replace(INTEGRALS, first=((F(2), F(0)), (F(0), F(3))))
+    assert starts(first, 6, (F(5), F(7)), (F(1, 2), F(0))) == (
+        (5, 0, 10, 0, 0, 0),
+        (0, 7, 0, 21, 0, 0),
+        (0, 0, 1, 0, 0, 0),
+    )
+    assert starts(INTEGRALS, 6, (F(5), F(0)), (F(1), F(1))) == ((5, 0, 0, 0, 0, 0),)
 
 
 def test_sizes_that_do_not_fit_are_refused():

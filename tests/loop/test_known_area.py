@@ -134,3 +134,30 @@ def test_only_slip_rate_its_measurement_and_what_enters_are_changed():
     rows = [[row[behind] for row in one.flow] for one in with_lag]
     assert rows[1][1] - rows[0][1] == 30 * GAIN * LAYER.area
     assert set(with_lag[1].inputs) == {"acceleration", "drift", "awaited"}
+
+
+def test_bounds_contain_the_rounding_of_rates_and_shares():
+    """6Nδτ² of the statement; and with steps h/λ + f·τ over h + f, each with its own part of the sum."""
+    rounding = 6 * MODES * F(1, 10**20)
+    assert LAYER.response_integral == abs(LAYER.share(MODES)) / LAYER.rate(MODES) ** 2 + rounding * TIME**2
+    loop = loop_of(F(0), F(0))[1]
+    height, rate, floor = LAYER.truncation_bound(STEP)
+    assert floor > 0
+    most = height / rate + floor * TIME
+    assert loop.feedthrough["slip_rate_error", "awaited"] == GAIN * most / (height + floor)
+    assert loop.fading["awaited"].height == height / rate / most
+    assert loop.fading["awaited"].floor == floor * TIME / most
+
+
+@pytest.mark.parametrize("lag", [F(0), F(1, 30)])
+def test_the_law_measures_the_slip_rate_with_what_is_awaited(lag):
+    """z takes 1/7 of the measured slip rate, the pressure −2 of it; the slip rate itself does not jump."""
+    _, loop = loop_of(lag, F(0))
+    told = dict(zip(loop.states, loop.sampled["awaited_told"], strict=True))
+    own = loop.feedthrough["slip_rate_error", "awaited"]
+    late = own if lag else own * loop.fading["awaited"].weight(STEP)
+    assert told["z"] == late / 7
+    assert told["valve"] == -2 * AUTHORITY * late
+    assert told["e1"] == 0
+    area = 0 if lag else LAYER.area  # with steps at the well, the jump of the pressure moves the slip rate
+    assert told["e2"] == 2 * AUTHORITY * late * GAIN * area

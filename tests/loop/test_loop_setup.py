@@ -7,9 +7,11 @@ import pytest
 
 from quakedesign.cli.options import SetupOptions
 from quakedesign.errors import ParameterError, UnitError
+from quakedesign.exact import LowerBound, UpperBound
+from quakedesign.fault import load_fault
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup, SampledLoop
 from quakedesign.laws import summed_integrals
-from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Pump, quantities
+from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup, Pump, quantities, require_step
 
 
 def test_quantities_with_units_become_exact_numbers_in_si_units():
@@ -70,3 +72,61 @@ def test_every_quantity_is_an_option_with_its_unit_and_help():
     assert SetupOptions(slip_noise="1/1000000", delay="0.02").setup(measured=MEASURED[1]) == LoopSetup(
         slip_noise="1 um", delay="20 ms", measured="slip"
     )
+
+
+def test_a_step_is_from_a_nanosecond_to_a_gigasecond():
+    for step in (F(1, 10**9), F(10**9)):
+        require_step(step)
+        with pytest.raises(ParameterError, match="between 1e-9 s and 1e9 s"):
+            require_step(step + (step - 1) / 10**12)
+
+
+def test_the_step_of_a_setup_is_that_of_the_fault():
+    fault = load_fault("real-fault")
+    timed, rest = LoopSetup(step="50 ms", delay="20 ms").at_step(fault)
+    assert (timed.sampling_time, rest) == (0.05, LoopSetup(delay="20 ms"))
+    assert LoopSetup(delay="20 ms").at_step(fault) == (fault, LoopSetup(delay="20 ms"))
+
+
+def test_only_what_differs_from_an_ideal_loop_is_on_its_path_and_in_its_noise():
+    assert IDEAL.path == IDEAL.noise == {}
+    setup = LoopSetup(delay=1, lag=2, diffusion=3, slip_noise=4, rate_noise=5)
+    assert setup.path == {"delay": 1, "lag": 2, "diffusion": 3}
+    assert setup.noise == {"slip_noise": 4, "rate_noise": 5}
+
+
+def test_one_limit_of_a_pump_may_be_zero():
+    assert Pump(least=F(0), largest=F(5)).limits == (0, 5)
+    assert Pump(least=F(-5), largest=F(0)).limits == (-5, 0)
+    assert Pump(rate=F(3)).limits is None
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "within"), [(-3, 5, True), (-4, 5, False), (-3, 6, False), (-4, 6, False)], ids=str
+)
+def test_pressures_stay_within_both_limits(low, high, within):
+    said = Pump(least=F(-3), largest=F(5)).exceeded(LowerBound(F(low)), UpperBound(F(high)))
+    assert (said == "") is within
+    assert within or f"pressures from {low} Pa to {high} Pa may be commanded, but the pump supplies only -3 Pa" in said
+    assert Pump(rate=F(1)).exceeded(LowerBound(F(low)), UpperBound(F(high))) == ""
+
+
+def test_a_pump_makes_its_rate_times_the_time():
+    pump = Pump(rate=F(3))
+    assert pump.too_slow(UpperBound(F(6)), F(2)) == ""
+    assert "changes of 6.01 Pa from one sample" in pump.too_slow(UpperBound(F("6.01")), F(2))
+    assert "changes of any size from one sample" in pump.too_slow(None, F(2))
+    assert Pump(least=F(-1), largest=F(1)).too_slow(None, F(2)) == ""
+
+
+@pytest.mark.parametrize(
+    ("pump", "said"),
+    [
+        (Pump(least=F(-3), largest=F(5)), "with a pump of -3 Pa to 5 Pa, whose limits"),
+        (Pump(rate=F(2)), "with a pump of 2 Pa/s, whose limits"),
+        (Pump(least=F(-3), largest=F(5), rate=F(2)), "with a pump of -3 Pa to 5 Pa, 2 Pa/s, whose limits"),
+    ],
+    ids=["pressures", "rate", "both"],
+)
+def test_the_clause_on_a_pump_names_each_of_its_limits(pump, said):
+    assert pump.words().startswith(said)

@@ -1,8 +1,13 @@
 """Parts of a period, by hand."""
 
 from fractions import Fraction as F
+from math import exp, factorial
 
+import pytest
+
+from quakedesign.errors import ParameterError
 from quakedesign.loop import PeriodicLoop, Segment
+from quakedesign.loop.periodic import Fading, Instants
 
 ONE = ((F(1),),)
 
@@ -31,3 +36,40 @@ def test_loops_that_are_alike_are_one_key():
         for given in ({"v": (F(1),), "w": (F(2),)}, {"w": (F(2),), "v": (F(1),)})
     )
     assert {one: "first"}[other] == "first"
+
+
+@pytest.mark.parametrize("time", ["0", "1/9", "1/2", "5/3"])
+def test_an_input_that_decays_is_below_its_bound_by_five_terms_of_the_series(time):
+    input_ = Fading(entry=(F(1),), first=0, height=F(3), rate=F(3, 2), floor=F(1, 7))
+    x = F(3, 2) * F(time)
+    assert input_.weight(F(time)) == 3 / sum(x**k / factorial(k) for k in range(5)) + F(1, 7)
+    assert input_.weight(F(time)) >= 3 * exp(-x) + 1 / 7 - 1e-12
+
+
+STEP = F(1, 5)
+
+
+@pytest.mark.parametrize(
+    ("part", "times"),
+    [
+        ("0", {}),
+        ("0", {"measured": STEP / 2}),
+        ("0", {"arrived": STEP / 2}),
+        ("0", {"ramp": STEP}),
+        ("0", {"arrived": STEP / 4, "ramp": STEP / 2}),
+        ("1/20", {"arrived": F(1, 20), "ramp": F(1, 10)}),
+        ("1/8", {"ramp": F(3, 40)}),
+    ],
+)
+def test_timing_errors_may_fill_the_interval(part, times):
+    Instants(**times).require_within(STEP, F(part))
+    for name in times:
+        with pytest.raises(ParameterError, match="jitter must be" if name == "measured" else "within one sampling"):
+            Instants(**times | {name: times[name] + F(1, 10**9)}).require_within(STEP, F(part))
+
+
+@pytest.mark.parametrize("name", ["measured", "arrived", "ramp"])
+def test_a_timing_error_is_a_size(name):
+    assert getattr(Instants(), name) == 0
+    with pytest.raises(ParameterError, match=r"jitter must be from 0 to half a step of 0\.2 s"):
+        Instants(**{name: F(-1, 10**9)}).require_within(STEP, F(0))
