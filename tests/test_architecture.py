@@ -467,7 +467,7 @@ BUDGETS = {
     "laws": 3114,
     "loop": 4185,
     "plant": 1458,
-    "guarantees": 13498,
+    "guarantees": 13511,
     "lyapunov": 6962,
     "linear": 2405,
     "synthesis": 1973,

@@ -453,8 +453,8 @@ def sliding_loop(
     moving, aged = model.rate * model.slope, model.state_rate * model.evolution_slope
     stress = {"e1": moving / model.strength, "e2": -aged / model.strength}
     balance = {"push": model.coefficient, "e1": -model.stiffness, "e2": -model.weakening}
-    names = ("log_rate", "ageing", "strength", "push")
-    outputs = {"slip_error": "e1", "log_rate": "log_rate", "log_state": "e2", **{name: name for name in names[1:]}}
+    outputs = {"slip_error": "e1", "log_rate": "log_rate", "log_state": "e2"}
+    outputs |= {name: name for name in ("ageing", "strength", "push")}
     return _connected(
         law,
         _ONE,

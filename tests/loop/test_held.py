@@ -199,6 +199,25 @@ def test_times_that_make_no_loop_are_refused(wrong, said):
         sampled_error_loop(ESTIMATE, MODEL, AUTHORITY, **given)
 
 
+def test_a_law_of_the_reference_moves_its_states_with_it():
+    """z1⁺ = z1 + e1, z2⁺ = z2/2 + r and p = −4(e1 + r) − 2(e2 + r′) − 5z1 + 3z2, in MPa: at rest z2 = 2r, and p is that
+    at r = 0 for 5z1 = 6r − 4r."""
+    law = LinearLaw(
+        states=("sum", "mean"),
+        update=((F(1), F(0)), (F(0), F(1, 2))),
+        measured=((F(1), F(0)), (F(0), F(0))),
+        output=(F(-5), F(3)),
+        feedback=(F(-4), F(-2)),
+        of_reference=((F(0), F(0)), (F(1), F(0)), (F(-4), F(-2))),
+    )
+    loop = sampled_error_loop(law, MODEL, AUTHORITY, STEP)
+    assert named(loop, loop.inputs["reference"]) == {"sum": F(-2, 5), "mean": -2}
+    assert named(loop, loop.sampled["reference_rate"]) == {"valve": -2 * AUTHORITY}
+    without = sampled_error_loop(replace(law, of_reference=()), MODEL, AUTHORITY, STEP)
+    assert "reference" not in without.inputs
+    assert replace(loop, inputs=without.inputs, sampled={}) == without
+
+
 LATE = Instants(measured=F(1, 50), arrived=F(1, 40), ramp=F(3, 80))
 
 

@@ -89,7 +89,9 @@ def test_the_step_of_a_setup_is_that_of_the_fault():
 
 
 def test_only_what_differs_from_an_ideal_loop_is_on_its_path_and_in_its_noise():
-    assert IDEAL.path == IDEAL.noise == {}
+    assert IDEAL.path == IDEAL.noise == IDEAL.given() == {}
+    assert IDEAL.measured == "slip-and-rate"
+    assert {getattr(IDEAL, name) for name in quantities()} == {0, None}
     setup = LoopSetup(delay=1, lag=2, diffusion=3, slip_noise=4, rate_noise=5)
     assert setup.path == {"delay": 1, "lag": 2, "diffusion": 3}
     assert setup.noise == {"slip_noise": 4, "rate_noise": 5}

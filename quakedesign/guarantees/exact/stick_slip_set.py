@@ -374,8 +374,6 @@ def _ball_middle(values: np.ndarray) -> np.ndarray:
 
 
 def _exact(value: Any) -> fmpq:
-    if isinstance(value, fmpq):
-        return value
     number = Fraction(value)
     return fmpq(number.numerator, number.denominator)
 
@@ -564,7 +562,7 @@ def _margin(
     `sizes` are bounds of the impulse responses of ξ and y and of their first two derivatives.
     """
     number, longest, most = back.number, sampled_loop.longest, task.beta[1] * task.authority
-    step = (longest - sampled_loop.step) / PIECES if sampled_loop.longest_step else _ZERO
+    step = (longest - sampled_loop.step) / PIECES
     still = task.reference_rates[1] * longest / 2 + sampled_loop.target_noise
     pushed = most * (max(map(abs, feedback)) + sampled_loop.law.target_gain * still + sampled_loop.pressure_noise)
     growth = 1 / (1 - plant.slope[1] * longest**2 / 2)
@@ -705,8 +703,6 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
     gap_margin = period.margin[0] * off  # for the chord of 1/β minus 1/β
     for cut in (False, True):
         which = raised if cut else everyone
-        if not len(which):
-            continue
         a1, a2, a3, shares = n1[which], n2[which], n3[which], multipliers[which]
         flag = back.middle(shares[:, 3 if cut else 1]) == 1
         plain = a1 + a3 * (0 if cut else slip)
@@ -748,13 +744,11 @@ def resting_rows(
     rises = back.middle(n3) > 0
     raised, lowered = np.flatnonzero(rises), np.flatnonzero(~rises)
     slip, half = number(law.slip_gain), number(sampled_loop.step / 2)
-    both = (sampled_loop.step, sampled_loop.longest) if sampled_loop.longest_step else (sampled_loop.step,)
-    for part in chain(*(_carried(back, task, sampled_loop, interval, facets, _AT_REST) for interval in both)):
+    ends = dict.fromkeys((sampled_loop.step, sampled_loop.longest))
+    for part in chain(*(_carried(back, task, sampled_loop, interval, facets, _AT_REST) for interval in ends)):
         for end in plant.chord:
             chord = number(end / task.authority)
             for which, share in ((raised, 0), (raised, 1), (lowered, None)):
-                if not len(which):
-                    continue
                 a1, a3 = n1[which], n3[which]
                 cut_off = a3 * slip * (multipliers[which][:, 4] if share is None else share)
                 constants = part.constant[which] + part.moved(0, which)

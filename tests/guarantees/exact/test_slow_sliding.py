@@ -74,6 +74,12 @@ def claims(log_rate="1/2", log_state="1/18", slip_error="4e-5", push=380000, ask
 CLAIM = SlidingProof(task=task(), sampled_loop=LAGGED, cuts=(None,), claims=claims())
 
 
+def test_a_sliding_loop_has_a_direct_path_unless_told():
+    direct = sliding_loop(LAW, MODEL, F(50))
+    assert direct == sliding_loop(LAW, MODEL, F(50), delay=F(0), lag=F(0), diffusion=F(0))
+    assert direct != sliding_loop(LAW, MODEL, F(50), delay=F(1))
+
+
 @pytest.mark.parametrize("chords", [small_gain.chords, standalone.sector], ids=["package", "standalone"])
 @pytest.mark.parametrize("size", ["1/1000", "1/2", "1", "3"])
 def test_sectors_hold_the_exponentials_and_no_more(size, chords):
