@@ -305,8 +305,8 @@ def claimed(loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fractio
     decrease = list(obligations.decrease(second))
     n = obligation_degree([o.polynomial for _, o in decrease], "V̇")
     require(second == "decrease" or m == n, "a rate needs V and V̇ of the same degree.")
-    width = len(next(iter(decrease[0][1].polynomial)))
-    margin = power_sum(states, n, width) if second == "decrease" else {e: 2 * c for e, c in function[0][1].items()}
+    doubled = {e: 2 * c for e, c in function[0][1].items()}
+    margin = power_sum(states, n, obligations.variables) if second == "decrease" else doubled
     for _, one in decrease:
         polynomial = less(one.polynomial, claims[second], margin)
         yield Obligation(one.name, polynomial, one.equalities, one.inequalities)

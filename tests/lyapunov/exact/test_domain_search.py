@@ -177,6 +177,18 @@ def test_the_cause_of_a_rate_at_zero_errors_is_the_larger_part(disturbance, caus
 
 
 @pytest.mark.parametrize(
+    ("errors", "cause"),
+    [
+        (Errors(acceleration=F(1000)), "the control, through viscosity and rate weakening (e2')"),
+        (Errors(slip=F(1, 10**9), rate=F(1000)), "the slip-rate error, through spring and weakening friction"),
+    ],
+)
+def test_with_errors_the_cause_is_one_of_them(errors, cause):
+    controller = SimpleNamespace(divisor=least_authority(REAL), feedforward=NONE)
+    assert domain._whole_limit(SimpleNamespace(fault=REAL, controller=controller), errors) == cause
+
+
+@pytest.mark.parametrize(
     ("spring", "slope", "growth", "name", "cause"),
     [
         (-4, -1, 0, "none", "the slip error, through the spring"),

@@ -6,16 +6,21 @@ from itertools import product
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import quakedesign as qd
 from quakedesign.fault import Disturbance, friction_law
+from quakedesign.laws.feed_forward import feed_forward
 from quakedesign.lyapunov.exact.perturbation_bounds import (
     Errors,
+    _reference_values,
     initial_perturbation,
     largest_matched_rate,
     largest_sensitivities,
     least_authority,
     parameter_ranges,
+    sensitivity_expressions,
+    stage,
     static_friction,
 )
 from quakedesign.symbolic import plant
@@ -161,3 +166,30 @@ def test_errors_are_zero_unless_told():
 def test_friction_falls_or_turns_where_its_law_does():
     assert parameter_ranges(faulty(SLIP))[plant.slip_slope] == (F(-1, 10), 0)
     assert parameter_ranges(faulty(RATE))[plant.rate_slope][0] < 0 < parameter_ranges(faulty(RATE))[plant.rate_slope][1]
+
+
+@pytest.mark.parametrize("name", ["none", "nominal"])
+def test_sensitivities_are_the_derivatives_where_friction_and_disturbance_are_linear(name):
+    """μ = 2/5 − 3·x1 − 7·x2 and φ = 1/9 + x1/11 + x2/13, so that chords and derivatives are the same."""
+    fault, divisor = REAL, F(1, 10**8)
+    given = feed_forward(name, fault, divisor)
+    time, errors = sp.Rational(2, 7), {plant.e1: sp.Rational(1, 50), plant.e2: sp.Rational(1, 90)}
+    r = [value.subs(stage, time) for value in _reference_values(fault).values()]
+    x1, x2 = errors[plant.e1] + r[0], errors[plant.e2] + r[1]
+    start = sp.Rational(*static_friction(fault).as_integer_ratio())
+    hats = {plant.k_hat: sp.Rational(1, 2), plant.eta_hat: sp.Rational(5, 3), plant.N_hat: sp.Rational(1, 7),
+            plant.sigma: 11, plant.mu_star: start}  # fmt: skip
+    friction = sp.Rational(2, 5) - 3 * x1 - 7 * x2
+    values = hats | errors | {
+        stage: time, plant.friction_value: friction, plant.slip_slope: -3, plant.rate_slope: -7,
+        plant.phi: sp.Rational(1, 9), plant.phi_1: sp.Rational(1, 11), plant.phi_2: sp.Rational(1, 13),
+    }  # fmt: skip
+
+    h = plant.matched_perturbation()
+    h = h.replace(plant.mu, lambda z, v: sp.Rational(2, 5) - 3 * z - 7 * v)
+    h = h.replace(plant.disturbance, lambda z, v, _: sp.Rational(1, 9) + z / 11 + v / 13)
+    h = plant._named(h).subs(dict(zip((plant.r0, plant.r1, plant.r2), r, strict=False)))
+    h += given.acceleration(plant.e1 + r[0], plant.e2 + r[1], r[2])
+    h = h.subs(hats).subs(plant.divisor, sp.Rational(1, 10**8))
+    for found, error in zip(sensitivity_expressions(fault, divisor, given), errors, strict=True):
+        assert sp.simplify(found.subs(values) - h.diff(error).subs(errors)) == 0

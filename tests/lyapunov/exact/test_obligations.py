@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from fractions import Fraction as F
+from itertools import product
 
 import pytest
 import sympy as sp
@@ -273,8 +274,8 @@ def test_a_root_with_a_range_stands_under_signs_alone_and_leaves_no_sign_open():
         open_ = {"n": (power(1, ("x", 1, "s"), parameters=("r",)), power(number, ("x", 1, "s")))}
         with pytest.raises(CertificateError, match="the sign of a coefficient in the argument of n depends on a root"):
             _ = lifted(open_, ("n", 0, "s"), states=("x",), **RANGE).cells
-    for number in ("1/5", "-1/5"):  # 0 at the lower end of the range
-        from_zero = {"n": (power(1, ("x", 1, "s")), power(number, ("y", 1, "s"), parameters=("r",)))}
+    for number, kind in product(("1/5", "-1/5"), "sa"):  # 0 at the lower end of the range
+        from_zero = {"n": (power(1, ("x", 1, "s")), power(number, ("y", 1, kind), parameters=("r",)))}
         wide = RANGE | {"roots": {"r": ("k", (F(0), F(3, 2)))}}
         with pytest.raises(CertificateError, match="the sign of a coefficient in the argument of n depends on a root"):
             _ = lifted(from_zero, ("n", 0, "s"), **wide).cells
