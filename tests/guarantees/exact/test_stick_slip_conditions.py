@@ -348,6 +348,17 @@ def test_the_slip_until_a_stop_is_the_least_bound_for_the_fastest_start(monkeypa
         found(F(-1, 2) - TINY)
 
 
+@pytest.mark.parametrize(("place", "entry"), [(0, "5"), (3, "-5"), (2, "1/3"), (4, "-1/3")])
+def test_sizes_are_those_of_the_farther_side(place, entry):
+    """The other side of the box keeps its 2/5 and 4."""
+    known = claim()
+    facets = [*known.invariant_set.facets]
+    facets[place] = tuple(F(entry) if v else v for v in facets[place])
+    smaller = replace(known.invariant_set, facets=tuple(facets))
+    for one in module.verifiers(known.task, known.sampled_loop, smaller, None):
+        assert list(one.sizes) == [fmpq(2, 5), 1, 4]
+
+
 def test_noise_makes_the_target_rate_larger_in_every_constraint():
     """The condition of rest has −βb·U with U by (max r' + noise) of the target rate."""
     known = claim()
