@@ -38,14 +38,18 @@ class RateAndState(FrictionLaw):
     ----------
     reference_coefficient : float
         Friction coefficient μ_0 [-] of steady sliding at the reference rate, positive.
-    direct_effect, evolution_effect : float
-        Direct effect a and evolution effect b [-], positive; friction with a < b weakens with rate.
+    direct_effect : float
+        Direct effect a [-], positive.
+    evolution_effect : float
+        Evolution effect b [-], positive; for b > a, steady-state friction weakens with rate.
     critical_slip : float
         Slip d_c [m] over which the state evolves, positive.
     reference_rate : float
         Rate v_0 [m/s], positive: loading rate of the natural cycle.
-    slowest_rate, fastest_rate : float
-        Ends v_s and v_f [m/s] of the working range, 0 < v_s ≤ v_0 ≤ v_f.
+    slowest_rate : float
+        Lower end v_s [m/s] of the working range, positive, at most v_0.
+    fastest_rate : float
+        Upper end v_f [m/s] of the working range, at least v_0.
     stress_sensitivity : float
         α [-], not negative: the effective normal stress σ adds −(αθ/(bσ))·dσ/dt to dθ/dt (Linker and Dieterich 1992,
         J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds of friction are for a constant σ.
