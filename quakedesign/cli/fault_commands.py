@@ -185,8 +185,8 @@ def init(
 
 
 _SOURCE = (
-    "Preset or .toml file, from which the file to write takes all but the friction; without T_s and disturbance if "
-    "only the identified friction has a state."
+    "Preset or .toml file that supplies everything but the friction of the file to write. Its T_s and disturbance are "
+    "not used if only the identified friction has a state."
 )
 
 

@@ -87,7 +87,7 @@ def guarantee(
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
         Sliding modes: stick-slip (default), or compensated on the plant without stick; no other scheme has a guarantee.
-        The e-LQR runs in explicit.
+        The e-LQR uses the scheme explicit.
     measured
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
         differentiator (implicit, n_d = 2, any n_f), for which the smallest λ_d is printed.

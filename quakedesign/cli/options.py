@@ -248,8 +248,8 @@ class LawOptions:
         none, nominal or centred: feed-forward of a sliding mode from the known plant; not with designed gains.
     certificate
         Certificate file that guarantee --out wrote; it replaces the options above. The law runs with the T_s, pressure
-        limit at rest, noise, delay, lag and diffusion path of the file. In slow sliding the shear stress is a sine of
-        the certified amplitude, unless simulate --stress gives another.
+        limit at rest, noise, delay, lag and diffusion path of the file. Runs in slow sliding have a sinusoidal shear
+        stress of the certified amplitude; simulate and campaign take another from --stress.
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
     """
@@ -326,7 +326,8 @@ class RunOptions:
     step
         Sampling time T_s, or step of the scheme continuous; the fault's T_s by default.
     duration
-        Duration of the run; the operation time by default. The disturbance of the fault acts with and without control.
+        Duration of the run; the operation time by default, with the disturbance of the fault. Without a controller and
+        without a duration the run is the natural earthquake, which has no disturbance and its own duration.
     substeps
         Integrator steps per sample.
     drift
@@ -740,7 +741,7 @@ class SpreadOptions:
         In slow sliding under a designed e-LQR: relative deviation of a, b and D_c, such as 0.1; normal stress,
         stiffness and damping vary within the box.
     stress
-        Bound of a sinusoidal shear stress, such as '25 kPa'; by default the certified bound of the design.
+        Amplitude of a sinusoidal shear stress, such as '25 kPa'; by default the certified bound of the design.
     stress_period
         Period of this stress; by default that of the tide, 12.42 hours.
     """
@@ -816,7 +817,7 @@ def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
 
 
 def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """Entries of a run of a certified law on its fault, by default under a sine of the largest proved stress.
+    """Entries of a run of a certified law on its fault, by default under the largest proved stress, a sine.
 
     The measurement error is at most the noise of the certificate: readings are rounded to multiples of twice this.
     """

@@ -54,7 +54,7 @@ def certify(
         decay rate; also gives a bound of the settling time).
     gain_range
         Sliding mode: b_m and b_M, the range of the input gain β; 1 1 by default. For
-        --maximize beta-factor give b, the centre of the range, twice.
+        --maximize beta give b_m twice, for beta-factor b, the centre of the range.
     box
         e-LQR: uncertainty box, paper or ten-percent.
     feedback
@@ -285,12 +285,13 @@ def attraction(
         polynomial that vanishes at the origin. A line V = "..." before this table is optional. By default V = x'Px with
         A'P + PA = -I for the linearised field x' = Ax; with --everywhere a V of degree 2 or 4 is searched for.
     everywhere
-        Prove global convergence. If that fails, a point may refute the given V; without a given V, another equilibrium
-        refutes every V.
+        Prove global convergence. If that fails, look for a refutation: a point that refutes the given V or, without a
+        given V, a second equilibrium, which refutes every V.
     relative
         Relative width of the last bisection interval, from 1e-6 to below 1.
     degree
-        Also search for V of at most this even degree, to enlarge the sublevel set of --shape in the region.
+        Also search for V of at most this even degree, to enlarge the sublevel set of --shape that lies in the proved
+        region of attraction.
     shape
         Positive definite polynomial, such as "x^2 + 2*y^2": proves the largest b whose sublevel set shape <= b lies in
         the proved region. With --degree the default is the sum of squares of the states.

@@ -49,7 +49,7 @@ class Assessment:
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """Sentences of failed tests that make intervals too narrow; empty if the fit does not explain the record."""
+        """Failed tests because of which intervals may be too narrow; empty if the fit does not explain the record."""
         failed = (check.sentence for check in self.checks if check.name == "halves" and not check.passed)
         return () if self.verdict == EXPLAINS_NOT else tuple(failed)
 
@@ -96,7 +96,7 @@ def checks_of(
 
 
 def in_doubt(excess: float, shift: float | None) -> bool:
-    """Whether a fit with another trend counts for the sign: its AIC is not much higher, or its trend may begin late."""
+    """Whether a fit with another trend counts for the sign: its AIC is close, or the selected trend may begin late."""
     return excess < DECISIVE or shift is not None
 
 
@@ -163,7 +163,7 @@ def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
     text = f"begins in steady sliding at {loading.first_rate:.3g} m/s"
     if off:
         older = float(np.exp(values[START_STATE]))
-        text = f"does not begin in steady sliding: the state is {older:.3g} times as old, which is fitted"
+        text = f"does not begin in steady sliding: its state is {older:.3g} times that of steady sliding (fitted)"
     text += "".join(f", on a trend of {values[n]:.3g} {u}" for n, u in _TREND_UNITS.items() if n in values)
     return _within("beginning", off, 0.0, f"the record {text}")
 

@@ -78,7 +78,7 @@ def columns_by_name(columns: Sequence[Column], wanted: str) -> tuple[dict[str, n
             )
     left = ", ".join(shown(column.heading) for column in unknown)
     if "time" not in given:
-        others, example = (f", and {left}, unknown", unknown[0].name) if unknown else ("", "1")
+        others, example = (f", and unknown: {left}", unknown[0].name) if unknown else ("", "1")
         raise RecordError(
             f"a record must have the column time. Received {', '.join(given) or 'none'}{others}. Add time [s], or name "
             f"it: --columns 'time={example} [s]'."
@@ -104,7 +104,7 @@ def _wanted(columns: Sequence[Column], wanted: str) -> dict[str, tuple[str, Colu
         name, _, text = (each.strip() for each in part.partition("="))
         if name not in COLUMNS or not text:
             raise RecordError(
-                f"--columns must name columns as time=Time(s), of {', '.join(COLUMNS)}. Received {shown(part)}."
+                f"--columns must assign headings, as time=Time(s), to {', '.join(COLUMNS)}. Received {shown(part)}."
                 f"{nearest_name(name, COLUMNS) if text else ' Write an equals sign.'}"
             )
         head = heading(text)

@@ -32,7 +32,9 @@ class CorrelatedNoise:
     along: ndarray  # position of every sample: time [s] or displacement [m]
     counts: ndarray  # measurements in every sample
     of_time: bool  # whether `along` is time
-    common: ndarray | None = None  # columns: effect of one deviation of each unknown of the load on all samples
+    common: ndarray | None = (
+        None  # columns: effect of one standard deviation of each unknown of the load on all samples
+    )
 
     def to_dict(self, noise: float) -> Json | None:
         """Size and length with units, from the white noise [-] of one measurement; None without correlated noise."""
@@ -43,7 +45,7 @@ class CorrelatedNoise:
 
     @property
     def pieces(self) -> float:
-        """Degrees of freedom of the estimated slow noise: one for every four `length` within the span.
+        """Degrees of freedom of the estimated slow noise: one per four decay lengths of the span.
 
         By Satterthwaite, 2 over the relative variance of the spectral density at frequency zero, 2·share·length. For
         the likeliest process over a span T this variance is 8·length/T: share/length is sharp, and 1/length has the

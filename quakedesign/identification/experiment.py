@@ -39,7 +39,7 @@ class Coordinate:
 class Experiment(ABC):
     """A simulated experiment: friction of the record without noise, for given coordinates.
 
-    The fitted quantities of its law may have any values.
+    The fitted quantities stored in its law are not used.
     """
 
     law: FrictionLaw

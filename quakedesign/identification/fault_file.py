@@ -150,8 +150,8 @@ def law_remarks(identification: Identification, fault: Fault) -> list[str]:
     named, law = fault.friction, identification.law
     if identification.rival is None or named.equilibrium is not law.equilibrium or named.name == law.name:
         return []
-    why = "the record prefers" if named.name == identification.rival.law else "the record was fitted without it, by"
-    return [f"{fault.name} names {named.name}, {why} {law.name}; --law {named.name} fits that one"]
+    why = "the record prefers" if named.name == identification.rival.law else "the record was fitted by"
+    return [f"{fault.name} has {named.name}, but {why} {law.name}; --law {named.name} fits the law of the fault"]
 
 
 def next_command(identification: Identification, path: str | Path | None) -> str:

@@ -412,5 +412,5 @@ def _next(below: ProfilePoint, above: ProfilePoint, wanted: float) -> float:
     if math.isinf(above.distance):
         return (near + end) / 2
     straight = near + (end - near) * (aim - below.distance) / (above.distance - below.distance)
-    tenth = 0.05 * (end - near)
-    return min(max(straight, near + tenth), end - tenth)
+    margin = 0.05 * (end - near)
+    return min(max(straight, near + margin), end - margin)

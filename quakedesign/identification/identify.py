@@ -58,7 +58,7 @@ class Setup:
     experiment: Experiment
     used: ndarray
     notes: tuple[str, ...]
-    starts: tuple[Coordinate, ...] = ()  # coordinates of an unsteady beginning, if any
+    starts: tuple[Coordinate, ...] = ()  # coordinates that an unsteady beginning adds
 
 
 def set_up(
@@ -128,7 +128,7 @@ def _sliding(
     if not first > 0:
         raise RecordError(
             f"a record for {law.name} must begin in steady sliding. Received a load point that moves at {first:.3g} "
-            "m/s. Cut off the part before with --from."
+            "m/s. Cut off what precedes steady sliding with --from."
         )
     drive, measured = loading.drive(record)
     path = float(np.ptp(record.load_point))
@@ -183,7 +183,7 @@ def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
     slip = record.slip[used]
     coordinates = tuple(_coordinate(name, law, record, float(slip.max())) for name in law.quantities())
     experiment = MeasuredSlip(law=_template(law), slip=slip, slip_noise=noise, coordinates=coordinates)
-    note = f"friction as a function of the measured slip, in {count} samples that slip"
+    note = f"friction as a function of the measured slip, in the {count} samples with slip"
     return Setup(experiment=experiment, used=used, notes=(note,))
 
 
@@ -492,7 +492,7 @@ class _Choice:
                 setup = set_up(self.record, fitted.kind, self.stiffness, other, _nuisance(fitted))
                 if len(setup.experiment.coordinates) == len(best.fitted):
                     moved = setup.experiment.resolved(best.fitted, best.accuracy).friction(best.fitted) - before
-                    moved += strengthens * np.log1p(error) * (place == 0)  # at an unchanged reference rate
+                    moved += strengthens * np.log1p(error) * (place == 0)  # this rate is also the reference rate
                     columns += [moved] * bool(np.all(np.isfinite(moved)))
         columns = [each for each in columns if np.linalg.norm(each * np.sqrt(best.counts)) > _NEGLIGIBLE * best.noise]
         return np.array(columns).T.reshape(len(best.measured), len(columns))

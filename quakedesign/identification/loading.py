@@ -22,11 +22,12 @@ _MOST_PIECES = 40
 _PATIENCE = 4  # successive pieces without improvement that end the search
 _TIMELY = 0.01  # error of the time of a change, in sampling periods, that has no visible effect
 _MOST_DELAYS = 4
-_HOLD, _SLOW = 3.0, 0.05  # standard deviations of a rate from 0, and their share of the largest rate: less is a hold
+# A piece is a hold if its rate is within 3 standard deviations of 0, and these are below 5 % of the largest rate.
+_HOLD, _SLOW = 3.0, 0.05
 _LARGE_CHANGE = 1.25  # ratio of rates above which a change is a step, not a drift
 _LEAST_CHANGE = 0.03  # relative to the faster rate: changes friction by 3 % of a or b
 _PIECE_PENALTY = 4.0  # required improvement of a fit by a new piece, in variances times log n
-_ROUGH = 6.0  # deviations from the pieces over the noise from sample to sample: more is motion
+_ROUGH = 6.0  # ratio of the deviations from the pieces to the noise from sample to sample above which pieces do not fit
 _PATH_TOLERANCE = 0.01  # share of the whole path
 
 
@@ -156,7 +157,7 @@ class Loading:
         return float(np.log(fast / slow)) if slow > 0 and fast > 0 else None
 
     def delays(self, record: Record) -> tuple[ndarray, ndarray]:
-        """Samples after each change of rate whose time noise makes uncertain, and the largest error of it [s]."""
+        """Samples after each change of rate whose time is uncertain because of noise, and its error [s]."""
         begins, rates = self.pieces.begins, self.pieces.rates
         ends = np.append(begins[1:], np.inf)
         off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)

@@ -197,7 +197,7 @@ def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
         )
     if (double := int(np.sum(np.diff(time) == 0))) and double < len(time) - 1:
         whole = whole.groupby("time", sort=False, as_index=False).mean()
-        repairs.append(f"{double} samples at the time of another replaced by their mean")
+        repairs.append(f"{double} samples at the time of another: replaced by the mean at this time")
     return {str(name): whole[name].to_numpy() for name in whole}, repairs
 
 
@@ -338,7 +338,10 @@ def scatter(time: ndarray, values: ndarray) -> float:
 
 
 def reading_step(values: ndarray) -> float:
-    """Resolution of quantised values (the first repeat, or increments often change); otherwise 1e-9 of the range."""
+    """Resolution of quantised values; otherwise 1e-9 of the range.
+
+    Values are quantised if some of the first repeat, or if the increments of the first change often.
+    """
     levels, first = np.unique(values), np.diff(values[:_FIRST])
     step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
     quantised = np.any(first == 0) or np.sum(np.abs(np.diff(first)) > step / 2) > _BENDS

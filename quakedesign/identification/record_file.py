@@ -186,9 +186,11 @@ def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -
     except (pd.errors.ParserError, ValueError) as error:
         match = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
         what = (
-            f"line {int(match[2])} must hold {match[1]} values. Received {match[3]}." if match else "lines must agree."
+            f"line {int(match[2])} must hold {match[1]} values. Received {match[3]}. Complete or remove it."
+            if match
+            else "all lines must hold as many values. Complete or remove those that do not."
         )
-        raise RecordError(f"{what} Complete or remove it.") from None
+        raise RecordError(what) from None
     if len(columns) == len(cells) - 1:  # row numbers without a heading, such as xlook's, come first
         table = table.drop(columns=0)
         table.columns = range(table.shape[1])

@@ -117,7 +117,7 @@ def identify_steps(
     Parameters
     ----------
     records : sequence of Record
-        One a step, at least two, without common samples.
+        One record per step, at least two, without common samples.
     law, stiffness, rates, states, trend, seed
         As for `identify`; the same `rates` hold for every step.
 
@@ -127,7 +127,7 @@ def identify_steps(
         When a record has not the columns that the law needs, or stiffnesses of steps have different units.
     """
     if len(records) < 2:
-        raise RecordError(f"several steps must be at least 2. Received {len(records)}. Use identify for one.")
+        raise RecordError(f"a common fit must have at least 2 records. Received {len(records)}. Use identify for one.")
     units = sorted({record.stiffness_unit for record in records if record.load_point is not None})
     if len(units) > 1:
         raise RecordError(

@@ -83,7 +83,7 @@ class SlidingExperiment(Experiment):
     measured: ndarray  # instants that are samples; the others are changes of rate between them
 
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction coefficient [-] at every sample, with steady sliding at the first."""
+        """Friction coefficient [-] at every sample, from steady sliding or a fitted deviation from it at the first."""
         states = self._states(fitted)[:, self._sampled]
         return np.asarray(self._build["friction"](states, np.asarray(fitted)[:, None])[0])
 

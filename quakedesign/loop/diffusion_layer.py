@@ -79,8 +79,8 @@ class Layer:
 # ----------------------------------------------------------------------
 # Effect of the fast modes of a layer on the slip rate at each pressure step: a known jump, and a remainder.
 #
-# **Statement.** Let R be the truncation error of the modes n < N of a layer (previous section), E that of a unit step,
-# and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly. With F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k) over the past
+# **Statement.** Let R be the error of truncating the series after the modes n < N (previous section), E that of a unit
+# step, and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly. With F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k) over the past
 # steps, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is equivalent to
 #
 #     e1′ = x2 + β0·bY,   x2′ = s0·e1 − w0·x2 + β0·v + a − w0·β0·bY,   x2 ← x2 − β0·A·bΔu_k at every step.

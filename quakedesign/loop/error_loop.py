@@ -29,7 +29,7 @@ from quakedesign.loop.signals import Interconnection, Signal
 # Sampled linear law on a fault: sample, zero-order hold, delay, lag, and diffusion between well and fault.
 
 MOST_PERIODS = 8
-SHORTEST = 32  # largest T_s/(L²/D): faster modes decay in less time than the bounds resolve
+SHORTEST = 32  # largest T_s/(L²/D): through a shorter path all modes decay within one piece of the period
 BENT = tuple(
     Fraction(v, 128) for v in (0, 1, 3, 6, 10, 15, 22, 32, 46, 64, 84, 106, 128)
 )  # denser at first, where a lag and the diffusion modes change fastest
@@ -71,9 +71,10 @@ def sampled_error_loop(
     ``reference_rate`` is the law's term in r′.
 
     With timing errors the last step of the valve pressure is a further state, and the output ``stepped`` [m/s²]. The
-    input ``late`` is b times the deviation of the valve pressure from its schedule. It is at most the last or the next
-    step, and acts near the arrivals only. During the timing error and the ramp, p* drifts: ``push`` (or ``asked``,
-    where the fault pressure is not the valve pressure) changes by ``drift`` times this duration.
+    input ``late`` is b times the deviation of the valve pressure from its schedule. Its size is at most that of the
+    previous or the next pressure step, and it is nonzero only near the arrivals. During the timing error and the ramp,
+    p* drifts: ``push`` (or ``asked``, where the fault pressure is not the valve pressure) changes by ``drift`` times
+    this duration.
 
     Parameters
     ----------

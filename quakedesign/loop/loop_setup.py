@@ -227,7 +227,7 @@ class LoopSetup:
             if value is None:
                 continue
             exact = exact_value(value, part["unit"], title)
-            if exact < 0:
+            if exact < 0 and name not in ("step", "rate_limit"):  # these must be positive, see below
                 raise ParameterError(
                     f"{title} must be 0 or more. Received {shortly(exact)} {part['unit']}. Omit the minus sign."
                 )

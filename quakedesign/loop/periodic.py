@@ -165,16 +165,18 @@ class Instants:
     ramp: Fraction = Fraction(0)
 
     def require_within(self, step: Fraction, part: Fraction) -> None:
-        """Reject timing errors that let events overlap; `part` [s] is the time of a pressure change after a sample."""
+        """Reject timing errors that let events overlap; `part` [s] is the time from a sample to the next change due."""
         if min(self.measured, self.arrived, self.ramp) < 0 or 2 * self.measured > step:
             raise ParameterError(
-                f"jitter must be from 0 to half a step of {float(step):.4g} s. Received {float(self.measured):.4g} s "
-                f"for measurements and {float(self.arrived):.4g} s for pressures. Reduce the jitter."
+                "jitter and ramp must not be negative, and jitter of a measurement at most half a step of "
+                f"{float(step):.4g} s. Received {float(self.measured):.4g} s for measurements, "
+                f"{float(self.arrived):.4g} s for pressures and a ramp of {float(self.ramp):.4g} s. Reduce the jitter."
             )
         after = self.arrived + self.ramp
         if self.arrived > (part or step) or after > step - part or self.arrived + after > step:
             raise ParameterError(
-                "a pressure change must begin and end within one sampling interval. Received a change due "
+                "a pressure change must begin and end between two samples, and before the next one may begin. Received "
+                "a change due "
                 f"{float(part):.4g} s after a sample, with the step {float(step):.4g} s, jitter of "
                 f"{float(self.arrived):.4g} s and a ramp of {float(self.ramp):.4g} s. Reduce jitter or ramp, or change "
                 "the delay."

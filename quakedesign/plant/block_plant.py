@@ -131,7 +131,7 @@ def _parts(
     steady = [row for row, read in zip(shares, pressures, strict=True) if any(read[:more])]
     shifts = [[*[zero] * (2 * N), *(_dot(row, one) for row in steady)] if more else None for one in of_pressures]
     order = ("slope", "damping", "input")
-    springs_in_words = ", springs between the blocks as they are" if any(tasks[0].spreads) else ""
+    springs_in_words = ", the stiffness of the springs between blocks known exactly" if any(tasks[0].spreads) else ""
     return {
         "A": [*rate, *pulls, *((*[zero] * (2 * N), *row[:more]) for row in flow)],
         "B": [(zero,) * m] * N + [row[more:] for row in (*forces, *flow)],

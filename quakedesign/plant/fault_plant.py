@@ -259,7 +259,7 @@ class FaultPlant:
         Constants of the fault and its reference must be the same; friction, ranges and disturbance must lie within
         those of this plant. The name is not compared.
         """
-        return [*_other(self, other), *_wider_than_needed(self, other), *_rougher(self.friction, other.friction)]
+        return [*_other(self, other), *_wider_than_proved(self, other), *_rougher(self.friction, other.friction)]
 
 
 def _hull(values: Iterable[Fraction]) -> Range:
@@ -328,7 +328,7 @@ def _other(proved: FaultPlant, required: FaultPlant) -> list[str]:
     return found + ([] if proved.shape == required.shape else ["the shape of the reference"])
 
 
-def _wider_than_needed(proved: FaultPlant, required: FaultPlant) -> list[str]:
+def _wider_than_proved(proved: FaultPlant, required: FaultPlant) -> list[str]:
     """Ranges and disturbances beyond those of the proof."""
     pairs = {
         f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, required.spreads, strict=True)

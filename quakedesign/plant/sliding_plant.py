@@ -1,6 +1,6 @@
 """Plant of a rate-and-state fault in slow sliding, in rationals, and cells of its parameter box.
 
-Quantities are per unit of area. The cells into which cuts divide the box of constants cover it for all cuts.
+Quantities are per unit of area. Whatever the cuts, the cells into which they divide the box of constants cover it.
 """
 
 from collections.abc import Mapping
@@ -136,7 +136,7 @@ class SlidingPlant:
 
     @property
     def inertia(self) -> Fraction:
-        """M [kg/m²]."""
+        """Mass per unit area, m = ρL [kg/m²]."""
         return self.density * self.length
 
     @property
@@ -172,11 +172,11 @@ def _in_words(value: Fraction | str | bool) -> str:
 
 
 # ----------------------------------------------------------------------
-# Repeated cuts of a box of constants: the cells cover it for all cuts.
+# Repeated cuts of a box of constants: whatever the cuts, the cells cover it.
 
 MOST_CELLS = 64
 Cuts = tuple[tuple[str, Fraction] | None, ...]
-"""For a box, then for its part below the cut with all of its parts, then for that above: axis and place, or no cut."""
+"""Axis and place of the cut of a box, or None; then the same for its part below the cut, then for that above."""
 WHOLE: Cuts = (None,)
 
 

@@ -88,7 +88,7 @@ class UncertainPlant:
         What is measured; all states unless given.
     sectors : mapping of str to Sector
     gains : mapping of str to (number, number)
-        Range of the gain on a control minus its loads, by the control's name; the gain may vary within this range at
+        Range of the factor of a control less its loads, by the control's name; the factor may vary within this range at
         any rate.
     disturbances : mapping of str to (sequence, number)
         Input column in x′, and largest magnitude.
@@ -191,11 +191,12 @@ class UncertainPlant:
         ParameterError
             For a system in discrete time, or with direct feedthrough.
         """
-        direct = getattr(system, "D", None)
-        if direct is None or getattr(system, "dt", None) or any(v for row in direct.tolist() for v in row):
+        direct, step = getattr(system, "D", None), getattr(system, "dt", None)
+        kind = f"dt = {step}" if step else "D not 0"
+        if direct is None or step or any(v for row in direct.tolist() for v in row):
             raise ParameterError(
-                "a plant must be a control.StateSpace in continuous time, with D = 0. Received no such system, one in "
-                "discrete time or D not 0. Use control.ss(A, B, C, 0)."
+                "a plant must be a control.StateSpace in continuous time, with D = 0. Received "
+                f"{type(system).__name__ if direct is None else kind}. Use control.ss(A, B, C, 0)."
             )
         labels = {"controls": tuple(system.input_labels), "measurements": tuple(system.output_labels)}
         return cls(**({"A": system.A, "B": system.B, "C": system.C, "name": system.name} | labels | more))

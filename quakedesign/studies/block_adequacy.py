@@ -43,8 +43,8 @@ class BlocksResult:
         parts = [
             f"{self.fault.name} cut into blocks, {wells}, a law designed for each number of blocks; the certificates "
             "are about the plants without stick that are derived from the fault, not about the derivation",
-            f"from rest, with zero-order hold over {UpperBound(self.step):.6g} s, each block its own friction of the "
-            "box, for all t >= 0:",
+            f"from rest, with zero-order hold over {UpperBound(self.step):.6g} s, each block with its own friction "
+            "law of the box, for all t >= 0:",
         ]
         for blocks, one in self.proofs.items():
             ends = self.peaks(blocks)

@@ -50,7 +50,7 @@ class UnstableMode:
     reached: bool  # Whether a well reaches it
     # Smallest pressure deviation from balance [Pa] that every controller needs, if known
     pressure: float | None
-    # Blocks in slow sliding: longest T_s and delay [s], and farthest well from the fault [m], for any controller
+    # Blocks in slow sliding: largest sum of T_s and delay [s], and farthest well from the fault [m], for any controller
     longest_step: float | None = None
     farthest_well: float | None = None
 
@@ -83,7 +83,7 @@ class ChainLimits:
     def lines(self) -> list[str]:
         """The result as lines of at most 80 characters."""
         chain = self.chain
-        assumed = [f"(box {chain.fault.box.name}, every block at its steepest friction, for constant disturbances)"]
+        assumed = [f"(box {chain.fault.box.name}, every block at its steepest weakening, for constant disturbances)"]
         if chain.has_state:
             V = quantity(float(mean_rate(chain.fault)), "m/s")
             assumed = [f"(linearised about steady sliding of every block at {V} and the pressure 0,"]

@@ -342,5 +342,5 @@ def trajectory_premise(law: Controller, lipschitz: float | None, run: Trajectory
     premise = on_trajectory(limit if lipschitz is None else lipschitz, run)
     if premise is None or lipschitz is not None:
         return premise
-    text = f"{premise.note}; no certificate was given, and none of these gains exceeds {limit:.4g} {premise.unit}"
+    text = f"{premise.note}; no certificate was given, and no bound of these gains exceeds {limit:.4g} {premise.unit}"
     return replace(premise, certified=0.0, proved=False, note=text)

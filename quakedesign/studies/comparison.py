@@ -204,8 +204,8 @@ def compared(
 def behind_path(fault: Fault) -> dict[str, str]:
     """Reasons why laws designed for a pressure without delay do not apply with a delay, lag or diffusion path."""
     why = (
-        "sliding modes and published gains are for a pressure without delay and are not compared with a delay, a lag "
-        "or a diffusion path; the command guarantee gives proved bounds of a sliding mode with them"
+        "sliding modes and published gains assume a pressure without delay; a comparison with a delay, a lag or a "
+        "diffusion path omits them; the command guarantee gives proved bounds of a sliding mode with these"
     )
     return {name: why for name in designable(fault) if name != "elqr"}
 
@@ -340,7 +340,7 @@ def need_sentence(needed: Enclosure) -> str:
     """Range of the equilibrium pressure of a task, and its fluid operations."""
     operations = f"the task needs {' and '.join(ways(needed))} of fluid" if ways(needed) else "the task needs no fluid"
     ends = f"{needed.low.quantity('Pa')} to {needed.high.quantity('Pa')}"
-    return f"pressure at equilibrium along the reference {ends} (p < 0 is withdrawal): {operations}"
+    return f"equilibrium pressure along the reference: {ends} (p < 0 is withdrawal): {operations}"
 
 
 def pressure_extremes(run: "Trajectory") -> tuple[float, float] | None:
@@ -359,11 +359,11 @@ def shortfall(run: "Trajectory", fault: Fault) -> str | None:
         return None
     (least, largest), margin = extremes, _margin(needed)
     if least > needed.low + margin:
-        end, lack = needed.low.quantity("Pa"), f"has no less than {_mega(least)}" if least < 0 else "never withdraws"
+        end, lack = needed.low.quantity("Pa"), f"never falls below {_mega(least)}" if least < 0 else "never withdraws"
     elif largest < needed.high - margin:
         end, lack = (
             needed.high.quantity("Pa"),
-            "never injects" if largest <= 0 else f"has no more than {_mega(largest)}",
+            "never injects" if largest <= 0 else f"never exceeds {_mega(largest)}",
         )
     else:
         return None

@@ -278,7 +278,8 @@ def sampling_adequacy(fault: Fault) -> SamplingAdequacy:
     """Compare a fault's sampling time with its fastest unstable pole.
 
     This is a rule of thumb, roughly a necessary condition: a sampled law responds to an event between two samples only
-    after its effect has grown by e^{pT_s}. It is no proof; the largest step of a given law is certified separately.
+    after its effect has grown by a factor of up to e^{pT_s}, p the pole. It is no proof; the largest step of a given
+    law is certified separately.
     """
     try:
         poles, over_box = _box_poles(fault), True
@@ -402,7 +403,7 @@ _of_sliding = by_equilibrium(rest=lambda fault: [], sliding=_sliding_sentence)
 
 
 def beyond_control(fault: Fault) -> list[str]:
-    """Statement that no controller can hold a fault at its T_s, if this is proved."""
+    """Statement that no controller can stabilise a fault at its T_s, if this is proved."""
     try:
         task = uncertain_plant(fault)
         longest = longest_reaction(task, task.normal_stress)
@@ -411,9 +412,9 @@ def beyond_control(fault: Fault) -> list[str]:
     if longest is None or rational(fault.sampling_time) <= longest:
         return []
     return [
-        f"NO CONTROLLER can hold this fault at T_s = {fault.sampling_time:.4g} s for all friction of its box and a "
-        f"disturbance as large as its own: beyond {longest.quantity('s')} no controller can, even by withdrawing "
-        "a pressure as large as the effective normal stress"
+        f"NO CONTROLLER can stabilise this fault at T_s = {fault.sampling_time:.4g} s for every friction law of its "
+        f"box and every disturbance within its amplitude: T_s must not exceed {longest.quantity('s')}, even for a "
+        "withdrawal as large as the effective normal stress"
     ]
 
 

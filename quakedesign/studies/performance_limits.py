@@ -48,7 +48,7 @@ _POINTS = 24  # intervals on the curve of smallest peaks
 
 KNOWING = "all controllers, linear or not, that know fault, slip, slip rate and disturbance exactly up to the sample"
 MEASURING = "all controllers, linear or not, that know the fault and measure, up to the sample, {} and nothing else"
-WAITING = "all controllers, linear or not, that know everything from the first sample after the disturbance begins"
+WAITING = "all controllers, linear or not, that know everything, but act only at samples after the disturbance begins"
 QUANTITIES = {
     "peak_slip_rate_error": ("slip-rate error", "m/s"),
     "largest_step": ("T_s", "s"),
@@ -213,7 +213,7 @@ class Limits:
 
     @property
     def stick_slip_rate(self) -> LowerBound | None:
-        """Slip rate [m/s] that the stick–slip plant reaches at its T_s under every controller that moves it."""
+        """Lower bound of the peak slip rate [m/s] of the stick–slip plant for every controller that moves it."""
         return smallest_stick_slip_rate(uncertain_plant(self.fault), rational(self.fault.sampling_time))
 
     @property

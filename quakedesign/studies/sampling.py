@@ -113,7 +113,7 @@ def sampling_report(
     design = law if isinstance(law, Design) else None
     controller = law.controller if isinstance(law, Design) else law
     if controller is None:
-        raise ParameterError(f"a law to sample needs gains. Received a design for {fault.name} without. Give gains.")
+        raise ParameterError(f"law must have gains. Received a design for {fault.name} that found none. Give gains.")
     bound = certified_bound(design)
     entries: list[tuple[str, Controller, tuple[str, ...]]]
     entries = [

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from quakedesign.errors import CertificateError, ParameterError
-from quakedesign.exact import LowerBound, UpperBound, rational
+from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import BlockChain, Disturbance, SlidingReference
 from quakedesign.files import Json
 from quakedesign.guarantees import NoProof
@@ -58,7 +58,7 @@ def chain_lines(chain: BlockChain) -> list[str]:
         stress = block.effective_normal_stress
         lines.append(f"{place:5}{block.length:12g}{quantity(stress, 'Pa', 4):>13}  {shares:24}{block.friction.name}")
     springs = ", ".join(f"{float(K):.4g}" for i, j, K in chain.springs if i < j)
-    lines += ["", f"springs to the next block over the mass of a block: {springs} 1/s^2"]
+    lines += ["", f"stiffness of the springs between neighbours over the mass of a block: {springs} 1/s^2"]
     pole, peak = _growth(chain), natural_peak(chain)
     stable = "stable" if pole == 0 else "stability unknown: its modes are not resolved in floating point"
     lines += [f"without control: {f'unstable, errors grow at up to {pole:.4g} 1/s' if pole else stable}"]
@@ -284,21 +284,26 @@ def chain_law(
     if chain.has_state:
         if not several:
             raise CertificateError(
-                f"a certificate must be about several blocks. Received {certificate}, which is not. Give one of "
-                "guarantee."
+                f"a certificate must be about several blocks. Received {certificate}, about one block. Give a file "
+                f"of guarantee {chain.name} --out FILE."
             )
         proof: Any = covered_stress(chain, claim)[-1]
     else:
         plant = UncertainPlant.from_blocks(chain)
         if not several or claim.part != linear_part(plant, {}):
             raise CertificateError(
-                f"a certificate must be about the fault. Received {certificate}, about a plant other than "
-                f"{plant.name}. Give a file of guarantee {chain.name} --out FILE."
+                f"a certificate must be about {plant.name}. Received {certificate}, about another plant. Give a file "
+                f"of guarantee {chain.name} --out FILE."
             )
         proof = named(claim, plant)
-    if claim.law.delay or claim.check() is not Verdict.PROVED:
+    if claim.law.delay:
         raise CertificateError(
-            f"a certificate must be valid, for a law without delay. Received {certificate}. Prove one with guarantee."
+            f"the law of a certificate must have no delay. Received {certificate} with a delay of "
+            f"{shortly(claim.law.delay)} s. Prove one with guarantee."
+        )
+    if claim.check() is not Verdict.PROVED:
+        raise CertificateError(
+            f"a certificate must be valid. Received {certificate}: its claims do not follow. Prove one with guarantee."
         )
     return proof
 
@@ -412,14 +417,14 @@ class SlidingChainRun:
         if self.proof is not None:
             covered = LowerBound(self.covered).quantity("Pa")
             parts = [
-                f"run over {end} under a sine of {quantity(self.stress, 'Pa')} of shear on every block; proved for up "
-                f"to {covered}, a lag of {float(self.lag):g} s, with |ln(v/V)| <= {self.log_rate:.3g}",
+                f"run of {end} under a sinusoidal shear stress of {quantity(self.stress, 'Pa')} on every block; proved "
+                f"for stresses up to {covered} and a lag of {float(self.lag):g} s: |ln(v/V)| <= {self.log_rate:.3g}",
                 *(
                     f"block {i}: slip error {quantity(float(slip), 'm')}, |ln(v/V)| {rate:.3g}, |ln(state)| {state:.3g}"
                     for i, (slip, rate, state) in enumerate(zip(*list(self.errors.values())[:3], strict=True), 1)
                 ),
                 *(
-                    f"well {i}: {quantity(float(v), 'Pa')} from the planned pressure"
+                    f"well {i}: pressure within {quantity(float(v), 'Pa')} of the plan"
                     for i, v in enumerate(self.errors["pressure_beside_plan"], 1)
                 ),
             ]

@@ -187,7 +187,7 @@ def shown_time(fault: Fault, *, whole: bool = False) -> float:
 def designed_run(
     design: Design, natural_peak: float | None, progress: Callable[[float], None], *, whole: bool = False
 ) -> SlidingRun:
-    """The law of a design for slow sliding over its `shown_time`, under a sine of the stress of the design.
+    """The law of a design for slow sliding over its `shown_time`, under a sinusoidal stress of the design's amplitude.
 
     The period of the sine is that of the tide, or a quarter of a run that is shorter than four tides.
     """
@@ -307,8 +307,8 @@ def _require_runnable(fault: Fault, plant: str) -> None:
     require_known(plant, PLANTS, "plant of a fault with a state", UnknownNameError)
     if fault.disturbance != Disturbance():
         raise ParameterError(
-            "a run of friction with a state has no disturbance but a pressure or a stress. Received a fault with a "
-            "table disturbance. Remove it, and give --pressure, or --stress with a controller."
+            "a fault with a friction state is disturbed by a pressure or a shear stress alone. Received a fault with a "
+            "table [disturbance]. Remove it, and give --pressure, or --stress with a controller."
         )
 
 
@@ -386,7 +386,9 @@ def sensor(
             "number of steps": inner_steps != 1,
         }
         for name in (name for name, there in entered.items() if there):
-            raise ParameterError(f"the {name} needs a differentiator. Received no bound. Give it, or omit the {name}.")
+            raise ParameterError(
+                f"the {name} needs a differentiator. Received no bound of one. Give this bound, or omit the {name}."
+            )
         return noise
     if noise.rate_noise:
         raise ParameterError(
@@ -432,10 +434,10 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
 
 def _note(order: int, reached: float, condition: JointCondition) -> str:
     if order > 1:
-        return f"no λ_d bounds derivative {order + 1} of the slip: its derivative 2 jumps wherever a held pressure does"
+        return f"no λ_d bounds derivative {order + 1} of the slip: derivative 2 jumps at every step of the pressure"
     return (
-        f"λ_d against |x1''| <= {reached:.3g} m/s² with exact states and what the errors of the estimates, "
-        f"{condition.slip_error:.2g} m and {condition.rate_error:.2g} m/s, add to it through the law"
+        f"λ_d must exceed |x1''| <= {reached:.3g} m/s² with exact states plus the contribution of the errors of the "
+        f"estimates, {condition.slip_error:.2g} m and {condition.rate_error:.2g} m/s, through the law"
     )
 
 
@@ -460,7 +462,7 @@ PUBLISHED, DESIGNED, CONTINUOUS = ("published",), ("designed",), ("continuous",)
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """Controller with its certified claim; building it needs no solver."""
+    """Controller, with its certified bound on |h'| or its guarantee where it has one."""
 
     controller: Controller
     # Certified bound on |h'| [m/s³]; None for gains without a certificate, and for a linear law
@@ -516,10 +518,10 @@ def _differences(fault: Fault, claim: Any) -> list[str]:
     """Differences of a fault that a certificate does not cover, except the planned pressure of slow sliding."""
     task: Any = plant_like(claim.task, fault)
     if claim.covers_healing:
-        task, uncovered = claim.beside_healing(task, rational(fault.friction.rest_excess))
-        if uncovered is not None:
+        task, covered = claim.beside_healing(task, rational(fault.friction.rest_excess))
+        if covered is not None:  # less than the healing of the fault
             healing = UpperBound(rational(fault.friction.rest_excess))
-            return [f"healing of the fault {healing:.3g}, covered with its disturbance {uncovered:.3g}"]
+            return [f"healing of the fault {healing:.3g}, covered with its disturbance at most {covered:.3g}"]
     differences: list[str] = claim.task.differences(task)
     return differences
 
@@ -659,7 +661,7 @@ def run_single(
     tell : callable
         Called with the progress.
     duration : float, optional
-        Duration of the run [s]; by default the operation time.
+        Duration of the run [s]; by default the operation time, but see `law`.
     noise : Measurement or Sensor
         Measurement of the law.
     actuator : Actuator

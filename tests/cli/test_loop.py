@@ -86,7 +86,7 @@ def test_the_printed_differentiator_is_told_and_has_no_bound_under_a_held_pressu
     (premise,) = (p for p in answer["premises"] if p["name"] == "differentiator")
     assert (premise["required"], premise["certified"], premise["unit"]) == (None, 100.0, "m/s^3")
     assert not premise["holds"]
-    assert "jumps wherever a held pressure does" in premise["note"]
+    assert "jumps at every step of the pressure" in premise["note"]
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def run(capsys, *arguments):
         (["campaign", "lab-fault", "--samples", "2", "--controller", "none", "--scale", "2"], "need a controller"),
         (["campaign", "lab-fault", "--samples", "2", "--rerun", "2"], "rerun must be an index below 2"),
         (["synthesise", "cta", "--degree", "5.5"], 'unable to convert "5.5" into int'),
-        (["simulate", "lab-fault", "--controller", "cta", "--saturation", "5 MPa"], "Received continuous"),
+        (["simulate", "lab-fault", "--controller", "cta", "--saturation", "5 MPa"], "with the scheme continuous"),
         (["certify", "elqr", "lab-fault", "--gains", "1", "2", "3", "4", "--step", "1 m"], "step"),
     ],
 )

@@ -169,7 +169,7 @@ def test_a_disturbance_of_acceleration_is_not_ignored(capsys, patch, tmp_path):
     path.write_text(TEXT + '\n[disturbance]\namplitude = "1e-4 m/s^2"\n')
     code, _, err = run(capsys, "simulate", str(path))
     assert code == 2
-    assert "has no disturbance but a pressure" in err
+    assert "is disturbed by a pressure or a shear stress alone" in err
 
 
 def test_friction_without_a_state_has_no_use_for_such_options(capsys):

@@ -261,11 +261,11 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
         " ".join(identification_lines(found, verbose=True)).split()
     )
     (said,) = law_remarks(found, patch)
-    assert "crustal-patch names rate-and-state-aging, the record prefers rate-and-state-slip" in said
+    assert "crustal-patch has rate-and-state-aging, but the record prefers rate-and-state-slip" in said
     assert law_remarks(replace(found, rival=None), patch) == []
     regularised = friction_law("regularised-rate-and-state")(**asdict(patch.friction))
     (said,) = law_remarks(found, replace(patch, friction=regularised))
-    assert "names regularised-rate-and-state, the record was fitted without it, by rate-and-state-slip" in said
+    assert "has regularised-rate-and-state, but the record was fitted by rate-and-state-slip" in said
     assert law_remarks(found, load_fault("lab-fault")) == []
     assert law_remarks(found, replace(patch, friction=slip)) == []
     assert "hardly tells" in str(OtherLaw(law="x", squares=1.001, excess=3.0))

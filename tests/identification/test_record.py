@@ -193,7 +193,7 @@ def test_what_falls_is_turned_and_what_slows_down_is_not(tmp_path):
     [
         (
             "clock, displ [um], mu",
-            r"Received load_point_displacement, friction, and 'clock', unknown.*'time=clock \[s\]'",
+            r"Received load_point_displacement, friction, and unknown: 'clock'.*'time=clock \[s\]'",
         ),
         (
             "displ [um], mu, tau [MPa]",

@@ -199,7 +199,7 @@ def test_rows_without_a_number_and_times_that_repeat_are_counted_once(tmp_path):
     record = read_record(path)
     assert record.remarks == (
         "3 of 8 rows left out, as a number is missing",
-        "1 samples at the time of another replaced by their mean",
+        "1 samples at the time of another: replaced by the mean at this time",
     )
     np.testing.assert_allclose(record.time, [0, 0.1, 0.2, 0.4])
     np.testing.assert_allclose(record.load_point[2], 0.25e-6)

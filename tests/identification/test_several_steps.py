@@ -236,5 +236,5 @@ def test_windows_of_a_file_are_steps(tmp_path):
         read_steps(path, "0 s-9 s")
     with pytest.raises(RecordError, match=r"--from and --to are for one window. Received them beside --steps"):
         read_steps(path, "0 s to 9 s", begin="1 s")
-    with pytest.raises(RecordError, match=r"several steps must be at least 2. Received 1. Use identify for one"):
+    with pytest.raises(RecordError, match=r"a common fit must have at least 2 records. Received 1. Use identify"):
         identify_steps([first])

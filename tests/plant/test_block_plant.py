@@ -86,7 +86,8 @@ def test_one_well_acts_on_all_blocks_and_measures_their_mean():
 
 
 @pytest.mark.parametrize(
-    ("fault", "box"), [(PAPER, "paper"), (WIDE, "ten-percent, springs between the blocks as they are")]
+    ("fault", "box"),
+    [(PAPER, "paper"), (WIDE, "ten-percent, the stiffness of the springs between blocks known exactly")],
 )
 def test_remarks_name_the_box_and_what_the_reference_needs(fault, box):
     task, remarks = uncertain_plant(fault), block_parts(fault, 2, "each", None)["remarks"]
@@ -102,7 +103,7 @@ def test_remarks_name_the_box_and_what_the_reference_needs(fault, box):
 
 def test_springs_without_a_spread_of_the_stiffness_are_still_those_of_the_nominal_fault():
     box = replace(WIDE.box, stiffness=F(0), damping=F(0))
-    assert "springs between the blocks as they are" in block_parts(
+    assert "springs between blocks known exactly" in block_parts(
         replace(WIDE, box=box), 2, "each", None
     )["remarks"]["plant"]  # fmt: skip
 

@@ -105,7 +105,7 @@ def test_a_differentiator_comes_with_its_premise():
 def test_without_a_certificate_the_premise_on_the_run_says_so():
     _, (premise,) = told(choice(LAB, "cta", BASE).controller, duration=0.02)
     assert (premise.name, premise.certified, premise.ratio, premise.holds) == ("on_trajectory", 0, None, False)
-    assert "no certificate was given, and none of these gains exceeds 1.2 m/s^3" in premise.note
+    assert "no certificate was given, and no bound of these gains exceeds 1.2 m/s^3" in premise.note
 
 
 def test_a_certified_bound_goes_with_the_scale(monkeypatch):
@@ -147,7 +147,7 @@ def test_a_scheme_is_tuned_as_its_guarantee_says():
     plain, _ = run_single(LAB, law, tell=lambda _: None, **(USUAL | small))
     assert run.pressure.tolist() != plain.pressure.tolist()
     for scheme in ("explicit", "continuous"):
-        with pytest.raises(ParameterError, match="settings of weight are for the schemes compensated"):
+        with pytest.raises(ParameterError, match="weight is a setting of compensated"):
             run_single(LAB, law, tell=lambda _: None, tuning={"weight": 0.35}, **(USUAL | {"scheme": scheme}))
     with pytest.raises(ParameterError, match="Received weight"):
         run_single(LAB, None, tell=lambda _: None, tuning={"weight": 0.35}, **USUAL)

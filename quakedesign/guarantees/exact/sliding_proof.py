@@ -175,7 +175,7 @@ def _box(task: SlidingPlant) -> str:
     ]
     if not wide:
         return "for the constants of fault and friction as they are given"
-    return f"for all constant {', '.join(wide)}, all other constants as they are given"
+    return f"for every constant value of {', of '.join(wide)}, all other constants as they are given"
 
 
 def _inside(low: Fraction, high: Fraction) -> str:

@@ -18,7 +18,7 @@ before the next sample, and the period ends with y = 0. So each period follows e
 linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
 bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
-**Rest map.** Let m = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(m−t)})/w. As y
+**Rest map.** Let μ = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(μ−t)})/w. As y
 = 0 at the stop, integration by parts gives δ = f(0)y + ∫f·(G + φ)dt up to the stop. Before the stop G ≤ −H + |S⁻|(δ −
 ξ), and this bound minus G decreases with the slip. So
 
@@ -41,7 +41,7 @@ the chord of β·m1 may replace β·M if the term −bβU·X1 of the ξ in (|n3�
 U < 0 replace m1 by the chord of β·m1, divided by β: all terms with U are convex in β, and |n3·s|ψ/b enters the terms
 with y and H alone.
 
-**Sliding mode.** The target rate is r′ + w, w the solution of the implicit step. That step is shown to be deadbeat, w =
+**Sliding mode.** The target rate is r′ + ω, ω the solution of the implicit step. That step is shown to be deadbeat, ω =
 −e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
 1/T, whose states stay in the polytope.
 
@@ -59,11 +59,11 @@ unlimited innovation would; otherwise d contains no noise. Initially e1 = N and 
 innovation, n, is not limited. All d from 0 to m·N are required to lie in the polytope.
 
 **Aperiodic sampling.** Each interval between samples is any h from T to T_m; T is a constant of the law. The bound of a
-facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|m(h − s)ds over [0, h]. Here g is its
-response to an impulse, and m(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. m ≥ 0 is
+facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|A(h − s)ds over [0, h]. Here g is its
+response to an impulse, and A(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. A ≥ 0 is
 required up to T_m, also beyond the end of the actual interval, so that one formula of V is valid for all h. g is
 Lipschitz, so V″ ≥ −B almost everywhere, and V is below its chord over Δ plus Δ²B/8: bounds at five intervals suffice,
-with B from |l″|, |g′|m(0), |g|·|m′| and ∫|g|·|m″|. At rest the bound is convex in h, so both ends suffice. A shorter
+with B from |l″|, |g′|A(0), |g|·|A′| and ∫|g|·|A″|. At rest the bound is convex in h, so both ends suffice. A shorter
 period that ends at rest can be extended to T_m, as nothing releases the block in the added time; so the bound for T_m
 of the slip until a stop covers it.
 
@@ -414,7 +414,7 @@ class Ranges:
 def ranges(task: FaultPlant, ahead: Fraction, feedback: Range, moved: Fraction) -> Ranges:
     """Ranges of the plant for bounds of slip and of U = p* − p [Pa].
 
-    The slip is at most `ahead` [m] beyond the target, and at most `moved` [m] in a period.
+    The slip is at most `ahead` [m] beyond the target, and grows by at most `moved` [m] in a period.
 
     β changes within a period by at most N̂|μ′|/b·`moved`, so σ exceeds S_chord/(bβ) by at most this fraction.
 
@@ -606,7 +606,7 @@ class Rows:
     Attributes
     ----------
     place : int
-        Slice or combination.
+        Index of the slice, or `SLICES` plus that of the combination.
     which : ndarray of int
         Indices of the facets.
     factors, constants : ndarray
@@ -624,10 +624,11 @@ class Rows:
 def feedback_row(
     sampled_loop: SampledStickSlip, fastest: Fraction, combination: tuple[int, bool, int, int]
 ) -> tuple[tuple[Fraction, Fraction, Fraction], Fraction, tuple[Fraction, Fraction]]:
-    """Factors of (e1, y, d) in U and its constant [Pa], and q1, q0 of r′ = q1·e1 + q0."""
+    """Factors of (e1, y, d) in U and its constant [Pa], and slope and intercept of r′ in e1."""
     law = sampled_loop.law
-    q1, q0 = law.return_rate * combination[2], fastest * combination[3]
-    return (-law.target_gain * (q1 - law.return_rate), law.rate_gain, Fraction(1)), -law.target_gain * q0, (q1, q0)
+    slope, end = law.return_rate * combination[2], fastest * combination[3]
+    row = -law.target_gain * (slope - law.return_rate), law.rate_gain, Fraction(1)
+    return row, -law.target_gain * end, (slope, end)
 
 
 @dataclass(frozen=True, slots=True)
@@ -640,7 +641,7 @@ class _Carried:
     of_error: np.ndarray
     constant: np.ndarray
     rising: np.ndarray  # factor of r′ itself
-    standstill: np.ndarray  # largest r′ at which r may stand still, where r′ counts as 0 and n1 > 0
+    standstill: np.ndarray  # largest r′ at which r may stand still, for r′ = 0 and n1 > 0; 0 otherwise
 
     def moved(self, pushed: np.ndarray | int, which: np.ndarray) -> np.ndarray:
         """Contribution of r′ where the reference may stand still; `pushed` is the plant's factor of −r′."""
@@ -790,12 +791,10 @@ def polytopes(
         return flat
     stops = stop_bounds(task, sampled_loop, plant)
     most = task.beta[1] * task.authority
+    room = most * sampled_loop.pressure_noise - task.amplitude
     for combination in (COMBINATIONS[place] for place in LEAST):
-        feedback, feedback0, _ = feedback_row(
-            sampled_loop, task.reference_rates[0] + sampled_loop.target_noise, combination
-        )
+        feedback = feedback_row(sampled_loop, _ZERO, combination)[0]  # the least r′ has no constant part
         larger = (*(-most * v for v in feedback), plant.slope[0])
-        room = most * (feedback0 + sampled_loop.pressure_noise) - task.amplitude
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
         tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, room)]
         tall += [((_ZERO, -g, _ZERO, one), h) for g, h in stops]
@@ -853,8 +852,8 @@ class Verifier:
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """Upper bounds of c·z + k, or of 1 + (c − n)·z + k where `which` names facets.
 
-        The second bound decides where a period changes nothing, as at rest: there c − n has the sign opposite to that
-        of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of its slice.
+        The second bound decides where a period changes nothing, as at rest: there the entries of c − n have signs
+        opposite to those of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of its slice.
         """
         factors, off = _middles(factors)
         constants, above = _middles(constants)
@@ -870,12 +869,12 @@ class Verifier:
                 left[:, 3] = 0
             same = 1 + 0 * largest
             if self.last is not None:
-                same, left[:, 0] = same + np.maximum(left[:, 0], 0) * self.ends[self.last], np.minimum(left[:, 0], 0)
+                same, left[:, 0] = same + np.maximum(left[:, 0], 0) * self.ends[self.last], 0
             largest = np.minimum(largest, same + self._rest(left, off))
         return np.asarray(largest + constants)
 
     def _rest(self, left: np.ndarray, off: np.ndarray) -> np.ndarray:
-        """Bound of the remainder of the multipliers, within `off`, by the signs of e1, y and δ."""
+        """Bound of left·z, each coefficient within `off`, by the signs of e1, y and δ."""
         left = left * np.array([self.sign, 1, 1, 1][: left.shape[1]])
         left[:, 2] = abs(left[:, 2])
         return np.asarray((np.maximum(left + off, 0) * self.sizes).sum(axis=1))
@@ -918,10 +917,10 @@ def _bounds(task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: Sti
         raise ParameterError("noise of the first measurement may put the loop outside of the polytope")
     fastest = task.reference_rates[0]
     moved = fastest * sampled_loop.longest
-    behind, before = lag + sampled_loop.slip_noise + moved, ahead - sampled_loop.slip_noise + moved
+    behind, in_front = lag + sampled_loop.slip_noise + moved, ahead - sampled_loop.slip_noise + moved
     if sampled_loop.law.pull:
         root = ImplicitStep(pull=sampled_loop.law.pull)
-        if not sector_is_valid(root, sampled_loop.step, *sampled_loop.errors(task, max(behind, before), rate)):
+        if not sector_is_valid(root, sampled_loop.step, *sampled_loop.errors(task, max(behind, in_front), rate)):
             raise ParameterError("the implicit step may not be deadbeat everywhere in the polytope")
     feedback = feedback_range(task, sampled_loop, invariant_set)
     plant = ranges(task, ahead + moved, feedback, rate * sampled_loop.longest)
@@ -936,10 +935,13 @@ def _bounds(task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: Sti
                 kind = "slides" if rows.place < SLICES else "ends at rest"
                 raise ParameterError(f"the state may leave the polytope through facet {facet} in a period that {kind}")
     if _bracket(task, sampled_loop, plant, feedback[1]) > task.amplitude:
-        raise ParameterError("the amplitude of the disturbance is too small for this range of the input gain")
+        raise ParameterError(
+            "the amplitude of the disturbance is too small for this range of the input gain. A larger amplitude may "
+            "have a proof, which covers this one"
+        )
     return StickSlipClaims(
         slip_behind=UpperBound(behind),
-        slip_ahead=UpperBound(before),
+        slip_ahead=UpperBound(in_front),
         peak_slip_rate=UpperBound(rate),
         least_pressure=LowerBound(plant.rest_pressure[0] - feedback[1]),
         largest_pressure=UpperBound(plant.rest_pressure[1] - feedback[0]),

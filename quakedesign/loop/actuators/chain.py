@@ -50,11 +50,13 @@ class Actuator:
                 )
         if len(between := [stage.name for stage in self.sampled if stage.part]) > 1:
             raise ParameterError(
-                f"one stage of an actuator can act between samples. Received {', '.join(between)}. Keep one of these."
+                f"at most one stage of an actuator may act between samples. Received {', '.join(between)}. Keep one."
             )
         if len(self._stores) > 1:
             names = ", ".join(stage.name for stage in self._stores)
-            raise ParameterError(f"one stage of an actuator can store fluid. Received {names}. Keep one of these.")
+            raise ParameterError(
+                f"at most one stage of an actuator may store fluid. Received {names}. Keep one of these."
+            )
 
     @classmethod
     def meant_for(cls, sampling: "Sampling") -> "Actuator":

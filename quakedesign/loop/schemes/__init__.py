@@ -35,8 +35,8 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
     for setting in sorted(settings.keys() - names):
         able = [n for n, one in schemes().items() if is_dataclass(one) and setting in {f.name for f in fields(one)}]
         raise ParameterError(
-            f"settings of {setting} are for the schemes {', '.join(sorted(able)) or 'of nobody'}. "
-            f"Received {name}. Use one of these schemes, or omit {setting}."
+            f"{setting} is a setting of {', '.join(sorted(able)) or 'no scheme'}. "
+            f"Received it with the scheme {name}. Use another scheme, or omit {setting}."
         )
     return kind(**settings)
 

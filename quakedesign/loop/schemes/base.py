@@ -184,8 +184,8 @@ class ControlStep:
     Attributes
     ----------
     function : casadi.Function
-        (signals in the order of `SIGNALS`, integrals ξ, numbers of the law, memory of the scheme) → pressure [Pa],
-        integrals and memory at the next sample, and effect, the change of the pressure [Pa] due to the change of ξ.
+        (signals in the order of `SIGNALS`, integrals ξ, numbers of the law, memory of the scheme) → pressure [Pa] at
+        this sample, integrals and memory at the next one, and the change of the pressure [Pa] due to the change of ξ.
     numbers : tuple of float
         Numbers of this law; another law of the same kind has the same function.
     """
@@ -390,7 +390,8 @@ class Sampled(Scheme, Decided):
         sample = self._sample(loop, counter, state, step)
         moving = ca.vertcat(state[:2], *sample.flow)
         for applied, begin, share in self._sections(sample):
-            # The repeated functions of two sections must differ in their number of arguments: the second has one more.
+            # With equal numbers of arguments the repeated functions of two sections would be merged: the second has one
+            # more.
             given = ca.vertcat(counter, applied, *sample.numbers, *([begin] if begin else []))
             times = math.ceil(share * self.substeps)
             motion = self._motion(step, begin, share, times)

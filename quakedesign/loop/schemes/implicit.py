@@ -35,19 +35,19 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 #   lies, or that it lies at the jump; then a linear equation gives the selection from [−1, 1]. So all signs are known.
 # - With the signs fixed, w = g(w) with g continuous and non-increasing. The solution lies between 0 and g(0): if
 #   g(0) ≥ 0, then w − g(w) is −g(0) ≤ 0 at w = 0, and g(0) − g(g(0)) ≥ 0 at w = g(0), because g(g(0)) ≤ g(0); likewise
-#   with the signs reversed. Reducing this bracket to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; evaluating three points at
-#   once uses a processor better than one. At a jump the search is skipped, since a loop in sliding mode, which stays at
-#   a jump, would spend most of its time on it.
+#   with the signs reversed. Reducing this bracket to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; three independent
+#   evaluations take little longer than one. At a jump the search is skipped, since a loop in sliding mode, which stays
+#   at a jump, would spend most of its time on it.
 
 ROUNDS = 27
-AT_ONCE = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
+ROUNDS_PER_LOOP = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
 end_slip, end_rate = sp.symbols("end_slip end_rate", real=True)
 
 InclusionValues = dict[sp.Symbol, ca.SX]
 
 
 def direction(expression: sp.Expr) -> int | None:
-    """1, 0 or −1 if an expression never falls, changes or rises with `end_slip` and `end_rate`; else None."""
+    """1, 0, −1 for an expression non-decreasing, constant, non-increasing in `end_slip` and `end_rate`; else None."""
     if not expression.free_symbols & {end_slip, end_rate}:
         return 0
     if expression in (end_slip, end_rate):
@@ -80,7 +80,7 @@ class Inclusion:
     free : Expr
         e2 [m/s], the part that does not depend on the end of the step.
     pull : Expr
-        T_s·B0·p [m/s], which never increases with the end of the step.
+        T_s·B0·p [m/s], non-increasing in `end_slip` and `end_rate`.
     slip_error, step : Symbol
         e1 [m], T_s [s].
 
@@ -106,7 +106,7 @@ class Inclusion:
 
     @cached_property
     def arguments(self) -> tuple[sp.Expr, ...]:
-        """Arguments of the signs, each increasing with the end of the step."""
+        """Arguments of the signs, each increasing in `end_slip` and `end_rate`."""
         signs = (atom for atom in self.pull.atoms(SignedPower) if atom.args[1] == 0)
         return tuple(sorted({_rising(atom.args[0])[0] for atom in signs}, key=sp.default_sort_key))
 
@@ -193,21 +193,21 @@ class Inclusion:
         return self._quarter(target - end_rate, inputs, self._value(target, inputs, 0.0))
 
     def _quarter(self, falling: sp.Expr, inputs: InclusionValues, width: ca.SX) -> ca.SX:
-        """Zero of a decreasing function of the end of the step, between 0 and `width`."""
+        """Zero of a function that decreases in `end_rate`, between 0 and `width`."""
         test, inputs = _sign_only(falling), self._dependencies(falling, inputs)
         before = ca.SX.sym("before", 2 + len(inputs))
         low, length, *values = ca.vertsplit(before)
         by_symbol = dict(zip(inputs, values, strict=True))
-        for _ in range(AT_ONCE):
+        for _ in range(ROUNDS_PER_LOOP):
             length = length / 4
             passed = sum(self._value(test, by_symbol, low + share * length) >= 0 for share in (1, 2, 3))
             low = low + passed * length
         rounds = ca.Function("rounds", [before], [ca.vertcat(low, length, *values)])
         start = ca.vertcat(ca.fmin(width, 0), ca.fabs(width), *inputs.values())
-        return rounds.fold(ROUNDS // AT_ONCE, {"never_inline": True})(start)[0]
+        return rounds.fold(ROUNDS // ROUNDS_PER_LOOP, {"never_inline": True})(start)[0]
 
     def _dependencies(self, expression: sp.Expr, inputs: InclusionValues) -> InclusionValues:
-        """Inputs on which an expression depends, only these: a call counts every argument as a dependency."""
+        """Inputs on which an expression depends; for CasADi a call depends on all of its arguments."""
         names = expression.free_symbols | {self.slip_error, self.step}
         return {symbol: value for symbol, value in inputs.items() if symbol in names}
 
@@ -257,7 +257,7 @@ def _rising(argument: sp.Expr) -> tuple[sp.Expr, int]:
 
 
 def _is_straight(expression: sp.Expr) -> bool:
-    """Whether an expression is a polynomial of degree at most 1 in the end of the step."""
+    """Whether an expression is a polynomial of degree at most 1 in `end_slip` and `end_rate`."""
     return all(
         not atom.free_symbols & {end_slip, end_rate} for atom in expression.atoms(SignedPower, AbsolutePower)
     ) and bool(expression.is_polynomial(end_slip, end_rate))
@@ -286,7 +286,7 @@ AHEAD = {
 def backward_euler(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
     """Pull [m/s], feed-forward [Pa] and ξ⁺ in `end_slip`, `end_rate` and the symbols of `discrete_law`.
 
-    The pull is T_s·B0·p without the feed-forward, the pressure at zero errors and integral states: it balances forces
+    The pull is T_s·B0·(p − p_f). The feed-forward p_f, the pressure at zero errors and integral states, balances forces
     of the plant that the double integrator lacks. Slip and slip rate themselves are taken at the end of the step if
     the pressure then never increases with them, otherwise at its start. Each ξ' uses the preceding ξ at the end of the
     step, and the others at its start.

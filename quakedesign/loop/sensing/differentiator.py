@@ -219,8 +219,8 @@ class Differentiator:
         size = math.log(self.bound) + (self.size + 1) * math.log(self.step / self.inner_steps)
         if not math.log(sys.float_info.min) < size < math.log(sys.float_info.max):
             raise ParameterError(
-                f"bound·step^{self.size + 1} must not vanish in double precision, nor overflow. "
-                f"Received {self.bound!r}, {self.step!r} s. Take another order or step."
+                f"bound·(step/inner_steps)^{self.size + 1} must be representable in double precision. Received "
+                f"{self.bound!r}, {self.step!r} s and inner_steps {self.inner_steps}. Take another order or step."
             )
 
     @property

@@ -157,7 +157,7 @@ class Measurement(Sensor):
 
     @property
     def software(self) -> "Measurement":
-        """None: all noise is that of the instruments."""
+        """Exact measurement: all noise is that of the instruments."""
         return EXACT
 
     @property
@@ -217,7 +217,7 @@ def uniform(memory: Entries) -> tuple[Entries, "ca.SX"]:
 class Transducer(SlipStage):
     """Slip after a first-order low-pass filter, plus independent normal noise at every sample, then rounded.
 
-    The filter is exact for a slip that is constant over the sample, y ← y + (1 − e^(−2πf_bT_s))(x − y).
+    The filter is exact for a slip that is constant over each sampling interval, y ← y + (1 − e^(−2πf_bT_s))(x − y).
 
     Attributes
     ----------
@@ -309,7 +309,7 @@ class Averaging(SlipStage):
         return (0.0,) * (self.samples - 1)
 
     def numbers(self, step: float) -> tuple[float, ...]:
-        """None."""
+        """No parameters."""
         return ()
 
     def pass_on(self, numbers: Entries, memory: Entries, slip: "ca.SX") -> tuple["ca.SX", Entries]:

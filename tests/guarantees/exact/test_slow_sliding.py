@@ -116,7 +116,7 @@ def test_the_guarantee_is_proved_by_both_checkers_and_survives_its_file(tmp_path
 def test_the_ranges_that_are_said_lie_inside_those_that_are_proved(half):
     one = task(half)
     sentence = replace(CLAIM, task=one).sentence()
-    said = sentence.split("for all constant ")[1].split(", all other constants as they are given: ")[0]
+    said = sentence.split("for every constant value of ")[1].split(", all other constants as they are given: ")[0]
     for text, axis in zip(said.split(", "), ("direct_effect", "evolution_effect", "critical_slip"), strict=True):
         low, high = one.ranges[axis]
         left, right = map(F, text.split(" from ")[1].split(" to "))
@@ -557,7 +557,7 @@ def test_a_guarantee_along_references_of_a_swing_is_proved_by_both_checkers_and_
     assert json.loads(text)["reference"]["swing"] == "1/20"
     assert parse_guarantee(text) == SWINGING
     assert SWINGING.check() is Verdict.PROVED
-    assert "every reference whose rate stays between 0.95 V and 1.05 V, for all constant a" in SWINGING.sentence()
+    assert "whose rate stays between 0.95 V and 1.05 V, for every constant value of a" in SWINGING.sentence()
     statement = checker.check(text).statement
     assert any("whose rate stays within (1 +- 0.05) times this slip rate" in line for line in statement)
 
@@ -646,7 +646,7 @@ def test_a_sentence_names_the_wide_constants_and_the_friction():
     assert "for the constants of fault and friction as they are given" in given
     assert given.endswith("(with inertia)")
     one = replace(CLAIM, task=task("0", ranges={**task("0").ranges, "critical_slip": (F("0.0008"), F("0.0011"))}))
-    assert "for all constant D_c from" in one.sentence()
+    assert "for every constant value of D_c from" in one.sentence()
     assert "constant a " not in one.sentence()
 
 

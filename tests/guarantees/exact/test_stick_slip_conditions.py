@@ -173,6 +173,10 @@ def test_damping_may_be_zero():
     assert ranges(still, F(0), (F(0), F(0)), F(0)).damping == (0, 0)
     with pytest.raises(ParameterError, match="w may be negative"):
         ranges(replace(still, growths=(F(0), TINY)), F(0), (F(0), F(0)), F(0))
+    low, high = ranges(task(growths=(F(0), F(0))), F(0), (F(0), F(0)), F(0)).damping
+    assert ranges(task(growths=(F(0), low)), F(0), (F(0), F(0)), F(0)).damping == (0, high - low)
+    with pytest.raises(ParameterError, match="w may be negative"):
+        ranges(task(growths=(F(0), low + TINY)), F(0), (F(0), F(0)), F(0))
 
 
 @pytest.mark.parametrize("growth", ["-1/60", "1/60"])
@@ -359,16 +363,14 @@ def test_sizes_are_those_of_the_farther_side(place, entry):
         assert list(one.sizes) == [fmpq(2, 5), 1, 4]
 
 
-def test_noise_makes_the_target_rate_larger_in_every_constraint():
-    """The condition of rest has −βb·U with U by (max r' + noise) of the target rate."""
+def test_rest_needs_a_force_below_the_disturbance():
+    """b·β_max·(U + m·N) ≥ H − |S⁻|δ with U = 3·(9/5 − q)·e1 + 2y + d, q = 9/5 or 0 the slope of the least r′ in e1."""
     known = claim()
-    loop, plant = known.sampled_loop, known.task
-    lines = module.polytopes(plant, loop, (), PLANT)
-    most, law = plant.beta[1] * plant.authority, loop.law
-    fastest = plant.reference_rates[0] + loop.target_noise
-    assert loop.target_noise == 2 * law.return_rate / 90
-    conditions = [lines[SLICES + place][-7] for place in range(len(COMBINATIONS))]
-    for (row, room), combination in zip(conditions, (COMBINATIONS[place] for place in module.LEAST), strict=True):
-        target = combination[3] * fastest
-        assert room == most * (loop.pressure_noise - law.target_gain * target) - plant.amplitude
-        assert row[3] == PLANT.slope[0]
+    plant = known.task
+    lines = module.polytopes(plant, known.sampled_loop, (), PLANT)
+    most = plant.beta[1] * plant.authority
+    for place, combination in enumerate(module.LEAST):
+        row, room = lines[SLICES + place][-7]
+        slope = 0 if COMBINATIONS[combination][2] else F(27, 5)
+        assert row == (-most * slope, -2 * most, -most, PLANT.slope[0])
+        assert room == most * F(3, 2) / 90 - plant.amplitude

@@ -170,7 +170,7 @@ def test_no_error_and_no_disturbance_means_no_pressure(name):
         ({"substeps": 0}, "substeps"),
         ({"substeps": 1.5}, "substeps"),
         ({"authority": 0.0}, "authority"),
-        ({"weight": 0.5}, "weight are for the schemes compensated, stick-slip. Received explicit"),
+        ({"weight": 0.5}, "weight is a setting of compensated, stick-slip. Received it with the scheme explicit"),
     ],
 )
 def test_meaningless_settings_are_refused(options, said):
@@ -179,7 +179,7 @@ def test_meaningless_settings_are_refused(options, said):
 
 
 def test_the_continuous_scheme_has_no_settings():
-    with pytest.raises(ParameterError, match=r"substeps are for the schemes compensated, .* Received continuous"):
+    with pytest.raises(ParameterError, match=r"substeps is a setting of compensated, .* with the scheme continuous"):
         run("continuous", substeps=2)
     with pytest.raises(ParameterError, match="Set them in the scheme"):
         run(simulation_scheme("explicit"), substeps=2)
