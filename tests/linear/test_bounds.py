@@ -52,6 +52,45 @@ def test_a_named_uncertainty_changes_only_its_own_term():
     assert stiffness.bound == F(1, 10) * F(48, 100) / least
 
 
+def test_each_term_has_the_far_ends_of_its_ranges():
+    """Ten per cent about k̂ = 0.48 1/s² and η̂ = 2.3 1/s: what the law does not know, and the largest drift."""
+    fault = REAL.with_box("ten-percent")
+    bounds = uncertainty_bounds(fault, loading_rate="1e-6")
+    found = {(c.name, c.acts_on): c for c in bounds.contributions}
+    assert found["stiffness", "slip"].range == (-F("0.048"), F("0.048"))
+    low, high = found["viscosity", "slip rate"].range
+    assert (-low, high) == (high, F(1, 10) * sectors(REAL).rate[0])
+    drift = F("0.528") * F(1, 10**6) * F(fault.reference.operation_time)
+    assert found["drift of the far end", "nothing"].range == (0, drift)
+    shaking = F("3.2e-4")
+    assert found["disturbance at rest", "nothing"].range == (-shaking, shaking)
+    assert bounds.nonvanishing == sum(c.bound for c in bounds.contributions if c.acts_on == "nothing")
+    low, high = found["friction chord slope", "slip rate"].range
+    assert low == -high == 0
+    plain = bounds.to_dict()
+    for name in ("control", "rest_pressure"):
+        assert plain[name][0] <= getattr(bounds, name)[0] < getattr(bounds, name)[1] <= plain[name][1]
+        assert plain[name] == pytest.approx([float(v) for v in getattr(bounds, name)], rel=1e-14)
+    assert [plain["g1"], plain["g2"]] == pytest.approx([float(v) for v in sectors(fault).row_bounds], rel=1e-14)
+
+
+def test_the_table_gives_every_term_its_share_of_its_column():
+    bounds = uncertainty_bounds(REAL.with_box("ten-percent"))
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in bounds.table().splitlines()[2:]]
+    assert len(rows) == len(bounds.contributions)
+    for row, term in zip(rows, bounds.contributions, strict=True):
+        assert row[:2] == [term.name, term.acts_on]
+        (low, _, high), unit = row[2].split()[:3], row[2].split()[3]
+        assert F(low) <= term.range[0] <= term.range[1] <= F(high)
+        assert [unit, row[3].split()[1]] == {
+            "slip": ["1/s²", "Pa/m"], "slip rate": ["1/s", "Pa·s/m"], "nothing": ["m/s²", "Pa"]
+        }[term.acts_on]  # fmt: skip
+        assert float(row[3].split()[0]) == pytest.approx(float(term.bound), rel=1e-3)
+    for acts_on in ("slip", "slip rate", "nothing"):
+        shares = [float(row[4][:-1]) for row in rows if row[1] == acts_on and row[4] != "-"]
+        assert sum(shares) == pytest.approx(100, abs=0.3)
+
+
 def test_drift_of_the_far_end_stays_at_the_equilibrium():
     # 30 mm a year over 184.17 h against k̂ = 0.48 1/s²
     speed, seconds = 0.03 / 31557600, 184.17 * 3600

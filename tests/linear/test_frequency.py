@@ -1,5 +1,6 @@
 """Limits in the frequency domain against eigenvalues, closed forms and another library."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 from itertools import product
 
@@ -60,19 +61,21 @@ def test_the_slip_limit_is_where_an_eigenvalue_crosses(gains):
 
 
 def test_the_least_limit_may_lie_inside_the_range_of_beta():
-    # k1·k3 only just above k2·k4: the bracket falls, then rises with β
-    loop = loop_of((F(10), F(3), F(30), F(40)), beta=(F(1), F(10)), slip=(F(-1), F(-1)), rate=(F(2),) * 2)
+    # k1·k3 only just above k2·k4: the limit falls, then rises with β, and is least where (2 + 3β)² = 200
+    loop = loop_of((F("4.3"), F(3), F(30), F(40)), beta=(F(1), F(10)), slip=(F(-1), F(-1)), rate=(F(2),) * 2)
     limit, beta = slip_limit(loop, F(2))
 
     def at(b):
-        strength = float(b)
-        damping = 2 + 3 * strength
-        return 10 * strength - 30 * strength / damping - damping * 40 / 30
+        damping = 2 + 3 * b
+        return 4.3 * b - 30 * b / damping - damping * 40 / 30
 
-    grid = np.linspace(1, 10, 9001)
-    assert float(limit) == pytest.approx(min(at(b) for b in grid), abs=1e-5)
-    assert float(limit) <= min(at(b) for b in grid) + 1e-9
-    assert 1 <= beta <= 10
+    assert float(beta) == pytest.approx((200**0.5 - 2) / 3, abs=1e-5)
+    assert float(limit) == pytest.approx(at(float(beta)), rel=1e-12)
+    assert at(float(beta)) < min(at(1), at(10)) - 0.1
+    for ends in ((F(1), F(2)), (F(5), F(10))):  # the least point lies outside
+        limit, beta = slip_limit(replace(loop, sectors=replace(loop.sectors, beta=ends)), F(2))
+        assert beta in ends
+        assert float(limit) == pytest.approx(min(at(float(b)) for b in ends), rel=1e-12)
 
 
 def test_a_loop_without_double_integral_action_has_no_limit():
