@@ -467,7 +467,7 @@ BUDGETS = {
     "laws": 3114,
     "loop": 4193,
     "plant": 1459,
-    "guarantees": 13513,
+    "guarantees": 13518,
     "lyapunov": 6962,
     "linear": 2405,
     "synthesis": 1973,

@@ -1,6 +1,7 @@
 """Numbers become exact in one place, and only finite ones."""
 
 import math
+import re
 import sys
 from fractions import Fraction as F
 
@@ -153,3 +154,29 @@ def test_a_number_that_is_not_0_is_not_written_as_0():
 )
 def test_numbers_that_differ_are_written_apart(values, texts):
     assert apart(*values) == texts
+
+
+@pytest.mark.parametrize(
+    ("off", "texts"),
+    [
+        (8, ("0.333333333", "0.333333343")),
+        (11, ("0.333333333333", "0.333333333343")),
+        (20, ("0." + "3" * 24, "0." + "3" * 19 + "43333")),
+    ],
+)
+def test_numbers_are_written_apart_with_the_fewest_of_9_12_and_24_digits(off, texts):
+    assert apart(F(1, 3), F(1, 3) + F(1, 10**off)) == texts
+
+
+def test_large_numbers_are_written_as_floats_are():
+    assert shortly(F(10**6)) == shortly(1e6) == "1e+06"
+
+
+@pytest.mark.parametrize(
+    ("text", "example"),
+    [("5%", "0.05"), ("12.5 %", "0.125"), ("1" * 20 + "%", "1.11111e+17"), ("1" * 21 + "%", "2.3,"), ("1/2%", "2.3,"),
+     ("x%", "2.3,"), ("", "2.3,")],
+)  # fmt: skip
+def test_the_remedy_for_a_percentage_is_the_number(text, example):
+    with pytest.raises(ParameterError, match=re.escape(f"Write for example {example}")):
+        rational(text)

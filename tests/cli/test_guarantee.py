@@ -106,8 +106,8 @@ def test_given_gains_for_people(call):
         answer.split()
     )
     assert told.startswith(
-        "proved: on the plant without stick, from rest, with zero-order hold over 0.184 s, for every disturbance of at "
-        "most 0.00032 m/s^2 (4 kPa"
+        "proved: on the plant without stick, from rest, with zero-order hold over 0.184 s, with exact measurements of "
+        "slip and slip rate, for every disturbance of at most 0.00032 m/s^2 (4 kPa"
     )
     assert "worst case found on the stick-slip plant" in out
     assert "of the box: the slip rate never exceeds" in " ".join(out.split())

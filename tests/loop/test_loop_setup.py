@@ -29,6 +29,8 @@ def test_quantities_with_units_become_exact_numbers_in_si_units():
         ({"delay": "-1 ms"}, ParameterError, "delay must be 0 or more. Received -0.001 s"),
         ({"lag": "8 MPa"}, UnitError, "lag must be a quantity in s"),
         ({"step": "0 s"}, ParameterError, "step must be positive"),
+        ({"step": "-1 s"}, ParameterError, "step must be positive"),
+        ({"rate_limit": "-1 Pa/s"}, ParameterError, "rate limit of a pump must be positive"),
         ({"step": "1e10 s"}, ParameterError, "step must be positive, between 1e-9 s and 1e9 s"),
         ({"measured": "slips"}, ParameterError, "measured must be .*slip"),
         ({"withdrawal": "1 MPa"}, ParameterError, "withdrawal needs saturation"),

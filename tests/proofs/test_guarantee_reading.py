@@ -498,7 +498,7 @@ def test_the_statement_says_what_rock_there_is(lag):
     assert checker.statement(raw, checker.read_task(raw), dict.fromkeys(CLAIMS, F(1)), F(1, 3))[2] == said
     claim, lagging = read_guarantee(raw), "" if lag == "0" else ", through a lag of 0.333334 s"
     assert (
-        f"with zero-order hold over 1 s{lagging}, through a diffusion path of L^2/D = 2 s, for every"
+        f"with zero-order hold over 1 s{lagging}, through a diffusion path of L^2/D = 2 s, with exact"
         in claim.sentence()
     )
     assert json.loads(guarantee_text(claim)) == raw

@@ -133,7 +133,8 @@ class PlantProof(Proof[Row]):
         text += f", disturbances of at most {_listed(sizes, pushed)}{of_forces and f' ({of_forces})'}" if sizes else ""
         rates, unit = [load.rate for load in part.loads], self.units[first] if self.units else ""
         text += f", loads that change by at most {_listed(rates, [unit and f'{unit}/s'] * len(rates))}" if rates else ""
-        text += f", measurement noise of at most {_listed(part.noise)}" if any(part.noise) else ""
+        noise = f"measurement noise of at most {_listed(part.noise)}" if any(part.noise) else "exact measurements"
+        text += f", {noise}"
         return f"{text}, for all t >= 0: {', '.join(self._peaks())}"
 
     def to_dict(self) -> Json:

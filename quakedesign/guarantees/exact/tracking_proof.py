@@ -334,6 +334,9 @@ class TrackingProof(Proof[Bounds]):
         when += ", with the slip alone measured" if sampled_loop.law.of_slip_alone else ""
         for name, bound in ((name, bound) for name, bound in sampled_loop.noise.items() if bound):
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
+        measured = {"slip_noise": "slip"} | ({} if sampled_loop.law.of_slip_alone else {"rate_noise": "slip rate"})
+        exact = [signal for name, signal in measured.items() if not sampled_loop.noise.get(name)]
+        when += f", with exact measurements of {' and '.join(exact)}" if exact else ""
         mean = LowerBound(sampled_loop.averaging)
         when += f", each measurement averaged over {mean:.6g} s around its instant" if mean else ""
         when += _off_schedule(sampled_loop.jitter, sampled_loop.jitter + sampled_loop.delay_jitter)
@@ -359,7 +362,8 @@ def sentence_of(task: FaultPlant, claims: Claims, when: str, start: str = "from 
         f"on the plant without stick, {start}, {when}, {kind}, "
         f"for every friction law and all constant parameters of the box: "
         f"the slip rate never exceeds {claims.peak_slip_rate.quantity('m/s')}, the slip stays within "
-        f"{claims.slip_error.quantity('m')} of the reference, the pressure {', at the valve '.join(pressures)}{step}"
+        f"{claims.slip_error.quantity('m')} of the reference, the pressure {', at the valve '.join(pressures)}{step}, "
+        "for all t >= 0"
     )
 
 
@@ -595,7 +599,7 @@ class ContinuousProof(Proof[Bounds]):
 
     def sentence(self) -> str:
         """Statement of the proved bounds as text."""
-        return sentence_of(self.task, self.claims, WHEN)
+        return sentence_of(self.task, self.claims, f"{WHEN}, with exact measurements")
 
 
 def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | NoProof:

@@ -239,10 +239,10 @@ def test_a_statement_about_a_plant_names_nothing_that_is_absent():
     proof = PlantProof(part=bare, law=law, pieces=1, inputs=(), claims=claims)
     assert proof.sentence() == (
         "on the uncertain plant of the certificate (1 state, 1 control), from rest, with zero-order hold over 1 s, "
-        "for all t >= 0: |row 1| <= 2, |row 2| <= 0"
+        "exact measurements, for all t >= 0: |row 1| <= 2, |row 2| <= 0"
     )
     pushed = replace(bare, disturbances=(((F(1),), F(3)),))
-    assert "disturbances of at most 3, for all t" in replace(proof, part=pushed).sentence()
+    assert "disturbances of at most 3, exact measurements, for all t" in replace(proof, part=pushed).sentence()
 
 
 PENDULUM = json.loads((FOLDER / "uncertain_plant_pendulum.json").read_text())

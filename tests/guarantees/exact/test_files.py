@@ -245,7 +245,7 @@ def test_the_statement_about_continuous_time_says_so_in_both():
     found = claim("continuous")
     said = "in continuous time (pressure without sampling or delay)"
     assert any(said in line for line in checker.check(guarantee_text(found)).statement)
-    assert f"from rest, {said}, for every disturbance" in found.sentence()
+    assert f"from rest, {said}, with exact measurements, for every disturbance" in found.sentence()
     assert not any("held" in line for line in (found.sentence(), *checker.check(guarantee_text(found)).statement))
 
 

@@ -116,7 +116,8 @@ def test_the_text_of_a_proof_gives_the_intervals():
 
 
 def test_a_sentence_names_a_diffusion_path_if_there_is_one():
-    assert "over 0.1 s, through a diffusion path of L^2/D = 0.02 s, for every" in proof(diffusion=F(1, 50)).sentence()
+    said = proof(diffusion=F(1, 50)).sentence()
+    assert "over 0.1 s, through a diffusion path of L^2/D = 0.02 s, with exact measurements" in said
     assert "diffusion" not in proof().sentence()
 
 

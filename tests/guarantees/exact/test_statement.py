@@ -127,6 +127,10 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     said = TrackingProof(task=TASK, sampled_loop=both, claims=CLAIMS).sentence()
     told = "with zero-order hold over 1 s, with any noise of at most 0.333333 m in the measured slip, "
     assert told + "with any noise of at most 0.666666 m/s in the measured slip rate, for every" in said
+    rough = TrackingProof(task=TASK, sampled_loop=replace(both, slip_noise=F(0)), claims=CLAIMS).sentence()
+    assert "m/s in the measured slip rate, with exact measurements of slip, for every" in rough
+    rough = TrackingProof(task=TASK, sampled_loop=replace(both, rate_noise=F(0)), claims=CLAIMS).sentence()
+    assert "0.333333 m in the measured slip, with exact measurements of slip rate, for every" in rough
     assert (both.noise, replace(both, slip_noise=F(0)).noise) == (
         {"slip_noise": F(1, 3), "rate_noise": F(2, 3)},
         {"rate_noise": F(2, 3)},
@@ -135,7 +139,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     assert (quiet.noise, quiet.setup) == ({}, ExactSetup())
     assert replace(quiet, lag=F(1, 2), ramp=F(1, 4)).setup == ExactSetup(lag=F(1, 2))
     said = TrackingProof(task=TASK, sampled_loop=quiet, claims=CLAIMS).sentence()
-    assert "with zero-order hold over 1 s, with the slip alone measured, for every" in said
+    assert "over 1 s, with the slip alone measured, with exact measurements of slip, for every" in said
     assert SampledLoop(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
     with pytest.raises(ParameterError, match="needs a law that measures the slip rate"):
         replace(quiet, rate_noise=F(1))
@@ -155,8 +159,10 @@ def test_a_sentence_says_when_and_has_every_claim_on_its_outer_side():
     held = SampledLoop(law=HELD.law, step=F(1, 10), delay=F(1, 50), lag=F(3, 100))
     said = TrackingProof(task=TASK, sampled_loop=held, claims=CLAIMS).sentence()
     where = "on the plant without stick, from rest, with zero-order hold over 0.1 s"
-    assert said.startswith(f"{where}, with a delay of 0.02 s, through a lag of 0.03 s, for every disturbance")
-    assert TrackingProof(task=TASK, sampled_loop=HELD, claims=CLAIMS).sentence().startswith(f"{where}, for every")
+    exact = "with exact measurements of slip and slip rate, for every disturbance"
+    assert said.startswith(f"{where}, with a delay of 0.02 s, through a lag of 0.03 s, {exact}")
+    assert TrackingProof(task=TASK, sampled_loop=HELD, claims=CLAIMS).sentence().startswith(f"{where}, {exact}")
+    assert said.endswith(", for all t >= 0")
     assert "never exceeds 286 mm/s, the slip stays within 334 mm of the reference" in said
     assert "the pressure between -3.34 Pa and 6.67 Pa, at the valve between -4.34 Pa and 5.67 Pa, commanded" in said
 
@@ -269,11 +275,11 @@ def test_a_fault_that_may_open_has_no_guarantee(off, proved, monkeypatch):
 def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     held = replace(HELD, jitter=F(1, 300), delay_jitter=F(1, 150))
     said = TrackingProof(task=TASK, sampled_loop=held, claims=CLAIMS).sentence()
-    told = "hold over 0.1 s, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s"
+    told = "slip rate, each measurement within 0.00333333 s of its instant, each pressure within 0.01 s"
     assert told in said
     assert "5.67 Pa, commanded changes of at most 1.67 Pa a sample" in said
     late = TrackingProof(task=TASK, sampled_loop=replace(HELD, delay_jitter=F(1, 150)), claims=CLAIMS).sentence()
-    assert "with zero-order hold over 0.1 s, each pressure within 0.00666666 s of its due time, for every" in late
+    assert "slip and slip rate, each pressure within 0.00666666 s of its due time, for every" in late
     assert (held.noise, HELD.noise) == ({"slip_noise": 0, "rate_noise": 0}, {})
     assert tuple(held.loop(TASK).sampled) == ("slip_noise", "rate_noise")
     alone = replace(HELD.law, feedback=(F(1), F(0)), measured=tuple((row[0], F(0)) for row in HELD.law.measured))
@@ -289,7 +295,7 @@ def test_jitter_is_said_and_makes_inputs_of_all_that_is_measured():
     assert (mean.timing_error, mean.instants) == (F(1, 50), Instants(measured=F(1, 50), arrived=F(1, 300)))
     assert tuple(mean.noise) == ("slip_noise", "rate_noise")
     said = TrackingProof(task=TASK, sampled_loop=mean, claims=CLAIMS).sentence()
-    assert "hold over 0.1 s, each measurement averaged over 0.0333333 s around its instant, each measurement" in said
+    assert "slip rate, each measurement averaged over 0.0333333 s around its instant, each measurement" in said
     for name in ("jitter", "delay_jitter", "averaging", "ramp"):
         with pytest.raises(ParameterError, match="jitter, delay jitter, averaging and ramp must be 0 or more"):
             replace(HELD, **{name: F(-1, 10**9)})

@@ -65,7 +65,7 @@ def test_it_is_compared_behind_its_path_without_what_acts_at_once(asked, monkeyp
     assert ([entry.origin for entry in found.entries], runs) == (["designed"], [design.controller])
     assert found.path == {"lag": LAG}
     assert set(found.left_out) == {"cta", "dia"}
-    assert "for a pressure without delay" in found.left_out["cta"]
+    assert "assume a pressure without delay" in found.left_out["cta"]
     found = designed_comparison(REAL, ["elqr"], lambda *_: None, options={"setup": qd.LoopSetup(lag=LAG)})
     assert [entry.origin for entry in found.entries] == ["designed"]
 
