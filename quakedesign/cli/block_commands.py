@@ -46,7 +46,7 @@ def blocks(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Check whether one block is an adequate model of a fault: guarantees of the fault cut into several blocks.
+    """Check whether one block is an adequate model of a fault, by guarantees for the fault cut into several blocks.
 
     Each block has its own friction law, any one within the uncertainty box, and its own disturbance. Springs connect
     neighbours. A law is designed for each number of blocks. Exit code 0 only if every number of blocks has a proof.

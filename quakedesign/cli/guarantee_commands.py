@@ -67,11 +67,12 @@ def guarantee(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Prove bounds on slip, slip rate and pressure of the sampled loop, for all t >= 0.
+    """Prove bounds on slip, slip rate and pressure of the sampled loop.
 
     The bounds hold along the reference for every friction law and all constant parameters of the box, for every
-    disturbance of the class, and from rest or from bounded initial errors. The controller is designed for the loop
-    setup unless gains are given. Exit code 0 only if every fault has a proof.
+    disturbance of the class, for all t >= 0, and from rest or from bounded initial errors; for rate-and-state faults
+    during the slip of the task, from steady sliding. The controller is designed for the loop setup unless gains are
+    given. Exit code 0 only if every fault has a proof.
 
     Parameters
     ----------
@@ -81,8 +82,8 @@ def guarantee(
         Of a design. peak: the smallest certified slip-rate error. tracking: a smaller slip error under a drifting
         disturbance, with a somewhat larger slip-rate error.
     gains
-        k1 to k4 of an e-LQR whose integrals are summed once per sample; by default a law with a disturbance estimate is
-        designed. For a sliding mode its base gains (λ = 1), which the command scales by λ.
+        k1 to k4 of an e-LQR with integral action, summed once per sample; without them a law is designed that estimates
+        the disturbance instead. For a sliding mode its base gains (λ = 1), which the command scales by λ.
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
@@ -230,13 +231,14 @@ def limits(
     """Give performance limits that no controller can beat on a fault, with the proved bounds of a designed controller.
 
     The limits are the smallest slip-rate error (plant without stick) and slip rate (stick-slip plant), the longest T_s,
-    delay and diffusion time, the largest distance of a well and the smallest withdrawal, for any disturbance of the
-    given amplitude.
+    delay and diffusion time, the largest distance of a well and the smallest withdrawal. Beyond a limit every
+    controller fails for some disturbance of at most the given amplitude and some friction of the box.
 
     Parameters
     ----------
     pressure
-        Largest withdrawal, such as '20 MPa'; the effective normal stress by default.
+        Largest withdrawal, such as '20 MPa'; in slow sliding the largest deviation from the planned pressure. By
+        default the effective normal stress, of several blocks the smallest.
     around
         Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; with noise
         the smallest slip-rate error of every controller is larger.

@@ -326,8 +326,8 @@ class RunOptions:
     step
         Sampling time T_s, or step of the scheme continuous; the fault's T_s by default.
     duration
-        Duration of the run; the operation time by default, with the disturbance of the fault. Without a controller and
-        without a duration the run is the natural earthquake, which has no disturbance and its own duration.
+        Duration of the run; the operation time by default. A slip-weakening fault without a controller and without a
+        duration has the natural earthquake, without disturbance and with its own duration.
     substeps
         Integrator steps per sample.
     drift
@@ -650,7 +650,7 @@ class StateOptions:
     share
         Fraction of the recurrence interval that has passed when the run starts; 0.9 by default.
     stress
-        With --controller elqr: amplitude of a sinusoidal shear stress, such as '20 kPa'.
+        With --controller elqr or --certificate: amplitude of a sinusoidal shear stress, such as '20 kPa'.
     stress_period
         Period of this stress; by default that of the tide, 12.42 hours.
     """

@@ -73,7 +73,7 @@ def simulate(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Simulate a closed loop over the whole task, or the natural earthquake without a controller.
+    """Simulate a closed loop over the whole task, or a fault without a controller.
 
     Give quantities with a unit, such as '20 MPa', or as numbers in SI units.
 

@@ -212,7 +212,7 @@ class LoopSetup:
     rate_limit: Fraction | None = quantity(
         "Pa/s",
         "Rate limit of the pressure at the valve, such as '10 MPa/s'. A proof includes the time that a change "
-        "takes, and shows that it ends before the next sample.",
+        "takes, and shows that every change ends before the next sample.",
         None,
     )
 
