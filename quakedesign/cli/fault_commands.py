@@ -185,8 +185,9 @@ def init(
 
 
 _SOURCE = (
-    "Preset or .toml file that supplies everything but the friction of the file to write. Its T_s and disturbance are "
-    "not used if only the identified friction has a state."
+    "Preset or .toml file that supplies everything but the friction of the file to write. If the identified friction "
+    "has a state and its own has none, its disturbance and T_s are not used; a T_s that it does not state follows from "
+    "the identified friction."
 )
 
 

@@ -237,14 +237,16 @@ def limits(
     Parameters
     ----------
     pressure
-        Largest withdrawal, such as '20 MPa'; in slow sliding the largest deviation from the planned pressure. By
-        default the effective normal stress, of several blocks the smallest.
+        Largest withdrawal that the limits assume, such as '20 MPa'; in slow sliding the largest deviation from the
+        planned pressure. By default the effective normal stress, of several blocks the smallest. --withdrawal and the
+        other options of the pump are for the proved designs alone.
     around
         Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; with noise
         the smallest slip-rate error of every controller is larger.
     stress
         Rate-and-state faults (limits of the plant linearised about slow sliding): bound of the shear stress
-        disturbance, such as '25 kPa'; by default about the largest with a guarantee.
+        disturbance, such as '25 kPa'; by default about the largest with a guarantee, for several blocks none: then only
+        their unstable modes are listed.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c in the proofs, such as 0.1; the limits are those of
         the nominal values.

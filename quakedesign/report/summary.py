@@ -241,7 +241,7 @@ LEGEND = (
     "worst: worst case found; pressure (p < 0: withdrawal): proved, else simulated",
     "tracked: slip error <= 2 % of target, rate <= reference + 1 % of uncontrolled",
 )
-_LAWS = "2-CTA, 2-DIA: sliding modes; e-LQR: linear feedback with disturbance estimate"
+_LAWS = "2-CTA, 2-DIA: sliding modes; e-LQR: feedback with disturbance estimate"
 
 
 def summary_lines(first: Summary) -> list[str]:

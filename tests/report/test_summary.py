@@ -320,7 +320,7 @@ def test_the_summary_of_a_fault_fits_a_screen():
 
 def test_the_legend_says_what_the_controllers_are_where_there_are_several():
     said = made()
-    laws = "2-CTA, 2-DIA: sliding modes; e-LQR: linear feedback with disturbance estimate"
+    laws = "2-CTA, 2-DIA: sliding modes; e-LQR: feedback with disturbance estimate"
     assert laws not in summary_lines(said)
     several = replace(said, rows=(*said.rows, replace(said.rows[1], name="2-CTA")))
     assert laws in summary_lines(several)
