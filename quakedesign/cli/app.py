@@ -130,10 +130,10 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
     """
     if path is None:
         return
-    if os.path.exists(path) and not force:
-        raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
     if os.path.isdir(path):
         raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
+    if os.path.exists(path) and not force:
+        raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
     require_writable(path)
 
 

@@ -1,8 +1,8 @@
 """Option types of the command line, and options that several commands share.
 
 Chapters: numbers with units, exact numbers and gains; options of laws, runs and output; actuator and
-sensors; runs of faults with friction state. Quantities of the loop setup, and stages of actuators and sensors, declare
-unit and help text themselves (`quakedesign.loop`).
+sensors; runs of faults with friction state. Quantities of the loop setup, and stages of actuators, declare unit and
+help text themselves (`quakedesign.loop`).
 """
 
 import math
@@ -77,7 +77,7 @@ def whole(_type: object, tokens: Sequence[Token]) -> int:
 
 
 def _exact_reader(unit: str) -> Callable[[object, Sequence[Token]], str]:
-    """Converter to an exact number as typed, also p/q, or to that of a text with a unit."""
+    """Converter to an exact number: a number or p/q as typed, or the SI value of a text with a unit."""
 
     def read(_type: object, tokens: Sequence[Token]) -> str:
         text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
@@ -607,8 +607,8 @@ def loop_elements(
 ) -> "tuple[int, Actuator, Sensor]":
     """Substeps, actuator and sensor of a run with a sampling period [s].
 
-    If none are given, they are the stages for which a sampled law is designed, with the substeps that these need, and
-    the noise of its certificate.
+    Stages that are not given are those for which a sampled law is designed, with the substeps that these need. Without
+    given noise, it is that of the certificate.
     """
     from quakedesign.simulation.run_settings import designed_path
 

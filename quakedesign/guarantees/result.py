@@ -64,7 +64,7 @@ class Guarantee:
         """Proved bounds by name; empty without a guarantee.
 
         Every fault has ``slip_error`` [m], ``peak_slip_rate`` [m/s], ``least_pressure`` and ``largest_pressure`` [Pa]
-        in the fault; on the plant without stick also ``slip_rate_error`` [m/s]. An uncertain plant has its outputs and
+        in the fault; except in slow sliding also ``slip_rate_error`` [m/s]. An uncertain plant has its outputs and
         controls, in its own units.
         """
         named: Mapping[str, Bound] = self.proof.bounds

@@ -40,8 +40,8 @@ from quakedesign.plant.sliding_plant import SlidingPlant
 from quakedesign.text import quantity
 
 Tell = Callable[[str, float], None]
-"""Of what is being done, and the fraction done [-]."""
-_TRIFLE = Fraction(1)  # stress [Pa] to try if the estimate is 0: a search may find another law
+"""Called with the name of the current step and the fraction done [-]."""
+_TRIFLE = Fraction(1)  # stress [Pa] of the task if none is given, and tried where the estimate of the largest is 0
 _SEARCHED = 0.8  # fraction of the work at which the proof of a designed law begins
 _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # shares of an estimate that may be too large
 
@@ -203,7 +203,7 @@ def _remedy(
     prove: Prove,
     spread: Fraction,
 ) -> str:
-    """Remedy: another T_s, V or diffusion path that has a proof; empty if none is needed."""
+    """Remedy: a proved V or diffusion path, else an admissible T_s (not proved); empty if none is known."""
     if well.share < 1:
         return possible_remedy(fault, task, well, setup, prove, spread=spread)
     suits = admissible_step(task, step)

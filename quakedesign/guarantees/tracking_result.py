@@ -52,9 +52,9 @@ class TrackingGuarantee(Guarantee):
     unproved_step : Fraction or None
         T_s [s] that has no guarantee where `shorter` has one.
     nearest : (str, TrackingProof) or None
-        For a loop without a guarantee: a quantity of its setup, and the proof of a design that differs from the request
-        in this quantity only, by as little as was found. `GAINS` is a design in place of given gains, `FACTOR` the law
-        with its pressure times `factor`.
+        For a loop without a guarantee: a quantity of its setup or of the fault, and the proof of the loop with the
+        smallest change of this quantity alone for which a proof was found. `GAINS` is a design in place of given gains,
+        `FACTOR` the law with its pressure times `factor`.
     factor : Fraction or None
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode in the scheme ``compensated``.
@@ -196,7 +196,7 @@ class TrackingGuarantee(Guarantee):
         ]
 
     def task_lines(self) -> list[str]:
-        """Lines that do not depend on the law: performance limits, and a note on the class of the disturbance."""
+        """Performance limits for the measured signals, and a note on the disturbance class; none without a proof."""
         return self.limit_lines() + self._narrower_class()
 
     def _narrower_class(self) -> list[str]:

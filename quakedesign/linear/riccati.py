@@ -276,7 +276,7 @@ _STATES = ("x1", "x2", "xi1", "xi2")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RiccatiDesign:
-    """u = −Kx with K, S, E in python-control's order, and the weights of the design.
+    """u = −Kx with K, S and E as `control.lqr` names them, and the weights of the design.
 
     Attributes
     ----------

@@ -92,7 +92,7 @@ class CommonQuadratic:
 
 
 def robust_stability(loop: Loop, *, fastest: bool = False) -> Certificate | None:
-    """Certificate of exponential stability for all measurable parameters of a loop, or None.
+    """Certificate of exponential stability for all measurable time histories of the parameters of a loop, or None.
 
     Parameters
     ----------
@@ -197,14 +197,14 @@ class SlopeMargin:
     # A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact)
     limit: UpperBound
     limit_beta: Fraction
-    circle: float  # What the circle criterion allows for time-varying s at `limit_beta`, measured
+    circle: float  # What the circle criterion allows for time-varying s at `limit_beta`, in floats
     slope: Fraction  # s_max [1/s²], see `nominal_slope`
     # The same with the largest effective stress on the way to the target slip (ERRATA 8) [1/s²]
     working_slope: Fraction
     certificate: Certificate | None
 
     def to_dict(self) -> Json:
-        """Exact numbers as strings, measured ones as numbers."""
+        """Exact numbers as strings, floating-point results as numbers."""
         return {
             "friction_slope_margin": self.certified.exact,
             "linear_limit": self.limit.exact,
@@ -217,7 +217,7 @@ class SlopeMargin:
 
 
 def friction_slope_margin(fault: Fault, controller: Controller) -> SlopeMargin | None:
-    """Certify the friction-slope margin to within a thousandth of its supremum for this family of V.
+    """Certify the friction-slope margin to within half a per cent of its linear limit, for this family of V.
 
     Parameters
     ----------
@@ -280,14 +280,14 @@ def _largest(prove: Callable[[Fraction], Certificate | None], limit: Fraction) -
 
 
 def _decimal(value: Fraction) -> Fraction:
-    """Value rounded down to six significant decimals."""
+    """Value with six digits, at most 4e-6 of it higher: what is then proved is the result itself."""
     digits = f"{float(value) * (1 - 1e-6):.5e}"
     return Fraction(digits)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GainRange:
-    """Range of β = μN̂/b over which one V proves stability with all other parameters anywhere in the box."""
+    """Range of β = μN̂/b beyond the box, with one V for each end and all other parameters anywhere in the box."""
 
     # low, high: Printed values stay inside the proved range. `low` is proved together with the largest β of the box,
     # `high` with the smallest. `high` is at most 1024 times the largest β of the box: larger values are not tried.
@@ -303,7 +303,7 @@ class GainRange:
 
 
 def gain_range(fault: Fault, controller: Controller) -> GainRange | None:
-    """Certify how far β may leave the box at either end, by bisection; None when the box itself is not proved."""
+    """Certify how far β may leave the box: below by bisection, above by factors of 4; None if the box is not proved."""
     needed = sectors(fault)
 
     def prove(low: Fraction, high: Fraction) -> Certificate | None:
@@ -353,7 +353,7 @@ class DecayRate:
     """Exponential decay for all measurable time histories of the parameters in the box."""
 
     certified: LowerBound  # a with |x(t)| ≤ C·e^{−at} [1/s]
-    limit: float  # Slowest pole of a constant vertex [1/s], measured: an upper limit of a
+    limit: float  # Slowest pole of a constant vertex [1/s], in floats: an upper limit of a
     certificate: Certificate
 
 
@@ -379,7 +379,7 @@ class Analysis:
     unstable_at: Vertex | None
     slope: SlopeMargin | None
     span: GainRange | None
-    frequency: tuple[FrequencyFacts, ...]  # Measured, one for every vertex
+    frequency: tuple[FrequencyFacts, ...]  # In floats, one for every vertex
 
     @property
     def verdict(self) -> Verdict:
@@ -398,7 +398,7 @@ class Analysis:
         return {name: certificate for name, certificate in by_name.items() if certificate is not None}
 
     def to_dict(self) -> Json:
-        """Exact numbers as strings, measured ones as numbers, SI."""
+        """Exact numbers as strings, floating-point results as numbers, SI."""
         return {
             "verdict": str(self.verdict),
             "unstable_at": [float(v) for v in self.unstable_at] if self.unstable_at else None,

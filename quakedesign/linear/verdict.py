@@ -34,7 +34,7 @@ _LARGEST = 16
 
 
 def sampled_files(problem: LinearProblem, gains: Sequence[Fraction], verdict: VaryingVerdict) -> list[Answer]:
-    """Every form, in SI, whose definiteness proves a sampled loop; none for another verdict."""
+    """Every form, in SI, whose definiteness proves stability of the sampled loop; none without a proof."""
     return definite_files(verdict.proof.forms(problem, gains)) if verdict.proof is not None else []
 
 
@@ -102,7 +102,7 @@ class LinearVerdict:
     peaks_class: str | None = None  # Class of the disturbance of requested peaks
 
     def to_dict(self) -> Json:
-        """Plain values: exact numbers as strings, measured ones as numbers, SI."""
+        """Plain values: exact numbers as strings, floating-point results as numbers, SI."""
         return {
             **self.analysis.to_dict(),
             **self.facts,

@@ -55,7 +55,7 @@ class Design:
     controller : Controller or None
         None only when no gains with a proof were found.
     certificate : Certificate or None
-        Proof in continuous time for the base gains (λ = 1), or the counterexample; None for a sampled linear law.
+        Proof in continuous time for the base gains (λ = 1); None without a proof, and for a sampled linear law.
         The verdict on a sampled law is that on its `guarantee`.
     premises : tuple of Premise
         Premises of the guarantee of a sampled law (those named in `REACH`), and of the certificate.
@@ -248,12 +248,12 @@ def design(
         ``"cta"``, ``"dia"`` or ``"elqr"``; or a user-defined law, also as ``"module:Class"``, with its own design
         method or derived from one of these.
     setup : LoopSetup
-        T_s in place of the fault's; delay, lag, diffusion path, measured signals and bounds of measurement errors of
-        an e-LQR. Rate-and-state friction: by default a diffusion path of 0.1 D_c/V.
+        T_s in place of the fault's; delay, lag, diffusion path and measured signals of an e-LQR; bounds of measurement
+        errors. Rate-and-state friction: by default a diffusion path of 0.1 D_c/V.
     feedforward : str
         Feed-forward of a sliding mode from a plant model: ``"none"``, ``"nominal"`` or ``"centred"``, see
         `quakedesign.laws.feed_forward`. It enlarges the certified domain in continuous time and has no sampled
-        guarantee, so it needs `continuous`; the e-LQR has none.
+        guarantee, so it needs `continuous`; the e-LQR takes no feed-forward.
     objective : str
         ``"tracking"`` for small errors under slow disturbances, ``"peak"`` for the smallest guaranteed slip-rate error.
     continuous : bool
@@ -270,9 +270,9 @@ def design(
         Of the guarantee: ``"amplitude"``, any disturbance bounded by the fault's amplitude, or ``"rate"``, whose rate
         is bounded too and which starts at 0, such as a tide.
     progress : callable, optional
-        Called with the present task of the search for slow sliding, and the completed fraction [-].
+        Called with the current task of a search (rate-and-state friction, stick–slip plant) and the completed fraction.
     accept_poor_fit : bool
-        Whether to continue for a fault whose friction its record does not support (`Fault.poor_fit`); its name then
+        Whether to continue for a fault whose friction is not supported by its record (`Fault.poor_fit`); its name then
         ends with ``poor-fit``.
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
@@ -280,18 +280,18 @@ def design(
     Returns
     -------
     Design
-        With verdict ``UNDECIDED`` and ``reason`` in its details when no proof was found.
+        Without a proof: verdict ``UNDECIDED``, or ``REFUTED`` for an unstable vertex, and ``reason`` in its details.
 
     Raises
     ------
     UnknownNameError
-        For a controller that cannot be designed, or an unknown feed-forward.
+        For an unknown controller or feed-forward.
     ParameterError
         For a feed-forward with a law that takes none or is sampled; an unknown objective, or ``"peak"`` in continuous
         time; quantities of the setup that a design does not take; stress or spread for friction without a state; a
         delay or a lag for friction with a state.
     UnsupportedError
-        For a law that does not apply to friction with a state.
+        For a law that does not apply to friction with a state or has no design method, or a sliding mode with a path.
     """
     require_fault(fault)
     fault = with_accepted_fit(fault, accept_poor_fit)
@@ -341,7 +341,7 @@ def _tracking(
 def _sliding(
     fault: Fault, law: type[Controller], setup: LoopSetup, requested: SlowSlidingDesign, path: bool
 ) -> tuple[LoopSetup, SlowSlidingDesign | None]:
-    """The setup without its diffusion path, which the request contains, and the request; rejects other laws."""
+    """Setup without the diffusion path, and the request, which contains it; rejects a law that does not apply."""
     if path and not setup.diffusion:
         raise ParameterError("a diffusion must be above 0 s. Received 0 s. Omit diffusion for a well near the fault.")
     if setup.delay or setup.lag:
@@ -370,7 +370,7 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **ent
     fault : Fault
     controller : Controller
     setup : LoopSetup
-        Loop setup of a sampled linear law.
+        Loop setup of a sampled linear law; not used for a sliding mode.
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 

@@ -150,7 +150,7 @@ def guarantee(
     progress : callable, optional
         Called with the current task of a search (rate-and-state friction, stick–slip plant) and the completed fraction.
     accept_poor_fit : bool
-        Whether to continue for a fault whose friction its record does not support (`Fault.poor_fit`); its name then
+        Whether to continue for a fault whose friction is not supported by its record (`Fault.poor_fit`); its name then
         ends with ``poor-fit``.
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
@@ -304,7 +304,7 @@ def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Want
 
 
 def _names(wrong: Mapping[str, object]) -> str:
-    """Names of what was given and does not apply, with the values that are not None, zero or a truth value."""
+    """Names of the given options that do not apply (not None, 0 or False), each with its value unless that is True."""
     given = {name: value for name, value in wrong.items() if value is not None and value != 0}
     return ", ".join(name if value is True else f"{name} {_shown(value)}" for name, value in given.items())
 

@@ -171,10 +171,10 @@ class Wanted:
     setup: LoopSetup = IDEAL
 
     def require_all_measured(self) -> None:
-        """Reject measurements of the slip alone for a law that needs the slip rate."""
+        """Reject other measured signals than slip and slip rate, for a law that needs both."""
         if self.setup.measured != MEASURED[0]:
             raise ParameterError(
-                "measured is for a designed e-LQR, all other laws need slip and slip rate. "
+                "measured is for the e-LQR (slip only if it is designed), all other laws need slip and slip rate. "
                 f"Received {self.setup.measured!r}. Omit measured, or omit gains and controller."
             )
 
@@ -339,7 +339,7 @@ class Samples(DesignMethod[SampledController]):
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingProof | NoProof:
-        """Guarantee at the law's T_s; the path of the law applies unless the loop setup has one."""
+        """Guarantee at the law's T_s, with each of its delay, lag and diffusion that the loop setup does not give."""
         law, step = controller.law, controller.step
         if setup.step is not None and setup.step != step:
             own, requested = apart(step, setup.step)
@@ -408,6 +408,6 @@ _FACTORS = tuple(map(Fraction, ("1/2", "2", "1/4", "4", "-1", "1/16", "16")))  #
 _DELAYS = Fraction(3, 4), Fraction(1, 2), Fraction(1, 4)
 """Shares of a delay for which a given law is tried where it has no guarantee."""
 _STANDING = (
-    "the law leaves an error under a constant pressure at rest, as it has no integral action: give it an integral of "
+    "the law cannot supply a constant pressure at zero error, as it has no integral action: give it an integral of "
     "the slip error or an estimate of the disturbance"
 )

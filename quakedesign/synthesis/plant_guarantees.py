@@ -51,14 +51,14 @@ def guarantee_plant(
         seen = np.abs(np.array(around.C, dtype=float) @ mode).max() > _UNSEEN
         return NoProof(
             reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
-            f"steepest the states ({shape}) grow by {radius:.4g} a sample",
+            f"steepest the states ({shape}) grow by a factor of {radius:.4g} a sample",
         )
     proof = plant_guarantee(around, exact)
     return replace(proof, notes=notes) if proof.available else proof
 
 
 def _shown(plant: UncertainPlant) -> int:
-    """Slip errors of blocks, or all states."""
+    """Number of leading states that are shown: the slip errors of blocks, or all states."""
     return len(plant.outputs or ()) // 2 if any("block" in name for name in plant.sectors) else len(plant.A)
 
 
@@ -87,7 +87,7 @@ def _law_of(
     step = rational(law.step if linear is not None else getattr(law, "dt", None) or 0, "dt")
     if step <= 0 or getattr(law, "dt", 0) is True or (setup.step or step) != step:
         raise ParameterError(
-            "dt of a law must be positive, and the step of the loop setup where that is given"
+            "dt of a law must be positive, and equal to the step of the loop setup where that is given"
             f"{f', here {shortly(setup.step)} s' if setup.step else ''}. Received dt = {getattr(law, 'dt', step)!r}. "
             "Use control.ss(A, B, C, D, dt)."
         )

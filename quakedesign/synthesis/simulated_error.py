@@ -107,7 +107,7 @@ def sampling(
     step : float, optional
         Sampling time T_s [s]; the fault's unless given.
     duration : float, optional
-        [s]; 4000 T_s unless given.
+        [s]; by default 4000 T_s, at most the operation time.
 
     Raises
     ------
@@ -118,7 +118,9 @@ def sampling(
     divisor = least_authority(fault)
     law_of_ones = chosen.for_authority((1,) * len(chosen.gain_units), divisor)
     if law_of_ones.scale is None:
-        raise ParameterError(f"sampled errors are searched for sliding modes. Received {law!r}.")
+        raise ParameterError(
+            f"the search for the least simulated error needs a sliding mode. Received {law!r}. Give cta or dia."
+        )
     require_known(metric, [name for name in Metrics.__dataclass_fields__ if name not in _NO_AIM], "metric")
     simulation_scheme(scheme)
     for name, value in (("step", step), ("duration", duration)):
@@ -157,7 +159,7 @@ def synthesise_sampled(
     degrees : iterable of int, optional
         Of V, as for `synthesise`; the search itself uses the last.
     rounds : int
-        Largest number of simulations.
+        Largest number of points of the search, besides the published gains.
 
     Returns
     -------

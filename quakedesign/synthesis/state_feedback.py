@@ -136,7 +136,7 @@ def _four(gains: tuple[str, ...]) -> tuple[Fraction, ...]:
 
 
 def may_stick(law: type[Controller], setup: LoopSetup, disturbance_class: str) -> bool:
-    """Whether the stick–slip theorem covers a law, setup and disturbance class."""
+    """Whether the stick–slip plant is tried by default for a law, setup and disturbance class."""
     covered = law is ExtendedLQR or method_of(law).takes_base_gains
     return covered and not setup.given().keys() - TAKEN and disturbance_class == CLASSES[0]
 

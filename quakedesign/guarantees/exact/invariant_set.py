@@ -241,7 +241,7 @@ class _SampleMap:
         return [upper(self._largest(arb_mat([row]), ends, bases)) for row, bases in rows]
 
     def _largest(self, row: arb_mat, ends: list[Fraction], bases: tuple[Basis, ...]) -> arb:
-        """Bound of |c·x(θ)| for all θ ≥ the piece end of the first basis."""
+        """Bound of |c·x(θ)| from the end of a piece that belongs to the first basis to the last end."""
         places = self.flow.along(row, ends, len(ends) - len(bases), self._largest_state, self.bounds)
         pieces = [
             (self._height(now, basis) + area[0, 0], more[0, 0])
@@ -269,7 +269,7 @@ class _SampleMap:
             return _rows(self.facets, basis).inv()
         except ZeroDivisionError:
             raise ParameterError(
-                f"facets that bound an output must be linearly independent. Received the dependent facets {basis}."
+                f"the facets of a basis must be linearly independent. Received the dependent facets {basis}."
             ) from None
 
 

@@ -19,10 +19,10 @@ class Proof(ABC, Generic[B]):
     """Claims about one loop with their check; abstract base, with one subclass for each theorem.
 
     **Principle.** A theorem bounds the claimed quantities for all t, and the claims follow if each bound is at most its
-    claim. Some theorems assume the claims up to time t: that of slow sliding to bound all inputs, on every cell of its
-    box of constants, and that of tracking to bound an implicit step or a slowly varying input gain. Then each bound
-    must be below its claim, or at most equal to it where the input depends on earlier samples alone. As the quantities
-    are continuous and initially within the claims, they stay within them.
+    claim. Two theorems assume the claims up to time t: that of slow sliding bounds all inputs by them, on every cell of
+    its box of constants, that of tracking an implicit step or a slowly varying input gain. Then each bound must be
+    below its claim, or at most equal to it where the input depends on earlier samples alone. As the quantities are
+    continuous and initially within the claims, they stay within them.
 
     Attributes
     ----------

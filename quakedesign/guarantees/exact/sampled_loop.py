@@ -43,12 +43,13 @@ class ExactSetup:
     initial_slip, initial_slip_rate : Fraction
         Bounds of the absolute initial slip [m] and slip rate [m/s]; those of the reference are 0.
     jitter, delay_jitter : Fraction
-        Largest common timing error of a measurement and its pressure [s], and largest further one of the pressure [s].
+        Largest timing error that a measurement and its pressure share [s], and largest additional one of the pressure
+        alone [s].
     averaging : Fraction
         Averaging time [s]: each measurement except the first is a mean over times that differ from its nominal instant
         by at most half the averaging time.
     pump : Pump, optional
-        Limits at the valve, which the loop must never reach.
+        Limits at the valve, which the loop must never exceed.
     ramp : Fraction
         Longest duration of a pressure change of the pump [s].
     longest_step : Fraction
@@ -164,8 +165,8 @@ class SampledLoop(ExactSetup):
             or (self.pump and self.pump.rate)
         ):
             raise ParameterError(
-                "aperiodic sampling needs a linear law, zero initial errors, and no delay, lag, diffusion path, "
-                "jitter, averaging, pump rate limit or implicit step. Received longest_step "
+                "aperiodic sampling needs a linear law whose states start at 0, zero initial errors, and no delay, "
+                "lag, diffusion path, jitter, averaging, pump rate limit or implicit step. Received longest_step "
                 f"{shortly(self.longest_step)} s for a loop that violates this. Omit longest_step, or change the loop."
             )
 
@@ -291,7 +292,7 @@ class GainSpread:
     present : Fraction
         Largest deviation at the present time.
     past : Fraction
-        Largest deviation at a time σ ago, divided by e^{ασ}.
+        Largest further deviation at a time σ ago, divided by e^{ασ}.
     """
 
     present: Fraction

@@ -111,14 +111,14 @@ from quakedesign.plant.fault_plant import FaultPlant
 # is continuous and initially below E, so it never reaches E. ∎
 #
 # **Diffusion path.** In this paragraph R is b times the truncation error of the modes [m/s²], |R| ≤ sup|y| with the
-# output y = ``left_out``, and bY is its integral as in `loop.diffusion_layer`. Of β(v + R) the loop contains β0·v and,
-# with the state e2 − β0·bY in place of e2, the known jumps due to β0·R. So (β − β0)R enters like ``acceleration``; its
-# c for y is that of ``acceleration`` for v. If the well pressure is continuous, this term is part of ``acceleration``.
-# If it has steps, R decays after every step and is a separate input. With a slowly varying gain, past values of R are
-# treated as those of v, with the same c. There are two more inputs, with F = 0 and c = 1 for y: ``awaited``, β0·bY in
-# the derivatives of e1 and of that state, and ``awaited_told``, its effect on the measurement at the samples. It acts
-# like noise, because e2 is measured, not that state. The bound of e2 is that of the state plus that of β0·bY, the
-# direct feedthrough of ``awaited``. ∎
+# output y = ``left_out``, and bY is its integral as in `loop.diffusion_layer`. The plant has β(v + R). The loop
+# contains β0·v and, with the state e2 − β0·bY in place of e2, also β0·R, as known jumps. So (β − β0)R enters like
+# ``acceleration``; its c for y is that of ``acceleration`` for v. If the well pressure is continuous, this term is part
+# of ``acceleration``. If it has steps, R decays after every step and is a separate input. With a slowly varying gain,
+# past values of R are treated as those of v, with the same c. There are two more inputs, with F = 0 and c = 1 for y:
+# ``awaited``, β0·bY in the derivatives of e1 and of that state, and ``awaited_told``, its effect on the measurement at
+# the samples. It acts like noise, because e2 is measured, not that state. The bound of e2 is that of the state plus
+# that of β0·bY, the direct feedthrough of ``awaited``. ∎
 
 _ZERO = Fraction(0)
 OUTPUTS = ("slip_error", "slip_rate_error", "push")
@@ -156,7 +156,7 @@ class Bounds:
     stepped : Fraction, optional
         b times the change of the commanded pressure between samples [m/s²]; None where it is not needed.
     small_gain : Fraction
-        Upper bound of the spectral radius of M [-], below 1.
+        Upper bound of the spectral radius of M [-], below 1; for aperiodic sampling the largest Σ c·Y/W, at most 1.
     """
 
     available: ClassVar[Literal[True]] = True

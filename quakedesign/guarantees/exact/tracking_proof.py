@@ -186,7 +186,10 @@ _NOISE_WORDS = {
 _RESTS = Fraction(1, 100)  # a fault counts as at rest below this share of the largest reference rate
 _TURNS, _LEAPS = 32, 16  # fixed-point iterations of claims: with small steps first, then with large ones
 _LEAP = Fraction(6, 5)
-_RAMPS, _RAMP_ROOM = 6, Fraction(21, 20)  # most ramp times tried; ratio of the next to the time required
+_RAMPS, _RAMP_ROOM = (
+    6,
+    Fraction(21, 20),
+)  # most ramp times tried after the first; ratio of the next to the time required
 _FIRST = Fraction(1, 64)  # first ramp time divided by T_s
 
 
@@ -608,7 +611,7 @@ def continuous_peaks(task: FaultPlant, law: ContinuousLaw) -> ContinuousProof | 
     Raises
     ------
     ParameterError
-        For a law with a steady-state error at rest under a constant pressure.
+        For a law that cannot supply a constant pressure at zero error.
     """
     bounds = _continuous_bounds(task, law)
     if not bounds.available:

@@ -601,12 +601,12 @@ def test_a_mode_that_escapes_wells_at_a_distance_is_named_by_the_slips_of_its_bl
     none = qd.guarantee(far).proof
     # alike blocks, pole p of x'' + wx' = sx: e^(pT)
     assert none.reason.startswith(
-        "a mode escapes: with every uncertain term at its steepest the states (1, 1) grow by "
+        "a mode escapes: with every uncertain term at its steepest the states (1, 1) grow by a factor of "
     )
     task = uncertain_plant(far.faults[0])
     s, w = float(task.slip_chord[1]), float(task.rate_chord[0])
     grown = np.exp((np.sqrt(w**2 + 4 * s) - w) / 2 * 0.184)
-    assert none.reason.endswith(f"grow by {grown:.4g} a sample")
+    assert none.reason.endswith(f"grow by a factor of {grown:.4g} a sample")
 
 
 @pytest.mark.slow

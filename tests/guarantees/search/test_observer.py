@@ -125,8 +125,8 @@ def test_more_noise_is_guaranteed_less():
     ("wrong", "said"),
     [
         ({"measured": "rate"}, "measured must be one of slip-and-rate, slip"),
-        ({"measured": "slip", "gains": ("1", "1", "1", "1")}, "measured is for a designed e-LQR"),
-        ({"measured": "slip", "controller": "cta"}, "measured is for a designed e-LQR"),
+        ({"measured": "slip", "gains": ("1", "1", "1", "1")}, "measured is for the e-LQR"),
+        ({"measured": "slip", "controller": "cta"}, "measured is for the e-LQR"),
         ({"slip_noise": F(-1)}, "slip noise must be 0 or more. Received -1 m"),
         ({"measured": "slip", "rate_noise": F(1)}, "needs a law that measures the slip rate"),
     ],
