@@ -72,7 +72,7 @@ def test_gains_from_the_literature_are_returned_where_nothing_is_better(fault, m
 
 
 def test_bad_input_gets_one_clear_message(fault):
-    with pytest.raises(ParameterError, match="sliding modes"):
+    with pytest.raises(ParameterError, match="needs a sliding mode"):
         sampling(fault, "elqr")
     with pytest.raises(ParameterError, match="metric must be one of"):
         sampling(fault, metric="speed")
