@@ -12,7 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from quakedesign.errors import ParameterError
-from quakedesign.exact import apart, float_above, float_below, fraction_of_float, nearest, rational, shortly, six_digits
+from quakedesign.exact import (
+    apart,
+    exact_text,
+    float_above,
+    float_below,
+    fraction_of_float,
+    nearest,
+    rational,
+    shortly,
+    six_digits,
+)
 
 
 @pytest.mark.parametrize(
@@ -180,3 +190,7 @@ def test_large_numbers_are_written_as_floats_are():
 def test_the_remedy_for_a_percentage_is_the_number(text, example):
     with pytest.raises(ParameterError, match=re.escape(f"Write for example {example}")):
         rational(text)
+
+
+def test_values_that_are_no_rationals_are_written_as_they_are():
+    assert (exact_text("x"), exact_text(0.5), exact_text(F(1, 2)), exact_text(F(2))) == ("x", "0.5", "1/2", "2")
