@@ -232,7 +232,8 @@ def limits(
 
     The limits are the smallest slip-rate error (plant without stick) and slip rate (stick-slip plant), the longest T_s,
     delay and diffusion time, the largest distance of a well and the smallest withdrawal. Beyond a limit every
-    controller fails for some disturbance of at most the given amplitude and some friction of the box.
+    controller fails for some disturbance of at most the given amplitude and, for slip weakening, some friction law of
+    the box.
 
     Parameters
     ----------

@@ -741,7 +741,8 @@ class SpreadOptions:
         In slow sliding under a designed e-LQR: relative deviation of a, b and D_c, such as 0.1; normal stress,
         stiffness and damping vary within the box.
     stress
-        Amplitude of a sinusoidal shear stress, such as '25 kPa'; by default the certified bound of the design.
+        Largest amplitude of a sinusoidal shear stress, such as '25 kPa'; amplitude and phase vary from sample to
+        sample. By default the certified bound of the design.
     stress_period
         Period of this stress; by default that of the tide, 12.42 hours.
     """

@@ -237,8 +237,8 @@ def sampling(
     """Show effects of sampling on a law and on the published laws: errors by scheme, orders of accuracy, sensitivities.
 
     Runs are on the plant without stick. Errors are evaluated after the first quarter of a run; for the orders of
-    accuracy, in the second half of shorter runs. Runs with noise last a sixteenth of the others. Writes results.json
-    and figures.
+    accuracy, in the second half of shorter runs. Runs with noise last a sixteenth of the duration. Writes
+    results.json and figures.
 
     Parameters
     ----------

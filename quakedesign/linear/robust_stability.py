@@ -217,7 +217,7 @@ class SlopeMargin:
 
 
 def friction_slope_margin(fault: Fault, controller: Controller) -> SlopeMargin | None:
-    """Certify the friction-slope margin to within half a per cent of its linear limit, for this family of V.
+    """Certify a friction-slope margin, at most 0.5 % of the linear limit below the supremum for this family of V.
 
     Parameters
     ----------

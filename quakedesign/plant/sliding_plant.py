@@ -1,6 +1,6 @@
 """Plant of a rate-and-state fault in slow sliding, in rationals, and cells of its parameter box.
 
-Quantities are per unit of area. Whatever the cuts, the cells into which they divide the box of constants cover it.
+Quantities are per unit of area. For any cuts, the cells into which they divide the box of constants cover it.
 """
 
 from collections.abc import Mapping
@@ -172,7 +172,7 @@ def _in_words(value: Fraction | str | bool) -> str:
 
 
 # ----------------------------------------------------------------------
-# Repeated cuts of a box of constants: whatever the cuts, the cells cover it.
+# Repeated cuts of a box of constants: for any cuts, the cells cover it.
 
 MOST_CELLS = 64
 Cuts = tuple[tuple[str, Fraction] | None, ...]

@@ -187,6 +187,7 @@ def test_json_is_strict_and_ends_with_its_line(capsys):
         ("there", True, None),
         ("there", False, "figure must be new. Received .*there, which exists. Give --force"),
         ("folder", True, "figure must be a file. Received .*folder, which is a folder"),
+        ("folder", False, "figure must be a file. Received .*folder, which is a folder"),
         ("none/new", True, "must be in a folder that can be written"),
     ],
 )

@@ -334,10 +334,11 @@ class TrackingProof(Proof[Bounds]):
             if sampled_loop.diffusion
             else ""
         )
-        when += ", with the slip alone measured" if sampled_loop.law.of_slip_alone else ""
+        alone = sampled_loop.law.of_slip_alone
+        when += ", with the slip alone measured" if alone and sampled_loop.noise.get("slip_noise") else ""
         for name, bound in ((name, bound) for name, bound in sampled_loop.noise.items() if bound):
             when += f", {_NOISE_WORDS[name].format(LowerBound(bound))}"
-        measured = {"slip_noise": "slip"} | ({} if sampled_loop.law.of_slip_alone else {"rate_noise": "slip rate"})
+        measured = {"slip_noise": "the slip alone"} if alone else {"slip_noise": "slip", "rate_noise": "slip rate"}
         exact = [signal for name, signal in measured.items() if not sampled_loop.noise.get(name)]
         when += f", with exact measurements of {' and '.join(exact)}" if exact else ""
         mean = LowerBound(sampled_loop.averaging)

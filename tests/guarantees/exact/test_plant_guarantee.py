@@ -384,7 +384,7 @@ STARTED = replace(STARTED, law=replace(STARTED.law, first=((Fraction(1), Fractio
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], noise={"y1": -1}), "noise and start must be 0 or more"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], disturbances={"d": ([1], -1)}), "must be 0 or more"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], loads={"l": ([1], [1], 1)}), "a shift that is not measured"),
-        (lambda: qd.UncertainPlant.from_statespace(control.ss(1, 1, 1, 1)), "with D = 0"),
+        (lambda: qd.UncertainPlant.from_statespace(control.ss(1, 1, 1, 1)), "with D = 0. Received D not 0"),
         (lambda: qd.UncertainPlant.from_statespace(None), "Received NoneType"),
         (lambda: qd.UncertainPlant.from_statespace(control.ss(1, 1, 1, 0, 0.1)), "Received dt = 0.1"),
         (lambda: qd.UncertainPlant.from_blocks(REAL, 1), "blocks must be 2 to 20"),

@@ -139,7 +139,7 @@ def test_noise_is_said_and_must_be_of_what_is_measured():
     assert (quiet.noise, quiet.setup) == ({}, ExactSetup())
     assert replace(quiet, lag=F(1, 2), ramp=F(1, 4)).setup == ExactSetup(lag=F(1, 2))
     said = TrackingProof(task=TASK, sampled_loop=quiet, claims=CLAIMS).sentence()
-    assert "over 1 s, with the slip alone measured, with exact measurements of slip, for every" in said
+    assert "over 1 s, with exact measurements of the slip alone, for every" in said
     assert SampledLoop(law=alone, step=F(1), slip_noise=F(1)).noise == {"slip_noise": 1}
     with pytest.raises(ParameterError, match="needs a law that measures the slip rate"):
         replace(quiet, rate_noise=F(1))

@@ -39,7 +39,7 @@ PLANT = Ranges(
 
 
 @pytest.fixture
-def undecided(monkeypatch):
+def facets_inside(monkeypatch):
     """Every facet counts as inside, so that the other conditions remain; the ranges of the plant are `PLANT`."""
     monkeypatch.setattr(module, "facet_rows", lambda *_: iter(()))
     monkeypatch.setattr(module, "ranges", lambda *_: PLANT)
@@ -227,7 +227,7 @@ def test_a_period_is_short_against_damping_and_slope(plant, inside):
         (("-90", "60"), True),
     ],
 )
-def test_the_first_measurement_leaves_the_loop_in_its_set(row, inside, undecided):
+def test_the_first_measurement_leaves_the_loop_in_its_set(row, inside, facets_inside):
     """Noise of the slip is 1/90 m, that of U 1/60 Pa."""
     known = claim()
     assert (known.sampled_loop.slip_noise, known.sampled_loop.pressure_noise) == (F(1, 90), F(1, 60))
@@ -244,7 +244,7 @@ def test_the_first_measurement_leaves_the_loop_in_its_set(row, inside, undecided
 
 
 @pytest.mark.parametrize("noisy", [False, True, "aperiodic"])
-def test_claims_are_the_ends_of_the_box_with_what_the_reference_moves(noisy, undecided):
+def test_claims_are_the_ends_of_the_box_with_what_the_reference_moves(noisy, facets_inside):
     """e1 exceeds the slip error by the noise; within a period the reference moves max r' times T_s."""
     known = claim(noisy)
     found, loop = bounds(known), known.sampled_loop
@@ -258,14 +258,14 @@ def test_claims_are_the_ends_of_the_box_with_what_the_reference_moves(noisy, und
 
 
 @pytest.mark.parametrize("longest", [F(0), F(3, 4)])
-def test_weakening_is_slow_against_the_longest_interval(longest, undecided):
+def test_weakening_is_slow_against_the_longest_interval(longest, facets_inside):
     T = longest or F(1, 2)
     loop = {"step": F(1, 2), "longest_step": longest}
     for slope in (1 / T**2, 1 / T**2 - TINY):
-        undecided.setattr(module, "ranges", lambda *_, slope=slope: replace(PLANT, slope=(F(-1), slope)))
-        undecided.setattr(module, "_bracket", lambda *_: F(0))
-        undecided.setattr(module, "verifiers", lambda *_: [])
-        undecided.setattr(module, "feedback_range", lambda *_: (F(-1), F(1)))
+        facets_inside.setattr(module, "ranges", lambda *_, slope=slope: replace(PLANT, slope=(F(-1), slope)))
+        facets_inside.setattr(module, "_bracket", lambda *_: F(0))
+        facets_inside.setattr(module, "verifiers", lambda *_: [])
+        facets_inside.setattr(module, "feedback_range", lambda *_: (F(-1), F(1)))
         if slope * T**2 < 1:
             assert bounds(**loop)
         else:
@@ -273,18 +273,18 @@ def test_weakening_is_slow_against_the_longest_interval(longest, undecided):
                 bounds(**loop)
 
 
-def test_the_disturbance_may_equal_the_loss_to_the_range_of_beta(undecided):
+def test_the_disturbance_may_equal_the_loss_to_the_range_of_beta(facets_inside):
     amplitude = claim().task.amplitude
-    undecided.setattr(module, "_bracket", lambda *_: amplitude)
+    facets_inside.setattr(module, "_bracket", lambda *_: amplitude)
     assert bounds()
-    undecided.setattr(module, "_bracket", lambda *_: amplitude + TINY)
+    facets_inside.setattr(module, "_bracket", lambda *_: amplitude + TINY)
     with pytest.raises(ParameterError, match="too small for this range of the input gain"):
         bounds()
 
 
 @pytest.mark.parametrize("holds", [True, False])
 @pytest.mark.parametrize("ahead", ["1/2", "1/5"])
-def test_an_implicit_step_is_deadbeat_for_the_larger_slip_error(holds, ahead, undecided):
+def test_an_implicit_step_is_deadbeat_for_the_larger_slip_error(holds, ahead, facets_inside):
     known, seen = claim(False), []
     step = known.sampled_loop.step
     deadbeat = replace(known.sampled_loop.law, target_gain=F(2), rate_gain=F(2), return_rate=1 / step)
@@ -296,9 +296,9 @@ def test_an_implicit_step_is_deadbeat_for_the_larger_slip_error(holds, ahead, un
         seen.append((root.pull, time, slip, rate))
         return holds
 
-    undecided.setattr(module, "sector_is_valid", judged)
-    undecided.setattr(module, "verifiers", lambda *_: [])
-    undecided.setattr(module, "feedback_range", lambda *_: (F(-1), F(1)))
+    facets_inside.setattr(module, "sector_is_valid", judged)
+    facets_inside.setattr(module, "verifiers", lambda *_: [])
+    facets_inside.setattr(module, "feedback_range", lambda *_: (F(-1), F(1)))
     other = replace(known.invariant_set, facets=tuple(facets))
     loop = replace(known.sampled_loop, law=law)
     moved = known.task.reference_rates[0] * step
