@@ -26,10 +26,10 @@ from scipy import sparse
 
 from quakedesign.checking import check_files
 from quakedesign.lyapunov import Loop
-from quakedesign.lyapunov.maps.gain_map import Screener, Sheet, axis
+from quakedesign.lyapunov.maps.gain_map import MapDefinition, Screener, axis
 from quakedesign.lyapunov.maps.sweep import ACCURACY, Sweep
 from quakedesign.lyapunov.search.certify import closed_loop, largest_lipschitz
-from quakedesign.lyapunov.search.lyapunov_search import balance, family_of, finished
+from quakedesign.lyapunov.search.lyapunov_search import balance, certificate_from_proposal, family_of
 from quakedesign.sos.solve.joint import JointProgram, Proposal
 from quakedesign.sos.solve.moment import settings
 
@@ -83,7 +83,7 @@ def naive_largest(gains: tuple[str, ...]) -> tuple[Fraction, int]:
         else:
             high = middle
     assert best is not None
-    assert finished(at(loop, low), *best, balance(loop), "cta") is not None
+    assert certificate_from_proposal(at(loop, low), *best, balance(loop), "cta") is not None
     return low, solves
 
 
@@ -112,7 +112,7 @@ def mapping(across: int = 16) -> None:
     """Throughput of screening one core, and of exact proofs."""
     loop = closed_loop("cta", MAPPED, lipschitz=LEVEL)
     axes = [axis(loop.gains[n] / 4, loop.gains[n] * 4, across) for n in OVER]
-    sheet = Sheet(subject="cta", loop=loop, over=OVER, axes=(axes[0], axes[1]), levels=(LEVEL,), degree=DEGREE)
+    sheet = MapDefinition(subject="cta", loop=loop, over=OVER, axes=(axes[0], axes[1]), levels=(LEVEL,), degree=DEGREE)
     own, (screener, found) = cpu(lambda: screened(sheet))
     places = [place for row in sheet.rows for place in row]
     sample = places[:: max(1, len(places) // 64)]
@@ -127,7 +127,7 @@ def mapping(across: int = 16) -> None:
     print(f"  exact proofs: {proving / len(inside):.2f} s each, {sum(proofs)} of {len(inside)} done")
 
 
-def screened(sheet: Sheet) -> tuple[Screener, dict]:
+def screened(sheet: MapDefinition) -> tuple[Screener, dict]:
     """All points of a sheet."""
     screener = Screener(sheet)
     return screener, {place: reached for row in sheet.rows for place, _, reached in screener.row(row)[0]}

@@ -160,7 +160,7 @@ def prove_squares(value: Any, statement: Statement) -> list[str]:
     for cofactor, equality in zip(cofactors, statement.equalities, strict=True):
         add_product(total, cofactor, equality)
     check_identity(statement.multiplier, statement.polynomial, total, "sos identity")
-    more = ["the set is empty, so that this holds trivially"] if is_empty(statement) else []
+    more = ["the set is empty, so the statement holds trivially"] if is_empty(statement) else []
     return ["conclusion: the polynomial is >= 0 on the set (the degree of the identity is not verified)", *more]
 
 

@@ -677,12 +677,12 @@ class StateOptions:
 
     def of_free(self) -> dict[str, Any]:
         """Given options of a run without control."""
-        from quakedesign.simulation import pressure_course
+        from quakedesign.simulation import pressure_history
 
         if self.stress is not None or self.stress_period is not None:
             raise ParameterError("--stress needs a controller. Received none. Give --controller elqr.")
         values = specified({"start": self.start, "hold": self.hold, "share": self.share})
-        return values | ({} if self.pressure is None else {"pressure": pressure_course(self.pressure)})
+        return values | ({} if self.pressure is None else {"pressure": pressure_history(self.pressure)})
 
 
 NO_STATE = StateOptions()

@@ -22,7 +22,7 @@ from quakedesign.linear.linear_problem import FeedbackLoop, Polytope, Vertex, mo
 from quakedesign.lyapunov import Certificate, Loop, Verdict, Witness, certificate_text, loop_of, parse_certificate
 from quakedesign.lyapunov.exact.obligations import Obligation, claimed, different
 from quakedesign.lyapunov.exact.perturbation_bounds import Sectors, plant_ranges, sectors
-from quakedesign.lyapunov.search.lyapunov_search import below, finish, quadratic_margin, quadratic_terms
+from quakedesign.lyapunov.search.lyapunov_search import below, certificate_of, quadratic_margin, quadratic_terms
 from quakedesign.sos.exact.polynomial import constant
 from quakedesign.sos.exact.proofs import Square
 from quakedesign.sos.solve.conic import solve
@@ -125,7 +125,7 @@ def finished(loop: Loop, proposal: QuadraticProposal) -> Certificate | None:
     positive = quadratic_margin(loop, lyapunov) / 2
     for share in _SHARES:
         claims = {"positive": positive, "rate": below(share * proposal.rate)}
-        certificate = finish(loop, lyapunov, claims) if min(claims.values()) > 0 else None
+        certificate = certificate_of(loop, lyapunov, claims) if min(claims.values()) > 0 else None
         if certificate is not None:
             return certificate
     return None

@@ -1,4 +1,4 @@
-"""Claims about closed loops, their certificate files, and their exact check."""
+"""Stability claims about closed loops: search, exact check, certificate files, and synthesis of gains."""
 
 from quakedesign.arguments import attach
 

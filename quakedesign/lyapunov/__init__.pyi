@@ -1,5 +1,5 @@
 from .exact.certificate import Certificate as Certificate
-from .exact.certificate import decided_once as decided_once
+from .exact.certificate import cached_verdict as cached_verdict
 from .exact.certificate import load_certificate as load_certificate
 from .exact.certificate import parse_certificate as parse_certificate
 from .exact.certificate_files import certificate_text as certificate_text

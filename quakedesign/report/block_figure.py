@@ -17,7 +17,15 @@ _STAGES = 6
 
 
 def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> "Figure":
-    """Matplotlib figure of a run; the sentence `proved` is written below it."""
+    """Matplotlib figure of a run with a note below it.
+
+    Parameters
+    ----------
+    chain : BlockChain
+    run : BlockRun or SlidersRun
+    proved : str
+        Sentence of the guarantee, used as the note.
+    """
     from matplotlib import colormaps
 
     drawing, axes = figure(2, 5.2, 2)

@@ -65,13 +65,13 @@ def compare(
     progress: Callable[[str, float], None] | None = None,
     **entered: Quantity | None,
 ) -> Comparison:
-    """Run all controllers of a fault with step T_s over the whole task, or 500 D_c/V for rate-and-state friction.
+    """Run all controllers of a fault with sampling period T_s: the whole task, or 500 D_c/V for friction with a state.
 
     Parameters
     ----------
     fault : Fault
     designs : sequence of Design, Controller or SampledLaw
-        Designed controllers; a design without a controller is reported and not run. Given laws are assessed first.
+        Designs, and given laws, which are assessed first; a design without a controller is reported but not run.
     setup : LoopSetup
         Loop setup of the given laws; a design has its own.
     with_published : bool
@@ -125,12 +125,15 @@ def designed_comparison(
     plant: str | None = None,
     **schemes: Any,
 ) -> Comparison:
-    """Comparison of a fault's designs of the named laws and the published gains.
+    """Design the named laws for a fault, and compare them with the published gains.
 
     Parameters
     ----------
+    fault : Fault
+    names : iterable of str
+        Names of control laws.
     tell : callable
-        Called with the progress.
+        Called with the current activity and the fraction done [-].
     options : mapping, optional
         Options of `quakedesign.design`, such as ``objective`` and ``continuous``.
     whole_task, plant : bool, str

@@ -71,7 +71,7 @@ def bar_look(entry: "Entry") -> dict[str, Any]:
 def figure(
     rows: int, height: float, columns: int = 1, *, sharex: Any = None, mosaic: Any = None, **more: Any
 ) -> "tuple[Figure, Any]":
-    """Figure at printing size and its axes, shape (rows, columns), or by name in a mosaic.
+    """Figure in print size, `height` [in], and its axes: an array (rows, columns), or a dictionary for a mosaic.
 
     x is shared in a single column by default.
     """
@@ -94,7 +94,7 @@ def figure(
 
 
 def finish(drawing: "Figure", title: str, runs: Sequence["Shown"], note: str = "", *, legend: Any = None) -> "Figure":
-    """Add to a figure its title above, and below it the legend of one axis (three columns) and the run settings."""
+    """Add the title above a figure, and the note, the run settings and the legend of one axis below it."""
     drawing.suptitle(title, fontsize=SMALL + 2)
     whole = "; ".join(part for part in (note, run_settings(runs)) if part).replace(" s,", "\N{NO-BREAK SPACE}s,")
     rows = wrap(whole, _NOTE, break_on_hyphens=False)
@@ -118,7 +118,7 @@ def named(axis: "Axes", title: str) -> None:
 
 
 def run_settings(runs: Iterable["Shown"]) -> str:
-    """Scheme, step, method and plant of runs: differing settings after the labels of the entries, then common ones."""
+    """Scheme, step, method and plant of runs: first the settings that differ, by entry, then the common ones."""
     ways: dict[tuple[str, ...], list[str]] = {}
     for shown in runs:
         label, run = (shown[0].label, shown[1]) if isinstance(shown, tuple) else ("", shown)
@@ -134,7 +134,7 @@ def run_settings(runs: Iterable["Shown"]) -> str:
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Size and name of the unit with the prefix for a largest value; ``(1e6, "MPa")`` for 5e6 Pa."""
+    """Factor and prefixed unit that suit a largest value, such as ``(1e6, "MPa")`` for 5e6 Pa."""
     size, prefix = next(((s, p) for s, p in _PREFIXES if largest >= s), (1.0, ""))
     return size, prefix + unit
 
@@ -163,7 +163,7 @@ def runs_of(entries: Iterable["Entry"]) -> "list[tuple[Entry, Trajectory]]":
 
 
 def with_diverged(entries: "Iterable[Entry]", note: str = "") -> str:
-    """Note that also names the diverged runs, whose last values would compress all others."""
+    """Note that also names the diverged runs, which are not drawn, as they would determine the scale."""
     diverged = [(e.label, e.run.events["diverged"]) for e in entries if e.run and "diverged" in e.run.events]
     lines = [f"{label} diverges at {time:.3g} s and is not drawn" for label, time in diverged]
     return "; ".join([*([note] if note else []), *lines])
@@ -205,7 +205,8 @@ def figure_bytes(drawing: "Figure", kind: str, name: str) -> bytes:
     stream = io.BytesIO()
     style: Any = _STYLE | {"svg.hashsalt": name}
     with mpl.rc_context(style):
-        if (engine := drawing.get_layout_engine()) is not None:  # `savefig` would repeat it in every format
+        # computed once; `savefig` would repeat the layout in every format
+        if (engine := drawing.get_layout_engine()) is not None:
             engine.execute(drawing)
             drawing.set_layout_engine(None)
         drawing.savefig(stream, format=kind, metadata=_UNDATED[kind])
@@ -323,7 +324,7 @@ def cached_figures(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str]
 
 
 def _stated(alt: Mapping[str, str], shown: Any) -> bytes | None:
-    """Cache key of drawings: contents, settings and fonts; None if they cannot be stated."""
+    """Cache key of drawings from contents, settings and fonts; None if one of these cannot be serialised."""
     import matplotlib as mpl
     from matplotlib.font_manager import fontManager
 
@@ -331,12 +332,13 @@ def _stated(alt: Mapping[str, str], shown: Any) -> bytes | None:
         fonts = [(font.fname, (file := os.stat(font.fname)).st_size, file.st_mtime_ns) for font in fontManager.ttflist]
     except OSError:
         return None
-    settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}  # its access loads a backend
+    # reading rcParams["backend"] would load a backend
+    settings = {name: mpl.rcParams[name] for name in mpl.rcParams if name != "backend"}
     return cache.stated((dict(alt), shown, settings, fonts), _Untimed)
 
 
 class _Untimed(cache.CachedStatement):
-    """A value by its fields, without durations and backends of its computation."""
+    """Serialised value without the durations and backends of its computation."""
 
     def __init__(self, content: io.BytesIO) -> None:
         super().__init__(content)

@@ -59,7 +59,7 @@ def grid(comparison: "Compared") -> tuple[list[str], list[str], dict[tuple[str, 
 def states(comparison: "Compared") -> "Figure":
     """Slip of all laws in the first row, below it the band of the slip rate of each law.
 
-    The rate is on a scale that is linear below the largest reference rate and logarithmic beyond it.
+    The scale of the rate is linear up to the power of ten at or above the largest reference rate, then logarithmic.
     """
     laws, origins, by_law = grid(comparison)
     rows = 1 + len(laws)
@@ -77,7 +77,7 @@ def states(comparison: "Compared") -> "Figure":
                 continue
             _rate(axes[row, column], entry, comparison, divisor)
         _time_below(axes[:, column], drawing, unit)
-    note = "slip rate: band between the extremes of 40 stored samples, logarithmic beyond the largest reference rate"
+    note = "slip rate: band between the extremes of every 40 stored samples; scale logarithmic beyond the linear part"
     rates = [axis for axis in drawing.axes if axis not in axes[0]]
     return finish(
         drawing,
@@ -172,7 +172,7 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
     if close_ups:
         bottom, top = drawing.axes[0].get_ylim()
         drawing.axes[0].set_ylim(bottom, top + _ROOM * (top - bottom))
-    note = "bands between the extremes of 10 stored samples" + (
+    note = "bands between the extremes of every 10 stored samples" + (
         "; insets: Δp about its mean, every step" if close_ups else ""
     )
     return finish(drawing, f"{comparison.fault.name}: fluid pressure", runs, with_diverged(comparison.entries, note))
@@ -197,11 +197,11 @@ def _inset(axis: "Axes", run: "Trajectory", shade: str) -> None:
 # Figures of faults whose friction has a state: their cycle, and controlled slow sliding.
 
 _BANDS = 600  # about the largest number of bands of a run: more are invisible, and make a file of many megabytes
-_PER_BAND = 16  # smallest number of instants of a band: those of four sampling periods
+_PER_BAND = 16  # smallest number of instants of a band: four sampling periods
 
 
 def state_figures(comparison: "Compared") -> "dict[str, Figure]":
-    """``cycle``, if it is known, and ``slow-sliding`` and ``sliding-errors`` of the first law with a run."""
+    """``cycle``, if computed, and ``slow-sliding`` and ``sliding-errors`` of the first law with a run."""
     drawn = {} if comparison.uncontrolled.failed else {"cycle": cycle(comparison)}
     for one in runs_of(comparison.entries)[:1]:
         drawn |= {"slow-sliding": slow_sliding(*one), "sliding-errors": errors(*one)}
@@ -240,7 +240,7 @@ def slow_sliding(entry: "Entry", run: "Trajectory") -> "Figure":
     rate.plot(time, speed / first, color="black", linestyle=":", linewidth=1, label="reference")
     if entry.proof is not None:
         never = float(entry.proof.peak_slip_rate) / first
-        rate.axhline(never, color=PROVED, linestyle=(0, (10, 3)), label="never exceeded, proved")
+        rate.axhline(never, color=PROVED, linestyle=(0, (10, 3)), label="proved upper bound")
     rate.set_ylabel("slip rate / V [-]")
     largest, pascal = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
     _filled(pressure, time, run.pressure / largest, shade)
@@ -355,9 +355,9 @@ def overview(comparison: "Compared") -> "Figure":
 
 
 def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
-    """Proved bound of the slip rate, worst case found and limit of every controller, as far as known.
+    """Proved slip-rate bound, worst case found, and performance limit, as far as available.
 
-    Without stick the last two are those of the slip-rate error.
+    On the plant without stick the last two are slip-rate errors.
     """
     if entry.proof is None or entry.guarantee is None:
         return
@@ -369,7 +369,7 @@ def _levels(entry: "Entry") -> "Iterator[tuple[float, str, Any, str]]":
         yield worst, f"worst case{of} found: {quantity(worst, 'm/s')}", "dotted", INDUCED
     least = entry.guarantee.least_slip_rate
     if least is not None:
-        yield float(least), f"limit{of} of every controller: {least.quantity('m/s')}", "dashdot", "#777777"
+        yield float(least), f"performance limit{of}: {least.quantity('m/s')}", "dashdot", "#777777"
 
 
 def _largest(time: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
@@ -381,7 +381,7 @@ def _largest(time: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.
 
 
 def uncontrolled(comparison: "Compared") -> "Figure":
-    """Slip and slip rate of the natural earthquake, and the rest slip from statics."""
+    """Slip and slip rate of the natural earthquake, and the slip of the next static equilibrium."""
     run, fault = comparison.uncontrolled, comparison.fault
     drawing, ((slip,), (rate,)) = figure(2, 3.2)
     size, unit = length(float(run.slip.max()))
@@ -389,7 +389,7 @@ def uncontrolled(comparison: "Compared") -> "Figure":
     divisor, name = clock(last)
     slip.set_xlim(-0.03 * last / divisor, last / divisor)
     slip.plot(run.time / divisor, run.slip / size, color=NATURAL)
-    slip.axhline(fault.rest_slip / size, color="grey", linestyle=":", label="next rest slip (statics)")
+    slip.axhline(fault.rest_slip / size, color="grey", linestyle=":", label="slip of the next static equilibrium")
     slip.set_ylabel(f"slip [{unit}]")
     slip.legend(loc="lower right", fontsize=SMALL)
     rate.plot(run.time / divisor, run.slip_rate, color=NATURAL)
@@ -400,7 +400,7 @@ def uncontrolled(comparison: "Compared") -> "Figure":
 
 
 def end(*runs: "Trajectory") -> float:
-    """Time [s] up to which earthquakes are shown: slightly after the last one has completed its slip."""
+    """End [s] of the time axis of earthquakes: at most 1.4 times the time at which 99.5 % of the slip is reached."""
     settled = [run.time[int(np.argmax(np.abs(run.slip) >= 0.995 * np.abs(run.slip).max()))] for run in runs]
     return float(min(1.4 * max(settled), min(run.time[-1] for run in runs))) or float(runs[0].time[-1])
 
@@ -420,7 +420,9 @@ def error_figure(comparison: "Compared") -> "Figure":
         axis.set_ylabel(label)
     rate.set_xlabel(f"time [{unit}]")
     title = f"{comparison.fault.name}: tracking errors"
-    return finish(drawing, title, runs, with_diverged(comparison.entries, "largest of 40 stored samples"), legend=slip)
+    return finish(
+        drawing, title, runs, with_diverged(comparison.entries, "largest value of every 40 stored samples"), legend=slip
+    )
 
 
 def _proved_bounds(slip: "Axes", rate: "Axes", entries: "Sequence[Entry]") -> None:
@@ -470,7 +472,7 @@ def metrics(comparison: "Compared") -> "Figure":
         else:
             axis.set_xlim(right=max(values, default=1) * 1.3 or 1)
     axes[0, 0].invert_yaxis()
-    title = f"{comparison.fault.name}: comparison after a quarter of the task"
+    title = f"{comparison.fault.name}: metrics after the first quarter of the run"
     return finish(drawing, title, settled, with_diverged(comparison.entries))
 
 
@@ -514,7 +516,7 @@ def stability_map(
     right.set_xlabel(f"injected pressure p [{unit}] (σ' = {normal / size:.4g} {unit}; p < 0 is withdrawal)")
     left.set_ylabel(f"stiffness per area k/A [{stiff}/m]")
     if regions.nucleation_length is not None:
-        left.plot(normal / size, regions.critical / high, "kx", label="critical here")
+        left.plot(normal / size, regions.critical / high, "kx", label="critical stiffness at this σ'")
     box = {"boxstyle": "round", "facecolor": "white", "alpha": 0.85, "edgecolor": "#999999"}
     left.text(0.03, 0.97, _critical(regions, fault), transform=left.transAxes, va="top", fontsize=8, bbox=box)
     once = {
@@ -532,7 +534,7 @@ def stability_map(
 
 
 def _region(axis: "Axes", plane: Plane, size: float, stiffness: np.ndarray, high: float) -> None:
-    """Colour both regions of a panel; draw the critical stiffness and the values at which damping alone decides."""
+    """Colour both regions of a panel; draw the critical stiffness and the damping limits."""
     across, critical = plane.across / size, np.where(plane.critical > 0, plane.critical, np.nan) / high
     levels = [-0.5, 0.5, 1.5]
     axis.contourf(across, stiffness, plane.stable.astype(float), levels=levels, colors=list(_COLOURS.values()))

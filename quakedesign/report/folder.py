@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Reject early a folder that cannot be written, or that exists; with `force` it may exist if it has results."""
+    """Raise OutputError early if a folder is not writable or exists; with `force`, a folder of results may exist."""
     if os.path.exists(out) and not force:
         raise OutputError(
             f"output folder must be new. Received {out}, which exists. Give another --out, or --force to replace it."
@@ -37,7 +37,7 @@ def prepare(out: Path, *, force: bool) -> None:
 
 
 def results(comparison: Comparison, *, stored: bool = True) -> Json:
-    """JSON-able facts of a comparison, with the keys of ``--json`` and the versions of all libraries.
+    """JSON-serialisable facts of a comparison, with the keys of ``--json`` and the versions of all libraries.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def results(comparison: Comparison, *, stored: bool = True) -> Json:
 
 
 def study_results(study: "PaperStudy", formats: Sequence[str] = DEFAULT) -> Json:
-    """Results of the comparison, and of a study: ``induced``, ``figures``, ``numbers`` and ``printed``."""
+    """Results of a study: those of its comparison, and ``induced``, ``figures``, ``numbers`` and ``printed``."""
     induced = study.induced
     induced_values = induced and {
         "outcome": induced.outcome.to_dict(),
@@ -101,13 +101,13 @@ def write_folder(
     force : bool
         Replace a folder of earlier results.
     study : PaperStudy, optional
-        Study of the same comparison: its figures instead of the comparison's, and ``numbers.csv``.
+        Study of the same comparison; its figures replace those of the comparison, and ``numbers.csv`` is written.
     formats : sequence of str
         Formats of the figure files, see `quakedesign.report.drawing.FORMATS`.
     command : str
-        Command that makes the report, stated in it.
+        Command that the report states for its reproduction.
     tell : callable
-        Called with the progress.
+        Called with the current activity and the fraction done [-].
 
     Returns
     -------

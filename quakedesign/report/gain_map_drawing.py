@@ -132,7 +132,7 @@ def _number(value: Any) -> str:
 
 
 def gain_map_rows(drawn: GainMap) -> list[dict[str, str]]:
-    """One row a point: both gains, the limit, the level screened, the level proved, its role and its certificate."""
+    """One row per point: gains, necessary limit of L̄, levels screened and proved, role, certificate file."""
     rows = []
     first, second = drawn.sheet.axes
     names = drawn.sheet.over
@@ -163,7 +163,7 @@ def _file(place: Place) -> str:
 
 
 def gain_map_units(drawn: GainMap) -> dict[str, str]:
-    """Units of the gains; empty for a bare loop, which has none."""
+    """Units of the gains; empty for a `LoopField`, whose gains have no declared units."""
     subject = drawn.sheet.subject
     if isinstance(subject, LoopField):
         return {}

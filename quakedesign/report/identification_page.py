@@ -42,7 +42,7 @@ def identification_lines(result: Identification | Steps, *, verbose: bool = Fals
         table += [f"and {left} more: --verbose"] * (left > 0)
         common = identification_lines(result.common)
         head = common.index(_HEAD) - 1
-        text = f"All together: {result.common.assessment.checks[0].sentence}."
+        text = f"All steps jointly: {result.common.assessment.checks[0].sentence}."
         return [*common[:head], "", *table, "", *_wrapped([text]), *common[head:], *(each if verbose else [])]
     assessment, summary = result.assessment, f"{result.record.name}: {result.law.name}"
     unclear, refused = (assessment.verdict == each for each in (CANNOT_TELL, EXPLAINS_NOT))
@@ -52,15 +52,23 @@ def identification_lines(result: Identification | Steps, *, verbose: bool = Fals
         does, (value, ends, _) = "weakens" if result.difference.value < 0 else "strengthens", _cells(result.difference)
         summary += f" Friction {does} with rate: a - b = {value} ({ends})."
     but = [f"But {each}." for each in assessment.cautions]
-    more = [f"open too: {each}" for each in assessment.open[1:4] if unclear]
-    more += [f"would decide: {each}" for each in assessment.experiments if unclear]
-    more += [*(f"- {each}" for each in result.undetermined()), f"try: {'; '.join(result.to_try())}"] if refused else []
+    more = [f"also undecided: {each}" for each in assessment.open[1:4] if unclear]
+    more += [f"this experiment would decide: {each}" for each in assessment.experiments if unclear]
+    more += (
+        [*(f"- {each}" for each in result.undetermined()), f"suggested: {'; '.join(result.to_try())}"]
+        if refused
+        else []
+    )
     failed = [check.sentence for check in assessment.checks if not check.passed]
     more += [f"not passed: {each}" for each in failed if each not in (*assessment.open, *assessment.cautions)]
     shown = [each for each in result.estimates.values() if verbose or not each.name.startswith(DELAY)]
     shown += [result.difference] if result.difference else []
     notes = [each for each in result.record.remarks if verbose or " is read as " not in each]
-    more += [*_warnings(result), *([f"read: {'; '.join(notes)}"] if notes else []), *(_more(result) if verbose else [])]
+    more += [
+        *_warnings(result),
+        *([f"read from the file as: {'; '.join(notes)}"] if notes else []),
+        *(_more(result) if verbose else []),
+    ]
     return [*_wrapped([summary, *but, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
 
 
@@ -92,7 +100,11 @@ def _more(result: Identification) -> list[str]:
         f"noise per sample {fit.noise:.3g}; {samples}; {fit.agreeing} of {fit.starts} searches (seed "
         f"{result.seed}) ended in this fit{', the others in worse ones' if fit.agreeing < fit.starts else ''}",
         *([str(result.rival)] if result.rival else []),
-        *([] if rate is None else [f"reference_coefficient is that of steady sliding at {quantity(rate, 'm/s', 4)}"]),
+        *(
+            []
+            if rate is None
+            else [f"reference_coefficient is the friction coefficient in steady sliding at {quantity(rate, 'm/s', 4)}"]
+        ),
         f"assumed: {'; '.join(result.notes)}",
     ]
 
@@ -133,7 +145,10 @@ def _warnings(identification: Identification) -> list[str]:
     if (correlated := identification.fit.correlated) is not None and correlated.share:
         size = identification.fit.noise * correlated.share**0.5
         length = f"{correlated.length:.2g} {'s' if correlated.of_time else 'm'}"
-        notes.append(f"noise correlated over {length}: {size:.2g} of friction; the confidence regions include it")
+        notes.append(
+            f"correlated noise of {size:.2g} in the friction coefficient, correlation length {length}; "
+            "the confidence regions include it"
+        )
     outliers = identification.outliers
     if outliers:
         largest = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in outliers[:_MOST_OUTLIERS])
@@ -227,7 +242,7 @@ def identification_figure(identification: Identification) -> "Figure":
         axis = axes[f"profile {each.name}"]
         _profile(axis, each, fit)
         axis.tick_params(labelleft=i == 0)
-        axis.set_ylabel("" if i else "distance [deviations]", fontsize=SMALL)
+        axis.set_ylabel("" if i else "distance [standard deviations]", fontsize=SMALL)
     note = f"residual: dashed at twice the noise of {fit.noise:.3g}, crosses at the edge beyond eight times; profiles: "
     note += "dashed at the 95 % threshold of one parameter, dotted at that of all jointly"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
@@ -257,10 +272,10 @@ def _friction(axis: "Axes", identification: Identification, way: ndarray, part: 
 
 
 def _correlation(axis: "Axes", fit: Fit) -> None:
-    """Autocorrelation of residuals, and of residuals minus their prediction from the neighbours."""
+    """Autocorrelation of the residuals, and of the whitened residuals."""
     for left, colour, label in (
         ((fit.residuals * np.sqrt(fit.counts))[fit.used], _MEASURED, "residuals"),
-        (fit.whitened, _FITTED, "made independent"),
+        (fit.whitened, _FITTED, "whitened residuals"),
     ):
         off = left - left.mean()
         each = np.correlate(off, off, "full")[len(off) - 1 :][: _LAGS + 1]
@@ -273,7 +288,7 @@ def _correlation(axis: "Axes", fit: Fit) -> None:
 
 
 def _profile(axis: "Axes", estimate: ParameterEstimate, fit: Fit) -> None:
-    """Square root of the excess at the tried values, with the thresholds for one parameter and for all."""
+    """Profile likelihood: root of the excess cost at fixed values, with thresholds for one parameter and for all."""
     alone, jointly = (math.sqrt(fit.threshold(count)) for count in (1, len(fit.fitted)))
     small = not estimate.unit and abs(estimate.value) < _SMALL_EFFECT
     power = power_of(estimate.value) if estimate.unit in _PREFIXED else -3 * small
@@ -295,7 +310,7 @@ def _pair(fit: Fit) -> list[str]:
 
 
 def _region(axis: "Axes", identification: Identification, label: str = "", colour: str = _FITTED) -> None:
-    """95 % region of two parameters, from the slopes of the fit."""
+    """95 % confidence region of two parameters, from the Jacobian of the fit."""
     fit, pair = identification.fit, _pair(identification.fit)
     places = [[c.name for c in fit.experiment.coordinates].index(name) for name in pair]
     size = np.maximum(np.linalg.norm(fit.slopes, axis=0), 1e-300)

@@ -23,7 +23,7 @@ _FORBIDDEN, _HIDDEN, _PROVED = "#F3C6B2", "#F9E4DA", "#0072B2"
 
 
 def limits_lines(limits: Limits) -> list[str]:
-    """The result as lines of at most 80 characters."""
+    """Performance limits and proved bounds as lines of at most 80 characters."""
     task = limits.fault
     head = [
         f"{task.name}: performance limits, and proved bounds of designs",
@@ -73,7 +73,7 @@ def _meaning(limits: Limits) -> list[str]:
     if limits.largest_step.impossible_beyond is None:
         return [
             *lines,
-            "other rows: no limit is known, as friction's weakening alone does not make this fault unstable",
+            "other rows: no limit is known, as the weakening of friction does not make this fault unstable",
         ]
     return [
         *lines,
@@ -131,7 +131,7 @@ def _path(proof: SlidingProof) -> str:
 
 
 def _undecided(limits: Limits) -> list[str]:
-    """Statement that neither proof nor limit decides the fault's own T_s, if this is so."""
+    """Sentence for a T_s of the fault that is neither proved nor infeasible; empty otherwise."""
     step, own = limits.largest_step, rational(limits.fault.sampling_time)
     proved = step.proved_up_to is not None and own <= step.proved_up_to
     if proved or step.impossible_beyond is None or own > step.impossible_beyond:

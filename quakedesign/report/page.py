@@ -98,12 +98,12 @@ ASKED = {
     "delay": "the time from the measurement to the pressure is not longer than certified",
     "control_coefficient": "the input gain β stays in the certified range",
     "friction_slope": "friction changes with slip no faster than certified",
-    "along_reference": "reference and disturbance alone change h no faster than the law withstands",
-    "level_set": "a start at rest lies in the certified region, at every phase of the disturbance",
-    "on_trajectory": "in the run that is shown, h changes no faster than the law withstands",
+    "along_reference": "the rate |h'| due to reference and disturbance alone is within the certified bound",
+    "level_set": "the initial condition at rest lies in the certified set, for every phase of the disturbance",
+    "on_trajectory": "in the run shown, |h'| stays within the certified bound",
     "constant_reference": "the reference is constant",
     "vanishing_disturbance": "the disturbance vanishes at the equilibrium",
-    "pressure_at_rest": "the pressure that the task needs lies inside the limits of the law",
+    "pressure_at_rest": "the equilibrium pressure of the task lies within the pressure limits of the law",
     "differentiator": "the slip rate is estimated by a differentiator that is fast enough",
 }
 """Condition of every premise in words; premises of user-defined laws have notes instead."""
@@ -115,7 +115,7 @@ class Account:
 
     label: str
     badge: str
-    good: bool  # Whether there is a guarantee, or a certificate whose premises all hold for this loop and task
+    good: bool  # Whether there is a guarantee, or a certificate all of whose premises hold for this loop and task
     # guarantee, run, limits, verdict, proof: Sentences without a full stop
     guarantee: list[str]
     run: list[str]
@@ -138,7 +138,7 @@ def accounts(comparison: "Compared") -> list[Account]:
 
 
 def _shared_accounts(every: Iterable[Account]) -> list[Account]:
-    """Accounts; controllers with equal statements share one."""
+    """Accounts; controllers with equal guarantees, runs and verdicts share one."""
     cards: dict[tuple[Any, ...], Account] = {}
     for one in every:
         key = (tuple(one.guarantee), tuple(one.run), tuple(one.verdict))
@@ -210,8 +210,8 @@ def _at_samples(entry: "Entry") -> list[str]:
         return []
     root = " (within the proved errors, where the implicit step of the sliding mode is deadbeat)" if law.pull else ""
     return [
-        f"the equations with the index k are the law that runs{root}: x and y are the measured slip [m] and slip rate "
-        "[m/s], r the reference, v the target slip rate, i the innovation of the slip, D the estimate of the "
+        f"the equations with the index k are the implemented law{root}: x and y are the measured slip [m] and slip "
+        "rate [m/s], r the reference, v the target slip rate, i the innovation of the slip, D the estimate of the "
         "disturbance [Pa]; D, v+, x and y are 0 before the first sample"
     ]
 
@@ -265,7 +265,7 @@ def badge(entry: "Entry") -> str:
     """Verdict in a few words."""
     if entry.proof is not None:
         step = entry.design.fault.sampling_time
-        return f"not guaranteed at T_s = {step:g} s" if entry.design.other_step else "guaranteed as it runs"
+        return f"not guaranteed at T_s = {step:g} s" if entry.design.other_step else "guaranteed for the sampled loop"
     verdict = entry.design.verdict
     return "proved in continuous time only" if verdict is Verdict.PROVED else str(verdict)
 
@@ -299,13 +299,13 @@ _DERIVED = {
 }
 _STEP = "sampling_time"
 Row = tuple[Any, ...]
-HEADINGS = ("parameter", "symbol", "value", "unit", "where")
+HEADINGS = ("parameter", "symbol", "value", "unit", "section")
 
 
 def parameter_rows(fault: Fault) -> list[Row]:
-    """One row a parameter under `HEADINGS`: those of the fault file, its uncertainty, and derived ones.
+    """One row per parameter under `HEADINGS`: from the fault file, its uncertainty, and derived ones.
 
-    No disturbance for friction with a state: the disturbance of such a fault is the stress of its guarantee.
+    Faults with a friction state have no disturbance rows; their disturbance is the stress of the guarantee.
     """
     refused = fault.friction.equilibrium.messages
     rows = [
@@ -374,7 +374,7 @@ def reproduction(fault: Fault, command: str = "") -> Reproduction:
 # Captions of the figures, which are also their text alternatives.
 
 CAPTIONS = {
-    "overview": "How fast does the fault slip? Slip rate and slip over logarithmic time, without control and with the "
+    "overview": "Slip rate and slip over logarithmic time, without control and with the "
     "controllers of the legend; thick: the designed controller with the smallest proved bound. Horizontal lines are "
     "for that controller.",
     "uncontrolled": "Natural earthquake without control: slip and slip rate. Dotted: the slip at which the fault comes "

@@ -57,7 +57,8 @@ PAPER = {
 def paper_figures(study: "PaperRuns") -> "dict[str, Figure]":
     """Figures of a study by name: those of a comparison, and the paper's (`PAPER`).
 
-    Closed-loop figures need a run, the bars a run of an e-LQR. Friction with a state has other figures.
+    Closed-loop figures need a run, the bars a run of an e-LQR. For friction with a state there are no figures of
+    friction law and earthquakes.
     """
     comparison = study.comparison
     if study.induced is None:
@@ -76,7 +77,7 @@ def paper_figures(study: "PaperRuns") -> "dict[str, Figure]":
 
 
 def peak_against_tracking(study: "PaperRuns") -> "Figure":
-    """Simulated errors over the guaranteed slip-rate error, one point a design."""
+    """Simulated errors against the guaranteed slip-rate error, one point per design."""
     claims = [point.guarantee.claims for point in study.front]
     drawing, axes = figure(1, 3.2, 2)
     largest = max(float(claim.slip_rate_error) for claim in claims)
@@ -92,7 +93,9 @@ def peak_against_tracking(study: "PaperRuns") -> "Figure":
         axis.set(xlabel=f"guaranteed slip-rate error [{unit}]", ylim=(0, 1.15 * max(seen) / divisor))
         axis.set_ylabel(f"simulated {'slip' if base == 'm' else 'slip-rate'} error [{name}]")
         axis.margins(x=0.12)
-    note = "peak: smallest slip-rate error, plant without stick; numbers: allowed multiple of it for tracking"
+    note = (
+        "plant without stick; peak: smallest guaranteed slip-rate error; numbers: allowed multiple of it for tracking"
+    )
     title = f"{study.comparison.fault.name}: peak against tracking of the e-LQR"
     return finish(drawing, title, [point.run for point in study.front], note)
 
@@ -155,7 +158,7 @@ def friction_coefficient(comparison: "Compared") -> "Figure":
 
 
 def errors_and_power(comparison: "Compared") -> "Figure":
-    """Mean squared and largest errors and RMS pressure over those of the e-LQR, in five panels."""
+    """Ratios to the e-LQR of mean squared errors, largest errors and RMS pressure, in five panels."""
     basis = baseline(comparison)
     assert basis is not None
     ratios = [(entry, relative(entry.run, basis.run)) for entry, _ in runs_of(comparison.entries)]
@@ -167,7 +170,7 @@ def errors_and_power(comparison: "Compared") -> "Figure":
     _notes(axes[1, 2], basis)
     return finish(
         drawing,
-        f"{comparison.fault.name}: errors and RMS pressure, over those of the {basis.label}",
+        f"{comparison.fault.name}: errors and RMS pressure relative to the {basis.label}",
         runs_of(entry for entry, _ in shown),
         with_diverged(comparison.entries),
     )
@@ -231,5 +234,5 @@ class PaperStudy(PaperRuns):
 
 
 def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None] | None = None) -> PaperStudy:
-    """Make the short runs that the figures of the paper need beside a comparison; see `paper_runs`."""
+    """Simulate the additional short runs for the figures of the paper; see `paper_runs`."""
     return PaperStudy(**vars(paper_runs(comparison, progress=progress)))

@@ -49,7 +49,11 @@ def _gain_lines(
         if not printed:
             return ""
         entry = printed[name]
-        off = "" if entry["agrees"] or entry["deviation"] is None else f", off by {100 * abs(entry['deviation']):.2g} %"
+        off = (
+            ""
+            if entry["agrees"] or entry["deviation"] is None
+            else f", deviation {100 * abs(entry['deviation']):.2g} %"
+        )
         return f"; printed {entry['printed']}{off}"
 
     return [f"  {n} = {_short(after[n])} from {_short(before[n])} ({exponents[n]}{comment(n)})" for n in after]
@@ -83,12 +87,12 @@ def export_lines(result: Json) -> list[str]:
     lines = [
         *result["remarks"],
         f"written: {', '.join(result['files'])}",
-        f"every {result['step']:g} s: {measured} to pressure [Pa]",
+        f"every {result['step']:g} s: inputs {measured}; output pressure [Pa]",
     ]
     lines += [f"  {name}: {value}" for name, value in result["facts"].items()]
     lines += [
         f"premise {p['name']} {'holds' if p['holds'] else 'FAILS'}: required {p['required']:.4g} {p['unit']}, "
-        f"given {p['certified']:.4g} {p['unit']}; {p['note']}"
+        f"certified {p['certified']:.4g} {p['unit']}; {p['note']}"
         for p in result["premises"]
     ]
     return lines

@@ -24,7 +24,7 @@ _CELLS = {
     "pressure_total_variation": (1e9, ".3g"),
     "time_at_rest_fraction": (1, ".2f"),
 }
-OUTCOMES = ("law", "scheme", "outcome", "peak rate [m/s]", "of natural", "least p [MPa]", "largest p [MPa]")
+OUTCOMES = ("law", "scheme", "outcome", "peak rate [m/s]", "of natural peak", "min p [MPa]", "max p [MPa]")
 COLUMNS = (
     "law",
     "scheme",
@@ -53,7 +53,7 @@ def write_sampling(report: SamplingReport, folder: Path, formats: Sequence[str] 
 
 
 def print_sampling(report: SamplingReport, console: Console) -> None:
-    """Print a table of the schemes, and one of every study."""
+    """Print two tables of the schemes (outcomes, metrics), and one table per study."""
     console.print(report.fault.name, style="bold", end=", ")
     console.print(f"T_s = {report.fault.sampling_time:g} s, plant without stick")
     console.print(_table(OUTCOMES, [row_outcome(row) for row in report.rows], OUTCOME_WIDTHS), soft_wrap=False)
@@ -77,13 +77,13 @@ def print_sampling(report: SamplingReport, console: Console) -> None:
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int, ...]) -> Table:
-    """Table with the given widths of the first columns; the first two of these, at most, are text."""
+    """Table with given widths of the leading columns; at most the first two columns are left-aligned text."""
     sides = "l" * min(len(widths), 2) + "r" * len(head)
     return table(zip_longest(head, widths, sides[: len(head)]), rows)
 
 
 def row_outcome(row: SchemeRow) -> tuple[str, ...]:
-    """Texts of a law under `OUTCOMES`; a dash means diverged."""
+    """Cells of one run under `OUTCOMES`; a dash means diverged or, for the share, no natural earthquake."""
     extremes, outcome = pressure_extremes(row.run), row.run.outcome
     peak = "–" if outcome.peak_slip_rate is None else f"{outcome.peak_slip_rate:.2e}"
     share = "–" if outcome.share_of_natural is None else f"{100 * outcome.share_of_natural:.3g} %"
@@ -92,7 +92,7 @@ def row_outcome(row: SchemeRow) -> tuple[str, ...]:
 
 
 def row_cells(row: SchemeRow) -> tuple[str, ...]:
-    """Texts of a law under `COLUMNS`; a dash means not applicable or diverged."""
+    """Cells of one run under `COLUMNS`; a dash means not applicable or diverged."""
     metrics = row.run.metrics
     values = ((getattr(metrics, name), unit, form) for name, (unit, form) in _CELLS.items())
     texts = ("–" if value is None else format(value / unit, form) for value, unit, form in values)
@@ -101,7 +101,7 @@ def row_cells(row: SchemeRow) -> tuple[str, ...]:
 
 
 def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of a study as strings: one row a scheme and quantity, the errors at every level."""
+    """Heading and rows of a study as strings: one row per scheme and quantity, with the errors at every level."""
     head = ("scheme", "error", *(f"{level:.2g}" for level in study.levels))
     rows = [
         (scheme, _quantity(name), *(f"{v:.1e}" for v in values))
@@ -112,7 +112,7 @@ def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 
 def order_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of the orders as strings: one row a scheme, with exponents and the errors at the longest T_s."""
+    """Heading and rows of the orders as strings: one row per scheme, with orders and the errors at the longest T_s."""
     exponents = study.orders()
     names = list(next(iter(study.errors.values())))
     head = ("scheme", *(f"order of {QUANTITIES[n][0].removeprefix('max ')}" for n in names), *map(_quantity, names))

@@ -82,7 +82,7 @@ def _failing(premise: Premise) -> str:
 
 
 def _hold_gaps(entry: "Entry") -> list[str]:
-    """Gaps of the proof for the scheme of the run."""
+    """Reasons why the proof does not cover the scheme of the run."""
     if entry.run is None:
         return []
     scheme, step = entry.run.provenance["scheme"], entry.run.provenance["step"]
@@ -122,7 +122,7 @@ def outcome_sentence(run: Trajectory) -> str:
     outcome = run.outcome
     if outcome.peak_slip_rate is None:
         return f"{outcome.kind} at {run.events['diverged']:.4g} s"
-    over = f"; its numbers overflow at {run.events['diverged']:.4g} s" if "diverged" in run.events else ""
+    over = f"; floating-point overflow at {run.events['diverged']:.4g} s" if "diverged" in run.events else ""
     opened = f" at {run.events['opening']:.4g} s (p >= σ')" if outcome.kind == "opened" else ""
     return f"{outcome.kind}{opened}: peak slip rate {outcome.peak_slip_rate:.3g} m/s, {_beside_natural(run)}{over}"
 
@@ -134,7 +134,7 @@ def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
         return None
     text = f"the fault is unstable, but its event has not begun by {run.time[-1]:.4g} s"
     if event.onset is None:
-        return f"{text}: no forward disturbance acts; without --duration the run adds one"
+        return f"{text}: no forward disturbance acts; omit --duration to add one"
     return f"{text}: at a growth rate of {event.growth:.3g} 1/s it would begin at about {event.onset:.3g} s"
 
 
@@ -172,7 +172,7 @@ def hold_sentences(stability: SampledStability) -> list[str]:
         return [f"UNSTABLE {over} ({_near(stability.verdict_at_step.witness)})", _proved_up_to(stability)]
     if stability.verdict_at_step.verdict is Verdict.UNDECIDED:
         return [f"undecided {over}", _proved_up_to(stability)]
-    course = "any time history of the parameters, with integrals as sums over the samples"
+    course = "any time-varying parameters, with integrals computed as sums over the samples"
     return [f"stable {over}, proved for {course}", _proved_up_to(stability)]
 
 
@@ -194,11 +194,11 @@ def peaks_sentence(peaks: Mapping[str, ContinuousProof | NoProof]) -> str:
     if not lines:
         reasons = {proved.reason for proved in peaks.values() if not proved.available}
         return "; ".join(["no bound on the slip rate is certified", *sorted(reasons)])
-    return "certified from rest in continuous time: slip rate below " + ", ".join(lines)
+    return "certified in continuous time for the initial condition at rest: slip rate below " + ", ".join(lines)
 
 
 def verdict_lines(judged: LinearVerdict) -> list[str]:
-    """Lines about a given K."""
+    """Lines about the stability, sampling and peaks of an e-LQR with given gains."""
     fault = judged.fault
     gains = " ".join(f"{float(k):.6g}" for k in judged.controller.gains.values())
     lines = [
@@ -225,7 +225,7 @@ def margin_lines(analysis: Analysis) -> list[str]:
     if span is not None:
         low = f"{span.low:.4g} (unstable at {span.low_limit:.4g})"
         lines.append(
-            f"certified ranges of beta: from {low} to the box's upper end; from its lower end to {span.high:.4g}"
+            f"certified ranges of beta: [{low}, upper end of the box] and [lower end of the box, {span.high:.4g}]"
         )
     return lines
 
@@ -273,7 +273,7 @@ def brief(entry: "Entry") -> str:
 
 _WHOLE = 1e-3  # a complete run may omit this share of a task, since no period follows its last sample
 HEADLINE = 200
-"""Characters of a headline at most: two lines and a half of a terminal."""
+"""Largest number of characters of a headline: two and a half lines of a terminal."""
 
 
 def headline(entry: "Entry") -> str:
@@ -376,9 +376,7 @@ def _premises(entry: "Entry") -> list[str]:
         texts += ["its base gains are proved in continuous time too"] if design.certificate is not None else []
     else:
         scheme = entry.run.provenance["scheme"] if entry.run else AS_IN_THE_PAPER
-        texts += (
-            [] if scheme == AS_IN_THE_PAPER else [f"this run has a zero-order hold over every step (scheme {scheme})"]
-        )
+        texts += [] if scheme == AS_IN_THE_PAPER else [f"this run uses a zero-order hold (scheme {scheme})"]
     if entry.largest_step is not None and not _holds(design.premises, "on_trajectory"):
         texts.append(f"the run satisfies the proved bound on |h'| for T_s up to about {entry.largest_step:g} s")
     return texts
@@ -441,13 +439,11 @@ def _holds(premises: Iterable[Any], name: str) -> bool:
 
 _SAID = {
     "along_reference": "reference and disturbance alone make |h'| {:.3g} times as large as the proof allows",
-    "level_set": "not covered: a start at an unknown phase of the disturbance (|h'| {:.3g} times too large)",
+    "level_set": "not covered: an unknown initial phase of the disturbance (|h'| is {:.3g} times the certified bound)",
     "on_trajectory": "in this run |h'| is {:.3g} times as large as the proof allows",
     "control_coefficient": "β leaves the proved range by a factor of {:.3g}",
     "friction_slope": "the friction slope is {:.3g} times as large as the proof allows",
-    "sampling_time": (
-        "T_s of the fault is {:.3g} times the longest for which a guarantee was found, and this design samples faster"
-    ),
+    "sampling_time": ("T_s of the fault is {:.3g} times the longest with a guarantee; this design has a shorter T_s"),
     "constant_reference": "the certificate is for a constant reference, but the reference moves",
     "vanishing_disturbance": "the disturbance does not vanish at the equilibrium, so a bounded error remains",
 }
@@ -457,10 +453,10 @@ _SAID = {
 # Sentences about a run of a fault whose friction has a state, without control or in slow sliding.
 
 _MOST_EVENTS = 8
-_LOCKED = 0.5  # a fault that slips less than this share of the loading stores the rest
+_LOCKED = 0.5  # below this ratio of slip to loading displacement a fault counts as locked
 FASTEST_PLATE = 1e-8
 """Loading rate [m/s] that no tectonic plate exceeds: 0.3 m per year."""
-_LABORATORY = 10.0  # length of a fault [m] below which a machine loads it
+_LABORATORY = 10.0  # length of a fault [m] below which it counts as a laboratory sample
 
 
 def state_run_lines(result: Json) -> list[str]:
@@ -479,8 +475,8 @@ def state_run_lines(result: Json) -> list[str]:
         lines.append("steady sliding is unstable here, but nothing disturbs it: use --start late, or set a pressure")
     if outcome["kind"] == "creep" and result["slip"] < _LOCKED * result["loading_rate"] * result["duration"]:
         lines.append(
-            "it is not in steady creep: it slips far less than it is loaded, and the run ends before the event; set a "
-            "longer --duration, such as the recurrence interval that design reports"
+            "this is not steady creep: the slip is far below the loading displacement, and the run ends before the "
+            "event; set a longer --duration, such as the recurrence interval that design reports"
         )
     if cycle["recurrence_interval"] is not None:
         lines.append(f"recurrence interval {lasting(cycle['recurrence_interval'])}")
@@ -551,7 +547,7 @@ def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") ->
         return ""
     if outside:
         beyond = f"{exceeded}; " if exceeded else ""
-        others = f"this run is NOT covered by the proof, which is for another {', '.join(outside)}"
+        others = f"this run is NOT covered by the proof, from which it differs in: {', '.join(outside)}"
         return f"{others}; {beyond}the proof says: {sentence}"
     return f"proved: {sentence}"
 

@@ -125,7 +125,7 @@ def _row(entry: "Entry") -> Row:
         outcome=run.outcome.kind if run else "not run",
         slip_rate=(
             proof.peak_slip_rate if proof else None,
-            worst.peak_slip_rate if worst else None,  # None where only the errors are searched
+            worst.peak_slip_rate if worst else None,  # None if the falsification searched the errors only
             run.outcome.peak_slip_rate if run else None,
         ),
         slip=(
@@ -226,7 +226,7 @@ def summary_cells(rows: Sequence[Row]) -> list[tuple[str, ...]]:
 
 
 def _range(row: Row) -> str:
-    """Pressures of a row with one unit."""
+    """Range of the pressure of a row, with a common unit."""
     if row.pressure is None:
         return "–"
     power = power_of(max(abs(float(end)) for end in row.pressure))
@@ -239,7 +239,7 @@ def _range(row: Row) -> str:
 
 LEGEND = (
     "worst: worst case found; pressure (p < 0: withdrawal): proved, else simulated",
-    "tracked: slip error <= 2 % of target, rate <= reference + 1 % of uncontrolled",
+    "tracked: slip error <= 2 % of target, rate <= reference + 1 % of natural peak",
 )
 _LAWS = "2-CTA, 2-DIA: sliding modes; e-LQR: feedback with disturbance estimate"
 

@@ -38,8 +38,8 @@ _METRICS = (
 def rows(comparison: "Compared") -> list[tuple[str, ...]]:
     """One row per controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
 
-    Largest errors, RMS and total variation (path) of the pressure and the share at rest are evaluated after a quarter
-    of the task, the least and the largest pressure over the whole task.
+    Largest errors, RMS pressure, total variation of the pressure and fraction of time at rest are evaluated after the
+    first quarter of the run, least and largest pressure over the whole run.
     """
     return [(e.label, *_cells(e.run)) for e in comparison.entries]
 

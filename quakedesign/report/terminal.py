@@ -83,7 +83,8 @@ def _whole(entry: "Entry") -> list[str]:
 
 
 _OF_SLIDING = (
-    "; pressure per unit of the measured slip error (k1) and slip rate (k2: not used), and per unit of the scaled "
+    "; pressure [Pa] per unit of the measured slip error (k1) and slip-rate error (k2: unused), and per unit of the "
+    "scaled "
     "predictions of the law: slip error, state of friction, diffusion modes, and level of the unknown disturbance"
 )
 
@@ -139,13 +140,13 @@ def print_run(run: "Trajectory", fault: "Fault", premises: "Sequence[Premise]", 
 
 
 LABORATORY = (
-    "no comparison with printed numbers: the paper has simulations of real-fault only;",
+    "no comparison with printed numbers: the paper simulates real-fault only;",
     "  its figures 9 to 12 show experiments on the laboratory fault",
 )
 
 
 def printed_lines(rows: list[Json], fault: str = "") -> list[str]:
-    """Printed numbers of the paper with ours and our plant; empty if the paper has none for the fault."""
+    """Numbers printed in the paper beside computed ones, and the plant; empty if there are none for the fault."""
     if not rows:
         return ["", *LABORATORY] if fault == "lab-fault" else []
     sticks = any(row["plant"] == "stick-slip" for row in rows)

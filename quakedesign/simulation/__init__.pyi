@@ -13,9 +13,9 @@ from .export import block_step as block_step
 from .export import controller_step as controller_step
 from .export import export_controller as export_controller
 from .export import write_step as write_step
-from .inputs import PressureCourse as PressureCourse
+from .inputs import PressureHistory as PressureHistory
 from .inputs import perturbation as perturbation
-from .inputs import pressure_course as pressure_course
+from .inputs import pressure_history as pressure_history
 from .integrators import Integrator as Integrator
 from .integrators import integrator as integrator
 from .integrators import integrators as integrators

@@ -22,13 +22,13 @@ _FEWER = 16
 
 
 def require_smooth(recorder: Recorder, method: str) -> None:
-    """Reject a loop whose field jumps or has an infinite slope, for which a tolerance has no meaning."""
+    """Reject a loop with a discontinuous or non-Lipschitz right-hand side, for which error control is not valid."""
     loop, remedy = recorder.loop, "Use a fixed step: method dormand-prince or rk4."
-    text = f"method {method} follows smooth loops only. Received"
+    text = f"method {method} requires a smooth loop. Received"
     if loop.sticks:
         raise ParameterError(
-            f"{text} the plant {loop.plant_name}, whose friction is set-valued. Use the plant printed, or method "
-            "dormand-prince or rk4."
+            f"{text} the plant {loop.plant_name}, whose friction is set-valued at rest. Use plant='printed', or "
+            "method dormand-prince or rk4."
         )
     if type(recorder.scheme).rates is Scheme.rates:
         raise ParameterError(f"{text} the scheme {recorder.scheme.name}, with zero-order hold. {remedy}")
@@ -37,7 +37,7 @@ def require_smooth(recorder: Recorder, method: str) -> None:
 
 
 def _lipschitz(loop: ClosedLoop) -> bool:
-    """Whether pressure and integral rates of the law have bounded slopes: no sign function, no power below one."""
+    """Whether the pressure and the integral rates of the law are Lipschitz: no sign function, no exponent below 1."""
     assert loop.controller is not None
     pressure, rates = law_expressions(loop.controller)
     parts = [node for expression in (pressure, *rates) for node in sp.preorder_traversal(expression)]
@@ -63,7 +63,7 @@ def smooth_march(
     kept: list[int],
     progress: Callable[[float], None] | None = None,
 ) -> "np.ndarray":
-    """Vectors at the steps `kept`, one a column, up to the first diverged instant.
+    """Vectors at the step numbers `kept`, one per column, until the first step at which the run has diverged.
 
     Raises
     ------
@@ -74,14 +74,14 @@ def smooth_march(
     wanted, vector, found, longest = set(kept), np.array(start), [np.array(start)], CHUNK
     while (now := recorder.parts(vector)).counter < kept[-1] and now.watched["diverged"] < 0:
         count, vectors = min(longest, kept[-1] - round(now.counter)), None
-        while vectors is None:  # fewer steps at once if the solver stops
+        while vectors is None:  # if the solver stops, retry with fewer steps
             try:
                 vectors = pieces(count)(vector)
             except StoppedError as error:
                 if count == 1:
                     raise SimulationError(
                         f"{method.name} stopped at t = {now.counter * recorder.step:.6g} s ({error}). "
-                        "Loosen rtol, or use a fixed step: method dormand-prince."
+                        "Increase rtol, or use a fixed step: method dormand-prince."
                     ) from None
                 count = max(1, count // _FEWER)
         longest = min(longest, count)
@@ -98,7 +98,7 @@ def smooth_march(
 def _piece(
     recorder: Recorder, method: type[AdaptiveIntegrator], rtol: float, count: int
 ) -> Callable[["np.ndarray"], "np.ndarray"]:
-    """Function from a vector to those after each of the next `count` steps, one a column; raises `StoppedError`."""
+    """Function that maps a vector to the next `count` vectors, one per column. May raise `StoppedError`."""
     shares, works = np.arange(1, count + 1) / count, len(WORKS)
     flow = method.flow(field(recorder), scales(recorder.loop), shares, rtol=rtol, quadratures=works)
     symbols = [ca.SX.sym(n, size) for n, size in (("z", recorder.size), ("y", recorder.state_size), ("w", works))]
@@ -114,7 +114,7 @@ def _piece(
 
 
 def field(recorder: Recorder) -> ca.Function:
-    """CasADi Function (t [s], state, factors) → time derivative of the state, works per unit mass and time."""
+    """CasADi Function (t [s], state, factors) → time derivative of the state, integrands of `ClosedLoop.powers`."""
     time, state = ca.SX.sym("t"), ca.SX.sym("state", recorder.state_size)
     factors = ca.SX.sym("factors", len(recorder.loop.factors))
     loop = recorder.loop.with_factors(tuple(ca.vertsplit(factors)) if recorder.loop.factors else ())

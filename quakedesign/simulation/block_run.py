@@ -20,29 +20,29 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 
 MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 SUBSTEPS = 8
-"""Default substeps of one period; errors are proportional to their length."""
+"""Default number of substeps per period; the error is proportional to the length of a substep."""
 _POINTS = 1000
 _MOST_PERIODS = 5 * 10**7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockRun:
-    """A run of several blocks. Arrays are instants × blocks, for the pressure instants × wells.
+    """A run of several blocks. Arrays have shape (instants, blocks); `pressure` has shape (instants, wells).
 
     Attributes
     ----------
     times : ndarray
-        Ends of intervals [s].
+        Ends of the recorded intervals [s].
     slip, slip_rate, pressure : ndarray
-        Slip [m] and pressure of the wells [Pa] at these times, largest slip rate in the intervals [m/s].
+        Slip [m] at `times`, largest slip rate in each interval [m/s], and pressure of the wells at `times` [Pa].
     reference : ndarray
-        r [m].
+        Reference r at `times` [m].
     slip_error, slip_rate_error : ndarray
         Largest |slip − r| [m] and |slip rate − r'| [m/s] of every block over the run.
     rest : ndarray
-        Fraction of time at rest of every block [-].
+        Fraction of the time that each block is at rest [-].
     reversed, opened : bool
-        Whether a block would have slipped backward, or an effective normal stress reached 0.
+        Whether the load on a block at rest exceeded friction backward, or an effective normal stress fell to 0.
     """
 
     times: np.ndarray
@@ -80,16 +80,16 @@ def reference(chain: BlockChain, time: ca.SX | float) -> tuple[ca.SX, ca.SX]:
 
 
 def decided(chain: BlockChain, law: Any, count: ca.SX, x: ca.SX, v: ca.SX, z: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Pressures of the wells [Pa] commanded by a law, and its next states, in CasADi.
+    """Pressures of the wells [Pa] commanded by a law, and the next states of the law, as CasADi expressions.
 
-    In slow sliding these are feedback pressures, without the planned pressure.
+    In slow sliding the pressures are the feedback pressures alone; the planned pressure is not included.
 
     Parameters
     ----------
     chain : BlockChain
     law : MatrixLaw
-        From errors of all blocks, or of the averages of slip and slip rate that each well measures; in slow sliding
-        from the slip alone, to pressures in MPa.
+        Its inputs are the errors of slip [m] and slip rate [m/s] of all blocks, or of their averages at each well; its
+        outputs are pressures [Pa]. In slow sliding: slip errors alone [m], and pressures [MPa].
     count : SX
         Number of earlier samples [-].
     x, v : SX
@@ -177,11 +177,11 @@ class _Period:
 
 
 def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> int:
-    """Number of periods of a run [-] with a duration [s]; the operation time unless given."""
+    """Number of whole periods in a duration [s]; the duration is the operation time unless given."""
     whole = chain.fault.reference.operation_time if duration is None else duration
     if not step <= whole <= _MOST_PERIODS * step:
         raise ParameterError(
-            f"duration of a run of blocks must be one step to {_MOST_PERIODS:.0e} steps, {float(step):g} s to "
+            f"duration must be between 1 and {_MOST_PERIODS:.0e} steps, that is {float(step):g} s to "
             f"{float(_MOST_PERIODS * step):g} s. Received {whole:g} s. Change the duration, or the sampling time."
         )
     return int(rational(whole) / step)
@@ -190,25 +190,25 @@ def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> 
 def simulate_blocks(
     chain: BlockChain, law: Any, *, duration: float | None = None, substeps: int = SUBSTEPS
 ) -> BlockRun:
-    """Run blocks under a sampled law from rest; block i of N has the fault's disturbance, shifted by 2πi/N.
+    """Simulate blocks, initially at rest, under a sampled law; the disturbance of block i of N has the phase 2πi/N.
 
     Parameters
     ----------
     chain : BlockChain
     law : MatrixLaw
-        From errors of all blocks, or of the averages of slip and slip rate that each well measures; without delay.
+        Law without delay. Its inputs are the errors of all blocks, or of the averages that each well measures.
     duration : float, optional
-        [s]; the operation time unless given.
+        Duration [s]; the operation time unless given.
     substeps : int
-        Substeps of a period, 1 to 1000: slip rates by a projected Euler step, v = max(v + h·a, 0), then slips.
+        Number of substeps per period, 1 to 1000. A substep is a projected Euler step, v = max(v + h·a, 0), x = x + h·v.
 
     Raises
     ------
     ParameterError
-        For friction with healing, for substeps outside 1 to 1000, and for a run that overflows.
+        For friction with healing, duration outside 1 to 5e7 periods, substeps outside 1 to 1000, or an overflow.
     """
     if any(block.friction.rest_excess for block in chain.blocks):
-        raise ParameterError("a run of several blocks has no healing. Received a healing law. Set healing to 0.")
+        raise ParameterError("the simulation of several blocks does not support healing: set healing to 0")
     step, periods = float(law.step), whole_periods(chain, law.step, duration)
     if not 1 <= substeps <= 1000:
         raise ParameterError(f"substeps must be 1 to 1000. Received {substeps}.")
@@ -227,7 +227,7 @@ def simulate_blocks(
         now = np.array(many[size](now)).ravel()
         seen.append(now.copy())
         if not np.isfinite(now[place["x"]]).all():
-            raise ParameterError("a run must stay finite. Received a run that overflows. Reduce the gains of the law.")
+            raise ParameterError("the slip is not finite at the end of the run: reduce the gains of the law")
     kept = np.array(seen)
     times = kept[:, place["count"]].ravel() * step
     task = chain.fault.reference

@@ -1,7 +1,7 @@
 """Closed loop of plant, control law and reference as CasADi functions.
 
-Chapters: far-field loading and user-defined perturbation; parameter variation within the uncertainty box
-without a new derivation or compilation; energy budget of a run [J].
+Chapters: far-field loading and user-defined perturbation; variation of parameters within the uncertainty box, with
+the same compiled code; energy budget of a run [J]; closed loop.
 """
 
 import math
@@ -84,12 +84,12 @@ class Load:
         named = {symbol: meant[symbol.name] for symbol in self.perturbation.free_symbols}
         return self.perturbation.subs(named, simultaneous=True)
 
-    def push(self, fault: "Fault") -> "sp.Expr":
-        """Acceleration k̂·drift·t [m/s²] by the far end, in t of `quakedesign.symbolic.plant`."""
+    def far_end_acceleration(self, fault: "Fault") -> "sp.Expr":
+        """Acceleration k̂·drift·t [m/s²] due to the motion of the far end, in t of `quakedesign.symbolic.plant`."""
         return plant.plant_values(fault)[plant.k_hat] * sp.Rational(str(rational(self.drift))) * plant.t
 
 
-NOTHING = Load()
+NO_LOAD = Load()
 
 
 # ----------------------------------------------------------------------
@@ -105,12 +105,12 @@ class Variation:
     stiffness, damping, authority : float
         Factors of k̂, η̂ and N̂ [-], each within the fault's box.
     weakening : float
-        Share of the friction drop that takes place [-], 0 … 1: μ = μ_res + weakening·(μ_law − μ_res). Together with
-        the authority it determines β. For every such share, μ and its slope are within the bounds of every box.
+        Fraction of the nominal friction drop [-], 0 … 1: μ = μ_res + weakening·(μ_law − μ_res). Together with
+        `authority` it determines β. For every value in 0 … 1, μ and its slopes stay within the bounds of the law.
     amplitude : float
-        Share of the amplitude of the fault's sinusoidal disturbance that acts [-], 0 … 1.
+        Ratio of the true to the nominal amplitude of the fault's sinusoidal disturbance [-], 0 … 1.
     phase : float
-        Initial phase of that sine [rad], 0 … 2π.
+        Initial phase of this disturbance [rad], 0 … 2π.
     """
 
     stiffness: float = 1.0
@@ -149,7 +149,7 @@ def names() -> tuple[str, ...]:
 
 
 def complete(factors: tuple[Number, ...]) -> tuple[Number, ...]:
-    """All factors; those omitted at the end are nominal."""
+    """All factors; omitted trailing factors take their nominal values."""
     return factors + astuple(Variation())[len(factors) :]
 
 
@@ -165,7 +165,7 @@ def symbol(name: str) -> sp.Symbol:
 
 @dataclass(frozen=True)
 class WeakenedFriction:
-    """A friction law with only a share of its drop."""
+    """A friction law whose drop is scaled by a factor, `share`."""
 
     law: FrictionLaw
     share: sp.Expr
@@ -198,7 +198,7 @@ WORKS = ("work_weakening", "work_injection", "work_viscous", "work_disturbance",
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class EnergyBudget:
-    """Energies between start and end of a run [J]: stored and dissipated energies balance the works.
+    """Energies of a run from its beginning to its end [J]: the stored and dissipated energies balance the works.
 
     kinetic + elastic + frictional + viscous − far_field − disturbance − residual = 0.
 
@@ -212,7 +212,7 @@ class EnergyBudget:
         Reduction of the frictional work by the pressure, ∫μAp·x2 dt [J]: without pressure the work on the same slip
         path would be frictional + injection.
     viscous : float
-        Heat of the dashpot (radiation damping if the damping is chosen so), ∫η(x2 − v_∞)² dt [J].
+        Energy dissipated by the dashpot, or radiated if `damping` is the radiation damping: ∫η(x2 − v_∞)² dt [J].
     far_field : float
         Work of the drifting far end on spring and dashpot [J]; 0 without drift.
     disturbance : float
@@ -234,12 +234,12 @@ class EnergyBudget:
 
     @property
     def relative_residual(self) -> float:
-        """|Residual| over the largest other entry [-]; 0 if all entries are 0."""
+        """Ratio of |residual| to the largest absolute value of the other entries [-]; 0 if all entries are 0."""
         entries = self.to_dict()
         return abs(entries.pop("residual")) / largest if (largest := max(map(abs, entries.values()))) else 0.0
 
     def to_dict(self) -> dict[str, float]:
-        """Return the energies [J] by name."""
+        """Energies and residual [J] by name."""
         return asdict(self) | {"residual": self.residual}
 
     @staticmethod
@@ -249,12 +249,12 @@ class EnergyBudget:
 
 
 class Meter:
-    """Wrapper of a loop that also accumulates the works of its forces while steps are expressed in CasADi.
+    """Wrapper of a loop that also accumulates the works of the forces during the steps, as CasADi expressions.
 
     Attributes
     ----------
     works : SX
-        Works so far, in the order of `WORKS`.
+        Accumulated works per unit mass [J/kg] and ∫x1 dt [m·s], in the order of `WORKS`.
     """
 
     def __init__(self, loop: "ClosedLoop", works: ca.SX) -> None:
@@ -289,7 +289,7 @@ class Meter:
 
 
 class Metered(Stepped):
-    """A loop with works of forces that are integrated along with its motion; functions on CasADi SX.
+    """A loop whose forces' works are integrated along with the motion; all functions take and return CasADi SX.
 
     Attributes
     ----------
@@ -312,13 +312,13 @@ class Metered(Stepped):
 
     @property
     @abstractmethod
-    def shaken(self) -> Motion:
+    def disturbance_function(self) -> Motion:
         """Function (t [s], x [m, m/s]) → φ̂_e [m/s²]."""
 
     def powers(self, time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
-        """Integrands per unit mass in the order of `WORKS` (SX): [W/kg], and x1 [m] for the last.
+        """Integrands in the order of `WORKS` (SX): powers per unit mass [W/kg], and x1 [m] as the last one.
 
-        Friction enters relative to its static value at p = 0, whose work follows exactly from the slip.
+        The first integrand is the frictional power minus that of static friction at p = 0, which `budget` adds exactly.
         """
         _, normal, damping, stress = self.hats()
         relief = ca.fmin(pressure, stress) if self.sticks else pressure
@@ -327,12 +327,12 @@ class Metered(Stepped):
             normal * stress * (friction * x[1] - self.static_friction * x[1]),
             normal * friction * relief * x[1],
             damping * x[1] * x[1],
-            self.shaken(time, x) * x[1],
+            self.disturbance_function(time, x) * x[1],
             x[0],
         )
 
     def budget(self, integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
-        """Budget of a run that starts at rest and lasts `time` [s], by the integrals of `powers` and the last state."""
+        """Energy budget over `time` [s] from rest; `slip` [m] and `rate` [m/s] are the final values."""
         mass, drift = self.fault.mass, self.load.drift
         stiffness, normal, damping, stress = map(float, self.hats())
         static = normal * stress * float(self.static_friction)
@@ -364,7 +364,7 @@ phi = sp.Symbol("phi", real=True)
 
 
 def reference_expressions(fault: Fault) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """r [m], r' [m/s] and r'' [m/s²] in the time t, at rest after the operation time (ERRATA 26)."""
+    """r [m], r' [m/s] and r'' [m/s²] as functions of t; r is constant after the operation time (ERRATA 26)."""
     end = sp.Rational(str(rational(fault.reference.operation_time)))
     slip = fault.reference.slip(plant.t)
     moving = (sp.factor(sp.diff(slip, plant.t, order)) for order in (1, 2))
@@ -377,7 +377,7 @@ def acceleration_expression(fault: Fault, varied: bool = False) -> sp.Expr:
 
     Friction is continued to slip < 0 (ERRATA 12).
 
-    With `varied`, here and below, the expression also contains the factors of `symbols`.
+    If `varied` is True, here and in the functions below, the expression also contains the factors of `symbols`.
     """
     return _with_numbers(plant.shifted_acceleration(), fault, varied)
 
@@ -388,7 +388,7 @@ def friction_expression(fault: Fault, varied: bool = False) -> sp.Expr:
 
 
 def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = False) -> sp.Expr:
-    """h of the paper's equation ``esystem3`` [unit of ν] along a run, in x1, x2, φ, r, r' and r''."""
+    """h [m/s²] of the paper's equation ``esystem3`` along a run, in x1, x2, φ, r, r' and r''."""
     moving, derived = plant.reference(plant.t), plant.error_dynamics()
     position = {plant.e1: plant.x1 - moving, plant.e2: plant.x2 - moving.diff(plant.t)}
     named = ((moving.diff(plant.t, 2), r_acceleration), (moving.diff(plant.t), r_rate), (moving, r))
@@ -400,7 +400,7 @@ def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = Fals
 
 
 def acceleration_with_parameters(fault: Fault, names: Sequence[str]) -> tuple[sp.Expr, list[sp.Symbol]]:
-    """x2' [m/s²] of `acceleration_expression` with the named parameters left as symbols, and these symbols."""
+    """x2' [m/s²] as in `acceleration_expression`, with the named parameters as symbols; and these symbols."""
     law = fault.friction
     free = law.symbols() | {name: sp.Symbol(name, positive=True) for name in plant.PARAMETERS}
     known = {name: sp.Rational(str(rational(getattr(fault, name)))) for name in plant.PARAMETERS}
@@ -418,7 +418,7 @@ def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
 
 
 def _inserted(expression: sp.Expr, law: FrictionLaw, values: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """Insert law and values; e^u becomes 1 + expm1(u), so that small slips are not lost in rounding."""
+    """Insert the law and the values; e^u becomes 1 + expm1(u), which avoids cancellation for small slips."""
     lawful = plant.with_law(expression, law, extended=True)
     numbers = lawful.replace(plant.disturbance, lambda *_: phi).subs(values)
     return sp.expand_mul(numbers.replace(sp.exp, lambda u: 1 + expm1(u)))
@@ -434,7 +434,7 @@ class ClosedLoop(Metered):
     fault: Fault
     controller: Controller | None = None
     constant_pressure: float = 0.0  # p [Pa] without a controller
-    load: Load = NOTHING  # In addition to the fault's own disturbance
+    load: Load = NO_LOAD  # In addition to the fault's own disturbance
     # tuple of float or SX: Ratios of true to nominal parameters as in `Variation.values`; empty for the nominal fault
     factors: tuple[Number, ...] = ()
 
@@ -447,27 +447,28 @@ class ClosedLoop(Metered):
 
         Parameters
         ----------
+        method : type of Integrator
         motion : callable
             Time derivative of the state. Its arguments are the plant, a function of t [s], x and p [Pa]; `passed`, the
             elapsed share of the step [-]; and the state.
         step : float
             [s].
         works : int
-            Number of last entries of the state that are works of forces; no rate depends on them.
+            Number of trailing entries of the state that are works of forces; no derivative depends on them.
         """
         return method.advance(lambda passed, now: motion(self.plant, passed, now), state, step)
 
     def advance_often(
         self, method: type[Integrator], motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int
     ) -> ca.SX:
-        """State (SX) after a number of steps; generated C calls one step as a function in a loop.
+        """State (SX) after `times` steps; in generated C the steps are a loop that calls one function.
 
         Parameters
         ----------
         method, state, step
             See `advance`.
         motion : callable
-            As in `advance`, but `passed` is the number of steps since the start, and `given` is the last argument.
+            As in `advance`, but `passed` counts steps from the first one, and `given` is an additional last argument.
         given : SX
             Further arguments of the motion, constant over the steps.
         """
@@ -482,7 +483,7 @@ class ClosedLoop(Metered):
         step: float,
         times: int,
     ) -> tuple[ca.SX, ca.SX]:
-        """State and works (SX) after a number of steps, see `advance_often`; no works if the start has none."""
+        """State and works (SX) after `times` steps; see `advance_often`. Empty works stay empty."""
 
         def once(loop: Self, moving: Motion, state: ca.SX, works: ca.SX) -> tuple[ca.SX, ca.SX]:
             if not works.shape[0]:
@@ -509,7 +510,7 @@ class ClosedLoop(Metered):
 
     @property
     def divisor(self) -> sp.Rational:
-        """μ0N̂0 [m²/kg]: the law's own, or μ_res·N̂_min for a law without one."""
+        """Divisor μ0N̂0 of the control [m²/kg]: that of the law, or μ_res·N̂_min if the law has none."""
         if self.controller is not None and self.controller.divisor is not None:
             return sp.Rational(str(self.controller.divisor))
         least = rational(self.fault.friction.bounds[0]) * (1 - self.fault.box.authority)
@@ -522,7 +523,7 @@ class ClosedLoop(Metered):
 
     @cached_property
     def printed(self) -> Motion:
-        """`plant` as printed in the paper (equation ``shift``), which is valid for slip rates that are not negative."""
+        """Plant as printed in the paper (equation ``shift``), which is valid for slip rates ≥ 0."""
         rates = [plant.x2, acceleration_expression(self.fault, bool(self.factors))]
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p]}
         return self.function("plant", inputs, {"dx": rates})
@@ -542,17 +543,17 @@ class ClosedLoop(Metered):
         return casadi_function("law", inputs, {"p": [pressure], "dxi": list(rates)})
 
     @property
-    def known(self) -> sp.Expr:
-        """Feed-forward of the known plant terms [unit of ν]; the law adds it to ν, so it counts in h."""
+    def feedforward(self) -> sp.Expr:
+        """Feed-forward of known plant terms [m/s²]; the law adds it to ν, so that it is part of h."""
         known = self.controller.feedforward if self.controller is not None else NONE
         return known.acceleration(plant.x1, plant.x2, r_acceleration)
 
     @cached_property
     def perturbation(self) -> Motion:
-        """CasADi Function (t, x, reference) → h [unit of ν], the law's feed-forward included, and mu [-]."""
+        """CasADi Function (t [s], x [m, m/s], reference) → h [m/s²] including the feed-forward, and mu [-]."""
         inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "reference": [r, r_rate, r_acceleration]}
         outputs = {
-            "h": [matched_perturbation(self.fault, self.divisor, bool(self.factors)) + self.known],
+            "h": [matched_perturbation(self.fault, self.divisor, bool(self.factors)) + self.feedforward],
             "mu": [friction_expression(self.fault, bool(self.factors))],
         }
         return self.function("perturbation", inputs, outputs)
@@ -570,12 +571,12 @@ class ClosedLoop(Metered):
         return value if type(value).__name__ == "SX" else float(value)
 
     @cached_property
-    def shaken(self) -> Motion:
+    def disturbance_function(self) -> Motion:
         """CasADi Function (t [s], x [m, m/s]) → φ̂_e [m/s²], without the load of the far end."""
         return self.function("shaken", {"t": [plant.t], "x": [plant.x1, plant.x2]}, {"phi": [self.disturbance]})
 
     def reversing(self, time: ca.SX, state: ca.SX, pressure: ca.SX) -> ca.SX:
-        """Whether the load moves a fault at rest backward against friction (SX): never on a plant without stick."""
+        """Whether the load on a fault at rest exceeds friction backward (SX); always 0 on a plant without stick."""
         return ca.SX(0)
 
     def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
@@ -583,7 +584,7 @@ class ClosedLoop(Metered):
         return friction * (self.fault.effective_normal_stress - pressure)
 
     def function(self, name: str, inputs: dict[str, list[sp.Symbol]], outputs: dict[str, list[sp.Expr]]) -> Motion:
-        """CasADi Function with the disturbance inserted; with factors, a callable with these inserted too."""
+        """CasADi Function with the disturbance inserted, or a callable with the factors of the loop inserted too."""
         shaking = self.shaking if plant.t in inputs.get("t", ()) else None
         if not self.factors:
             return casadi_function(name, inputs, outputs, shaking)
@@ -592,8 +593,8 @@ class ClosedLoop(Metered):
 
     @property
     def shaking(self) -> dict[sp.Symbol, sp.Expr]:
-        """φ̂_e and the far end's load [m/s²] in x1, x2 and t, inserted last: in a sum a tiny constant would be lost."""
-        loading = self.load.push(self.fault) * (symbol("stiffness") if self.factors else 1)
+        """Substitution of `phi` by φ̂_e plus the far end's load [m/s²], made last to keep tiny terms exact."""
+        loading = self.load.far_end_acceleration(self.fault) * (symbol("stiffness") if self.factors else 1)
         return {phi: self.disturbance + loading}
 
     @property
@@ -615,9 +616,9 @@ def casadi_function(
     outputs: dict[str, list[sp.Expr]],
     named: dict[sp.Symbol, sp.Expr] | None = None,
 ) -> ca.Function:
-    """CasADi Function with named inputs and outputs; outputs may contain symbols that `named` expresses in the inputs.
+    """CasADi Function with named inputs and outputs. `named` gives other symbols in the outputs in terms of the inputs.
 
-    Derivatives at a kink are one-sided, for growing x1 and x2.
+    Derivatives at a kink are right-sided in x1 and x2.
     """
     vectors = {key: ca.SX.sym(key, len(symbols)) for key, symbols in inputs.items()}
     values = {symbol: vectors[key][i] for key, symbols in inputs.items() for i, symbol in enumerate(symbols)}

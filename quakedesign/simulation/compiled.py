@@ -1,8 +1,8 @@
 """Compilation of CasADi functions to portable C with bitwise reproducible results.
 
-Chapters: elementary functions from IEEE 754 operations (errors below 1 ulp; powers other than cube roots
-1.5, tanh 2); instructions of a CasADi function; fixed C files; portable C operations; repeated steps in machine code
-where a compiler is available; many vectors at once, with inner loops for vectorisation.
+Chapters: elementary functions from IEEE 754 operations (errors below 1 ulp; below 1.5 ulp for powers other than cube
+roots, and 2 for tanh); instructions of a CasADi function; fixed C files; portable C operations; repeated steps in
+machine code where a compiler is available; many vectors at once, with inner loops for vectorisation.
 """
 
 import ctypes
@@ -55,10 +55,10 @@ _in_bits = ContextVar("in_bits", default=False)
 
 @contextmanager
 def verbatim(*, bits: bool = False) -> Iterator[None]:
-    """In this context CasADi does not simplify: (x + y) − x stays, since in floats it is not y.
+    """Context in which CasADi does not simplify: (x + y) − x is kept, since it differs from y in floating point.
 
-    With `bits`, expressions are for C, where `exponent_and_mantissa` and `near_cube_root` use the bits of a float;
-    log, log1p and sinh then stand for them.
+    With `bits`, expressions are for C, where exponent, mantissa and approximate cube root are read from the bits of a
+    float. CasADi's log, log1p and sinh then serve as placeholders for these three functions.
     """
     before, token = ca.GlobalOptions.getSimplificationOnTheFly(), _in_bits.set(bits)
     ca.GlobalOptions.setSimplificationOnTheFly(False)
@@ -122,7 +122,7 @@ def two_to(exponent: ca.SX) -> ca.SX:
 
 
 def choice(condition: ca.SX, yes: ca.SX, no: ca.SX) -> ca.SX:
-    """One of two values; the other one may be NaN."""
+    """`yes` if the condition holds, else `no`; the value that is not selected may be NaN."""
     return ca.if_else(condition, yes, no)
 
 
@@ -193,7 +193,7 @@ def expm1(x: ca.SX) -> ca.SX:
 
 
 def _parted(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """n and m: x = m·2ⁿ with √½ ≤ m < √2, for positive finite x."""
+    """n and m such that x = m·2ⁿ and √½ ≤ m < √2, for positive finite x."""
     small = x < _LEAST
     x = x * choice(small, ca.SX(2.0**54), ca.SX(1.0))
     whole, mantissa = exponent_and_mantissa(x)
@@ -201,7 +201,7 @@ def _parted(x: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def exponent_and_mantissa(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """As `_parted`, for x ≥ 2⁻¹⁰²²; exact for every rounding of the C library's logarithm.
+    """n and m such that x = m·2ⁿ and √½ ≤ m < √2, for x ≥ 2⁻¹⁰²²; exact whatever the rounding of the C logarithm.
 
     The logarithm only selects a whole number, the exponent of a power of two near x; where its rounding decides between
     two exponents, both give the same result.
@@ -242,7 +242,7 @@ def power(x: ca.SX, a: ca.SX) -> ca.SX:
 
 
 def near_cube_root(x: ca.SX) -> ca.SX:
-    """Number of 17 bits whose cube is within a tenth of x, for x ≥ 2⁻¹⁰²².
+    """Number with 17 significant bits whose cube is within 10 % of x, for x ≥ 2⁻¹⁰²².
 
     The leading bits of a float, its exponent and 16 bits of its fraction as one whole number, approximate its
     logarithm: a third of this number approximates that of the cube root (Kahan 1991).
@@ -296,7 +296,7 @@ def _power(x: ca.SX, a: ca.SX) -> ca.SX:
 
 
 def _by_half_pi(x: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Turns n/4 less whole turns (−½, −¼, 0, ¼ or ½), and r and rest: x = nπ/2 + r + rest."""
+    """Fraction of a turn n/4 (−½, −¼, 0, ¼ or ½), r and rest, such that x = nπ/2 + r + rest modulo 2π."""
     x = x * (ca.fabs(x) < 2.0**52)
     whole = rounded(x * float(1 / _HALF_PI))
     first, second, third, fourth = (whole * piece for piece in _HALF_PI_PIECES)
@@ -315,7 +315,7 @@ def _sine_and_cosine(r: ca.SX, rest: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def sin(x: ca.SX) -> ca.SX:
-    """Sine of x; for |x| > 2³¹, of a number within one unit in the last place of x; for |x| ≥ 2⁵², of 0."""
+    """Sine of x. For |x| > 2³¹ it is the sine of a number within 1 ulp of x; for |x| ≥ 2⁵² it is 0."""
     turns, r, rest = _by_half_pi(x)
     sine, cosine = _sine_and_cosine(r, rest)
     size = ca.fabs(turns)
@@ -323,7 +323,7 @@ def sin(x: ca.SX) -> ca.SX:
 
 
 def cos(x: ca.SX) -> ca.SX:
-    """Cosine; for large arguments see `sin`."""
+    """Cosine of x. For |x| > 2³¹ it is the cosine of a number within 1 ulp of x; for |x| ≥ 2⁵² it is 1."""
     turns, r, rest = _by_half_pi(x)
     sine, cosine = _sine_and_cosine(r, rest)
     size = ca.fabs(turns)
@@ -371,14 +371,14 @@ FUNCTIONS: dict[int, Callable[..., ca.SX]] = {
 
 
 # ----------------------------------------------------------------------
-# Instructions of CasADi Functions of scalar operations, and the functions that they call.
+# Instructions of scalar CasADi Functions (SX), and the functions that these instructions call.
 
 _WRITTEN_OUT = 60
-"""Mean number of instructions of an elementary function in a step."""
+"""Mean number of instructions per elementary function, once it is written out."""
 
 
 class NotPortableError(ValueError):
-    """An operation without a portable C text."""
+    """An operation for which no portable C code exists."""
 
 
 @dataclass(frozen=True)
@@ -416,7 +416,7 @@ class Called:
 
 
 def called(function: ca.Function, work: Instruction) -> Called:
-    """Function that an instruction calls.
+    """Function called by an instruction `work` of `function`.
 
     Raises
     ------
@@ -567,7 +567,7 @@ def constant(value: float) -> str:
 
 
 def called_alone(code: int) -> str | None:
-    """Name of the C library's function for an operation, which is called for one number at a time."""
+    """Name of the scalar C library function that implements an operation; None if there is none."""
     return _OF_THE_LIBRARY.get(code)
 
 
@@ -632,7 +632,7 @@ FLAGS = (
 """Compiler options that leave all results bitwise unchanged."""
 RADIX = 64
 LEVELS = 3
-_LONGEST_COMPILATION = 120
+_LONGEST_COMPILATION = 120  # s
 _WORTH = 100_000_000
 """Least number of instructions of a run for which compilation, which takes 0.3 s, saves time."""
 
@@ -647,12 +647,12 @@ MachineCode = Callable[[Any, int], int]
 class Backend:
     """Backend that advances a vector."""
 
-    # tuple of casadi.Function: Advance by 1, 64 and 4096 steps, one input and one output each; empty with machine
-    # code
+    # Functions that advance the vector by 1, 64 and 4096 steps, each with one input and one output; empty if
+    # `machine_code` is given
     functions: tuple[ca.Function, ...]
     name: str  # ``"compiled"`` or ``"virtual-machine"``
     reason: str  # The compiler, or the reason for using none
-    machine_code: MachineCode | None = None  # Advances floats at a pointer by a number of steps; not 0 on failure
+    machine_code: MachineCode | None = None  # (pointer to the vector, number of steps) → 0, or not 0 on failure
 
 
 def prepare(step: ca.Function, compiled: bool | None, steps: int) -> Backend:
@@ -663,19 +663,19 @@ def prepare(step: ca.Function, compiled: bool | None, steps: int) -> Backend:
     step : casadi.Function
         One vector in, one vector of the same length out; called `STEP`.
     compiled : bool or None
-        Whether to compile; None: if the run is long enough to save time and a working compiler exists.
+        Whether to compile. None: compile if this saves time and a compiler works.
     steps : int
         Number of steps of the run.
 
     Raises
     ------
     SimulationError
-        If compilation is requested and not possible.
+        If `compiled` is True and no compiler works.
     """
     if compiled is False:
         return _virtual_machine(step, "requested")
     if compiled is None and steps * expanded_size(step) < _WORTH:
-        return _virtual_machine(step, "the run is shorter than a compilation")
+        return _virtual_machine(step, "compilation would take longer than the run")
     try:
         command = compiler()
         return Backend((), "compiled", " ".join((*command, *FLAGS)), _compile(_source(step), command))
@@ -683,7 +683,7 @@ def prepare(step: ca.Function, compiled: bool | None, steps: int) -> Backend:
         reason = _reason(error)
         if compiled:
             raise SimulationError(
-                f"a compiled loop needs a C compiler. {reason}. Install one, set CC, or use compiled=None."
+                f"compiled=True needs a working C compiler: {reason}. Install one, set CC, or use compiled=None."
             ) from None
         return _virtual_machine(step, reason)
 
@@ -739,7 +739,7 @@ def compiler() -> tuple[str, ...]:
 
 @lru_cache(maxsize=32)
 def _compile(text: str, command: tuple[str, ...]) -> MachineCode:
-    """Compile and load the loop of a C source; the library stays in memory after its file is deleted."""
+    """Compile a C source and load its function ``advance``; the library stays in memory after its file is deleted."""
     key = text.encode(), repr((*command, *FLAGS, *_identity(command[0]))).encode()
     with temporary_folder() as folder:
         library = folder / "kept.so"
@@ -809,7 +809,7 @@ def _reason(error: Exception) -> str:
 
 LANES = 16
 LANE_FLAGS = ("-fno-tree-pre", "-fno-thread-jumps")
-"""Options with which a compiler selects values instead of branching; results are bitwise unchanged."""
+"""Compiler options that favour conditional moves over branches; results are bitwise unchanged."""
 _WIDE = {"__AVX512F__": ("-mavx512f", "-mprefer-vector-width=512"), "__AVX2__": ("-mavx2",)}
 _LONGEST_QUERY = 10
 

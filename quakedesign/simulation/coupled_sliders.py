@@ -1,10 +1,10 @@
 """Coupled blocks with rate-and-state friction: seismic cycles, controlled runs, pressure diffusion.
 
-With ζ the slip less that of the far end, N = σ' − p and S the stiffness matrix, for each block
+Let ζ be the slip minus the displacement of the far end, N = σ' − p, and S the stiffness matrix. For each block
 
-    ζ' = v − v_∞,    mv' = τ_0 − Sζ + s − Nμ(v, θ) − Hv,    θ' of the law.
+    ζ' = v − v_∞,    mv' = τ_0 − Sζ + s − Nμ(v, θ) − Hv,    θ' as given by the friction law.
 
-Without mass the right-hand side is 0, and its derivative gives v' (quasi-dynamic). The logarithms of rates and states
+Without mass the right-hand side is 0, and its time derivative gives v' (quasi-dynamic). The logarithms of v and θ
 are integrated. Pressures h of cells or wells obey h' = Fh + Gu, and p is a linear combination of them.
 """
 
@@ -33,26 +33,26 @@ from quakedesign.simulation.stick_slip import direct_strength
 from quakedesign.symbolic.casadi_printer import to_casadi
 from quakedesign.symbolic.rate_and_state_plant import rate, state_symbols, without_overflow
 
-MOST_EXPANDED = 40  # with more blocks equations stay matrices, without a Jacobian
-_LONGEST = 1e9  # s of one time variable, whose resolution is then 1.2e-7 s
+MOST_EXPANDED = 40  # above this number of blocks, matrix equations are used, without a Jacobian
+_LONGEST = 1e9  # s, longest span of one time variable: the resolution of its floats is then 1.2e-7 s
 _LONGEST_RUN = 1e5 * _LONGEST  # s
-_FARTHEST = 1e6  # critical slips that the far end travels: some thousand cycles
+_FARTHEST = 1e6  # largest displacement of the far end, in critical slips: some thousand cycles
 _MOST_PERIODS = 10**5  # of a controlled run
 _ONSET = 10.0  # times the loading rate
-_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # of a run for a cycle: events, and loads in units of aσ'
-_SMALL = 1e3  # Pa, below which the tolerance of a pressure is absolute
-_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a controlled run is recorded
+_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # least events; first, largest load [aσ']
+_SMALL = 1e3  # Pa; the tolerance of pressures below this value is absolute
+_SHARES = (0.25, 0.5, 0.75, 1.0)  # fractions of a sampling period at which a controlled run is recorded
 _WIDEST = 50.0  # largest change of the logarithm of a rate by the initial stress
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class CoupledSliders:
-    """Blocks per unit of area, and the pressures that act on them.
+    """Coupled blocks, with all quantities per unit area, and the pressures that act on them.
 
     Attributes
     ----------
     laws : tuple of FrictionLaw
-        With one state each.
+        Friction laws of the blocks, with one state each.
     stiffness : ndarray
         S [Pa/m], blocks × blocks: decrease of the stress on a block per slip of every block.
     normal_stress : tuple of float
@@ -62,9 +62,9 @@ class CoupledSliders:
     mass : float
         m [kg/m²]; 0: quasi-dynamic.
     flow : ndarray
-        F [1/s] of the pressures of cells or wells; empty without such pressures.
+        F [1/s] in h' = Fh + Gu for the pressures h of cells or wells; empty without such pressures.
     source : ndarray
-        G, rows for these pressures and columns for inputs u.
+        G in h' = Fh + Gu, shape (pressures, inputs) [Pa/s per unit of u].
     shares : ndarray
         Share of each of these pressures (columns) in the pressure of every block (rows) [-].
     """
@@ -85,7 +85,7 @@ class CoupledSliders:
 
     @classmethod
     def of(cls, chain: BlockChain, *, inertia: bool = False, lag: float | None = None) -> "CoupledSliders":
-        """Blocks of a chain; with a lag [s] also the lagged pressures of its wells, without the planned pressure."""
+        """Blocks of a chain. With a lag [s], also the lagged feedback pressures of its wells."""
         N, m, fault = len(chain.blocks), len(chain.wells), chain.fault
         stiffness, mass = np.diag([fault.stiffness / fault.area] * N), fault.mass / fault.area
         add_springs(stiffness, chain.springs, -mass)
@@ -143,6 +143,7 @@ class CoupledSliders:
         Parameters
         ----------
         y : MX
+            Vector of `start`.
         load : MX
             v_∞ [m/s], a further pressure on all blocks and its rate [Pa, Pa/s], τ_0 of every block [Pa] if there is
             mass, and inputs u.
@@ -191,7 +192,7 @@ class CoupledSliders:
         return np.asarray(normal * mu + self.damping * np.exp(y[N : 2 * N]))
 
     def stressed(self, y: "np.ndarray", stress: "np.ndarray") -> "np.ndarray":
-        """Vector y after a step of the stress [Pa] on every block; unchanged if blocks have mass."""
+        """Vector y after a step of the stress [Pa] on every block; y itself if the blocks have mass."""
         from scipy.optimize import brentq
 
         if self.mass:
@@ -226,19 +227,20 @@ class BlockEvent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlidersRun:
-    """A run of coupled blocks. Arrays are instants × blocks, but the pressure is instants × cells or wells.
+    """A run of coupled blocks. Arrays have shape (instants, blocks); `pressure` has shape (instants, cells or wells).
 
     Attributes
     ----------
     times, slip, slip_rate, state, pressure : ndarray
-        [s], [m], [m/s], [s], [Pa].
+        Time [s], slip [m], slip rate [m/s], friction state [s], pressure [Pa].
     reference : ndarray
         Displacement of the far end, or r of a controlled run [m].
     onsets : ndarray
-        Times [s] at which the fastest block rises through the onset rate.
+        Times [s] at which the slip rate of the fastest block rises through the onset rate.
     onset_rate, loading_rate : float
         [m/s].
     evaluations : int
+        Number of evaluations of the right-hand side. {undocumented}
     """
 
     times: "np.ndarray"
@@ -258,7 +260,7 @@ class SlidersRun:
         return np.asarray(self.slip_rate.max(axis=1))
 
     def events(self, moment_per_slip: "np.ndarray | None" = None) -> tuple[BlockEvent, ...]:
-        """Events, with the seismic moment of every block per slip [N] for the magnitude."""
+        """Events of the run. Magnitudes need `moment_per_slip`, the seismic moment per slip of every block [N]."""
         below, found = self.fastest <= self.onset_rate, []
         falls = np.flatnonzero(~below[:-1] & below[1:])
         for onset in self.onsets:
@@ -288,7 +290,7 @@ class SlidersRun:
 
 
 def _run_of(sliders: CoupledSliders, times: np.ndarray, values: np.ndarray, far: Any = 0.0, *more: Any) -> SlidersRun:
-    """A run from vectors y and the far end's displacement; `more` are its rate, onsets, onset rate, evaluations."""
+    """A run from vectors y and the far end's displacement [m]; `more`: its rate, onsets, onset rate, evaluations."""
     N, (rate, onsets, onset, evaluations) = len(sliders.laws), more or (0.0, np.empty(0), math.inf, 0)
     return SlidersRun(
         times=times,
@@ -328,20 +330,25 @@ def simulate_sliders(
     loading_rate : float
         v_∞ [m/s].
     inputs : sequence of (float, sequence of float)
-        Times [s] from 0 on at which inputs u change, and their new values.
+        Times [s], the first 0, at which the inputs u change, and the new values of u.
     onset_rate : float
         Slip rate [m/s] above which an event begins.
     times : sequence of float, optional
-        Ascending instants to return [s] in addition to start, changes of inputs and end; every step unless given.
+        Ascending output times [s], in addition to both ends and the times of `inputs`; every step unless given.
     method, rtol
-        As for `simulate_state`.
+        As in `simulate_state`.
+
+    Raises
+    ------
+    ParameterError
+        If the duration or the displacement of the far end is too large.
     """
     require_positive(duration=duration)
     slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
     if duration > _LONGEST_RUN or duration * loading_rate > _FARTHEST * min(slips):
         raise ParameterError(
-            f"a run of blocks must last at most {_LONGEST_RUN:g} s, in which the far end moves at most {_FARTHEST:g} "
-            f"critical slips. Received {duration:g} s at {loading_rate:g} m/s. Shorten the duration."
+            f"duration must be at most {_LONGEST_RUN:g} s, and the far end must move by at most {_FARTHEST:g} critical "
+            f"slips. Received {duration:g} s at {loading_rate:g} m/s. Shorten the duration."
         )
     N, n = sliders.sizes
     prestress = tuple(sliders.resisting(start)) if sliders.mass else ()
@@ -378,18 +385,18 @@ def natural_cycles(
     method: str = "radau",
     rtol: float = RTOL,
 ) -> SlidersRun:
-    """Blocks under remote loading; block i of N starts at the loading rate with 1 + i/N times its steady state.
+    """Simulate blocks under remote loading; block i = 1 … N has the initial state 1 + i/N times its steady state.
 
     Parameters
     ----------
     chain : BlockChain
         With rate-and-state friction.
     duration : float, optional
-        [s]; by default until three events have begun, or the load reaches 640 times aσ' of block 1.
+        [s]; by default until three events have begun, or until the load reaches 640 aσ' of the first block.
     loading_rate : float, optional
         v_∞ [m/s]; the reference rate of the friction of the first block unless given.
     inertia : bool
-        Whether blocks have their mass.
+        Whether the inertia of the blocks is included.
     method, rtol
         As for `simulate_state`.
     """
@@ -431,20 +438,20 @@ def simulate_sampled_blocks(
     inertia: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> SlidersRun:
-    """Blocks under a sampled law that tracks the reference of slow sliding, from steady sliding at its first rate.
+    """Simulate blocks under a sampled law that tracks the slow-sliding reference, initially at its first rate.
 
-    The planned pressure reaches the blocks directly; the feedback pressure passes the lag. The far end rests. A sine of
-    stress acts on block i of N from t = 0, with the phase 2πi/N, i from 0.
+    The planned pressure reaches the blocks directly; the feedback pressure passes the lag. The far end is fixed.
+    A sinusoidal stress acts on block i = 0 … N − 1 from t = 0, with the phase 2πi/N.
 
     Parameters
     ----------
     chain : BlockChain
     law : MatrixLaw
-        From slip errors [m], or their averages, one for each well, to pressures [MPa].
+        Its inputs are the slip errors of the blocks [m], or one average per well; its outputs are pressures [MPa].
     lag : float
-        [s].
+        Time constant of the lag [s].
     stress, period : float
-        Amplitude [Pa] and period [s].
+        Amplitude [Pa] and period [s] of the stress.
     duration : float, optional
         [s]; the operation time unless given.
     inertia : bool
@@ -453,13 +460,13 @@ def simulate_sampled_blocks(
     Returns
     -------
     SlidersRun
-        Four instants per sample; its pressures are those of the wells without the planned pressure.
+        Four instants per sampling period. `pressure` is the feedback pressure of the wells.
     """
     length, step = chain.fault.reference.operation_time if duration is None else duration, float(law.step)
     require_positive(duration=length, stress_period=period, lag=lag)
     if length > _MOST_PERIODS * step:
         raise ParameterError(
-            f"a run of blocks under a law must last at most {_MOST_PERIODS:g} samples, {_MOST_PERIODS * step:g} s. "
+            f"duration must be at most {_MOST_PERIODS:g} sampling periods, {_MOST_PERIODS * step:g} s. "
             f"Received {length:g} s. Shorten the duration."
         )
     sliders, course = CoupledSliders.of(chain, inertia=inertia, lag=lag), SlidingReference(task=chain.fault.reference)
@@ -469,7 +476,7 @@ def simulate_sampled_blocks(
     y = sliders.start([V] * N, [float(one.steady_state(V)[0]) for one in sliders.laws])
     prestress = sliders.resisting(y)
     y = sliders.stressed(y, stress * np.sin(phases))
-    time, held, state = ca.MX.sym("t"), ca.MX.sym("told", m), ca.MX.sym("y", len(y))
+    time, held, state = ca.MX.sym("t"), ca.MX.sym("held", m), ca.MX.sym("y", len(y))
     planned = per_slip * course.slip(time)
     load = ca.vertcat(0, planned, ca.jacobian(planned, time), ca.DM(prestress) if inertia else ca.MX(0, 1), held)
     stresses = stress * ca.sin(turn * time + ca.DM(phases)), stress * turn * ca.cos(turn * time + ca.DM(phases))

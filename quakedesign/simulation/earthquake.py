@@ -1,6 +1,6 @@
 """Natural earthquake of an uncontrolled fault, and runs that end before their event.
 
-For such a run the time of onset is extrapolated with the growth rate of the unstable eigenvalue.
+For a run that ends before its event, the onset is extrapolated with the growth rate of the unstable eigenvalue.
 """
 
 from collections.abc import Callable
@@ -21,12 +21,12 @@ from quakedesign.symbolic import derive
 # ----------------------------------------------------------------------
 # Natural earthquake.
 
-NUDGE = 1e-9  # relative to the largest change of friction: far above rounding, with no effect on the peak
+NUDGE = 1e-9  # relative to the largest friction drop: far above rounding errors, too small to affect the peak
 FOLDINGS = 90
 PERIODS = 100
-ENDING = 30, 10  # e-foldings and natural periods, for a growth rate far above the natural frequency
-FINENESS = 2e-3  # of 1/ω_n; steps across a kink of friction have an error of second order
-STILL = 1e3  # factor over the slip rate due to the nudge alone; a smaller peak shows no instability
+ENDING = 30, 10  # e-foldings and natural periods: least duration if the growth rate is far above the natural frequency
+FINENESS = 2e-3  # largest step, in units of 1/ω_n; a step across a kink of friction has an error of second order
+STILL = 1e3  # least ratio of the peak to the slip rate due to `NUDGE` alone; below it no instability has developed
 
 _PEAKS: dict[Fault, float | None] = {}
 _MOST_PEAKS = 64
@@ -40,9 +40,10 @@ def natural_earthquake(
     compiled: bool | None = None,
     plant: str | None = None,
 ) -> LoopTrajectory:
-    """Simulate an uncontrolled fault under a constant pressure and, if it is unstable, a tiny constant acceleration.
+    """Simulate an uncontrolled fault under constant pressure; an unstable one also has a tiny constant acceleration.
 
-    A fault with healing starts at its release. The acceleration is 1e-9 of the largest change of friction.
+    Healing is set to zero, since the acceleration cannot release a healed fault. The acceleration is 1e-9 times that of
+    the largest drop of friction.
     Acceleration and step are so small that the first six digits of the peak slip rate do not depend on them.
 
     Parameters
@@ -50,7 +51,7 @@ def natural_earthquake(
     fault : Fault
         Its own disturbance is ignored.
     pressure : float
-        Fluid pressure [Pa] from t = 0 on: 0 for a natural, positive for an induced earthquake.
+        Fluid pressure [Pa] for t ≥ 0: 0 for a natural earthquake, positive for an induced one.
     progress, compiled, plant
         As in `simulate`.
 
@@ -58,13 +59,13 @@ def natural_earthquake(
     -------
     LoopTrajectory
         Over 90 e-foldings of the unstable eigenvalue, or 30 of them and 10 natural periods if that is longer, or 100
-        natural periods of a stable fault, which stays at rest; steps of at most 2e-3/ω_n. Of the metrics only
-        `peak_slip_rate`, `steps` and `seconds` are given.
+        natural periods of a stable fault, which stays at rest. The step is at most 2e-3/ω_n. Its metrics are only
+        `peak_slip_rate`, `settled_from`, `steps`, `seconds` and, on the stick–slip plant, `time_at_rest_fraction`.
 
     Raises
     ------
     ParameterError
-        For a pressure that is not below the effective normal stress.
+        If the absolute value of the pressure is not below the effective normal stress.
     SimulationError
         If the fault is unstable but does not move.
     """
@@ -97,18 +98,18 @@ def natural_earthquake(
 
 
 def _with_peak(earthquake: LoopTrajectory, fault: Fault, growth: float) -> LoopTrajectory:
-    """Event of an unstable fault with its peak as criterion; an error if the nudge alone moves the fault."""
+    """Run with its peak as criterion. Raises if the peak is only that due to the small acceleration."""
     peak = earthquake.metrics.peak_slip_rate  # None if the run diverges
     if peak is not None and peak <= STILL * event_nudge(fault) / growth:
         raise SimulationError(
             f"{fault.name} is unstable (eigenvalue {growth:.4g} 1/s), but it stays at rest in simulation: the peak is "
-            f"{peak!r} m/s. Rounding may hide its friction; check the parameters of the friction law."
+            f"{peak!r} m/s. The friction drop may be lost in rounding: check the parameters of the friction law."
         )
     return replace(earthquake, criterion=OutcomeCriterion.of(fault, peak))
 
 
 def natural_peak(fault: Fault) -> float | None:
-    """Largest slip rate [m/s] of a fault without control; None for a stable one. Computed once for every fault."""
+    """Peak slip rate [m/s] of the uncontrolled fault; None for a stable fault. The last 64 results are cached."""
     alone = _alone(fault)
     if alone not in _PEAKS:
         natural_earthquake(alone, compiled=False)
@@ -117,13 +118,13 @@ def natural_peak(fault: Fault) -> float | None:
 
 def _alone(fault: Fault) -> Fault:
     """Fault reduced to the properties on which its natural earthquake depends."""
-    longest = min(fault.reference.operation_time, 1e4 * fault.sampling_time)  # a fault without control has no task
+    longest = min(fault.reference.operation_time, 1e4 * fault.sampling_time)  # the result does not depend on the task
     task = replace(fault.reference, operation_time=longest)
     return replace(fault, reference=task).with_disturbance(Disturbance()).with_box("paper")
 
 
 def event_nudge(fault: Fault) -> float:
-    """Acceleration [m/s²] that is small compared with that of an event."""
+    """Initiating acceleration [m/s²], 1e-9 times that of the largest friction drop."""
     low, high = fault.friction.bounds
     return NUDGE * (high - low) * fault.authority * fault.effective_normal_stress
 
@@ -132,16 +133,16 @@ def event_nudge(fault: Fault) -> float:
 # Uncontrolled runs of unstable faults that end before the earthquake begins.
 
 BEGUN_SHARE = 0.01
-"""Share of the natural peak: slip rates above it are no longer exponential growth from rest."""
+"""Fraction of the natural peak above which the slip rate no longer grows exponentially."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Waiting:
-    """An event that has not begun."""
+class PendingEvent:
+    """Expected event that has not begun by the end of the run."""
 
     growth: float  # Real part of the unstable eigenvalue [1/s]
-    # Time [s] at which the slip rate would reach 10 % of the natural peak, if it grows at this rate from the end of the
-    # run; None for a fault that has not moved forward
+    # Time [s] at which the slip rate would reach 10 % of the natural peak if it grew at `growth` after the end of the
+    # run; None if the fault has not slipped forward
     onset: float | None
 
     def to_dict(self) -> Json:
@@ -149,7 +150,7 @@ class Waiting:
         return asdict(self)
 
 
-def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
+def waiting(run: Trajectory, fault: Fault) -> PendingEvent | None:
     """Event that has not begun in an uncontrolled run; None if it has begun, or if none is expected."""
     natural, reached = run.natural_peak, run.outcome.share_of_natural
     if run.provenance["controller"] != "none" or natural is None or reached is None or reached >= BEGUN_SHARE:
@@ -157,4 +158,4 @@ def waiting(run: Trajectory, fault: Fault) -> Waiting | None:
     growth = derive(fault).eigenvalues[0].real
     speed = max(float(run.slip_rate[-1]), growth * float(run.slip[-1]))
     onset = float(run.time[-1]) + log(EARTHQUAKE_SHARE * natural / speed) / growth if speed > 0 else None
-    return Waiting(growth=growth, onset=onset)
+    return PendingEvent(growth=growth, onset=onset)

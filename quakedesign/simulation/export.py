@@ -39,29 +39,29 @@ SOURCE, HEADER = "controller.c", "controller.h"
 _WIDTH = 110
 _USE = """
 Call controller_reset once, and controller_step every CONTROLLER_STEP seconds: it reads CONTROLLER_MEASUREMENTS
-numbers{inputs}, updates CONTROLLER_MEMORY numbers, and writes {written} to hold until the next call (zero-order hold).
-{limited} The reference of
-the fault is computed from the number of calls. The functions have no state between calls except the memory argument,
-allocate nothing, and may be called from several threads with different memories. Numbers that
-are not finite are not detected: check measurement and pressure.
+numbers{inputs}, updates CONTROLLER_MEMORY numbers, and writes {written} to be held until the next call (zero-order
+hold). {limited} The reference of
+the fault is computed from the number of calls. The functions keep their state in the memory argument alone,
+allocate nothing, and may be called from several threads with different memories. Infinite and NaN
+values are not detected: check the measurement and the pressure.
 """
 _USE_OF_ONE = {
     "inputs": " and the pressure [Pa] that was applied since the last call",
     "written": "the fluid pressure [Pa]",
-    "limited": "If pump or valve limit the pressure, give the applied pressure to prevent windup of the law, as in "
-    "simulate --saturation; else give a null pointer.",
+    "limited": "If the pump or a valve limits the pressure, pass the applied pressure, which prevents windup as in "
+    "simulate --saturation; otherwise pass a null pointer.",
 }
-_PLAN = "planned pressure"  # key of an entry of `facts` that only laws for several blocks in slow sliding have
+_PLAN = "planned pressure"  # key in `facts`, present only for laws of several blocks in slow sliding
 _USE_OF_WELLS = {
     "inputs": "",
     "written": "the fluid pressure [Pa] of CONTROLLER_PRESSURES wells{beside}",
-    "limited": "{plan}If pump or valve limit a pressure, the law winds up: proved pressures must be within the limits.",
+    "limited": "{plan}If pump or valve limits act, the law winds up: the proved pressures must be within the limits.",
 }
-_ADDED = """Add the planned pressure (below) to each, continuously in time and not in steps: the proof assumes that the
-planned pressure reaches the fault unchanged, and that the pressure written here passes through the proved lag. """
+_ADDED = """Add the planned pressure (below) to each, as a continuous function of time: the proof assumes that the
+planned pressure reaches the fault unchanged, and that the pressure written here passes through the lag. """
 _APPLIED_INPUT = " and the pressure [Pa] applied since the last call"
 _APPLIED = """
-   applied may be a null pointer: then the pressure of the last call counts as applied (0 before the first call)."""
+   applied may be a null pointer: the pressure of the last call is then taken as applied (0 before the first call)."""
 _COMPILE = "Compile with: cc -std=c99 -O2 -ffp-contract=off -c controller.c, and link with -lm."
 
 
@@ -95,7 +95,7 @@ class ControllerStep:
 
     @property
     def limited(self) -> bool:
-        """Whether the applied pressure is an argument."""
+        """Whether `function` has the applied pressure as an argument."""
         return bool(self.function.n_in() == 3)
 
     @property
@@ -105,7 +105,7 @@ class ControllerStep:
         return ("pressure",) if self.limited else tuple(f"pressure_{i + 1}" for i in range(count))
 
     def to_dict(self) -> Json:
-        """Return the data of the step in JSON types."""
+        """Return the data of the step, without `function`, in JSON types."""
         return {
             "step": self.step,
             "measurement": dict(self.measurement),
@@ -116,9 +116,9 @@ class ControllerStep:
 
 
 def header_text(exported: ControllerStep) -> str:
-    """Text of the header with the meaning of every number."""
+    """Text of the C header, with the meaning of every input, output and memory entry."""
     measured = (f"measurement[{i}]: {name} [{unit}]" for i, (name, unit) in enumerate(exported.measurement.items()))
-    kept = (f"memory[{i}]: {name}, {value!r} at the start" for i, (name, value) in enumerate(exported.start.items()))
+    kept = (f"memory[{i}]: {name}, initial value {value!r}" for i, (name, value) in enumerate(exported.start.items()))
     facts = (f"{name}: {value}" for name, value in exported.facts.items())
     parts = [part for remark in exported.remarks for part in (*_wrapped(remark), "")]
     added = {"beside": ", in addition to the planned pressure,", "plan": _ADDED} if _PLAN in exported.facts else {}
@@ -171,7 +171,7 @@ def _wrapped(text: str) -> list[str]:
 
 
 def _comment(lines: list[str]) -> str:
-    """Lines in one C comment, which no text of the user can terminate."""
+    """Lines as one C comment; text from the user cannot terminate it."""
     wrapped = [part for line in lines for part in (textwrap.wrap(" ".join(line.split()), _WIDTH) or [""])]
     safe = "\n".join(f" * {line}".rstrip() for line in wrapped).replace("*/", "* /")
     return "/*\n" + safe + "\n */\n"
@@ -187,11 +187,11 @@ _PLATFORMS = {"Linux": ("linux64", "so"), "Darwin": ("darwin64", "dylib")}
 
 
 def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
-    """Bytes of an FMU of a sampled step, and the platform of its binary or the reason why it has none.
+    """Bytes of an FMU of a sampled step; and the platform of its binary, or the reason why it has no binary.
 
     Inputs are the measurement and, for one block, ``applied`` [Pa], the pressure that pump or valve applied since the
-    last sample. By default the commanded pressure counts as applied. A value that is set after initialisation stays in
-    force until it is set again: then set it before every sample, or the law winds up. The output ``pressure`` [Pa], for
+    last sample. Unless set, it equals the commanded pressure. Once set after initialisation, it keeps its value:
+    set it again before every sample, or the law winds up. The output ``pressure`` [Pa], for
     several wells ``pressure_1`` and so on, is the command of the last sample. Samples are T_s apart, from the start of
     the experiment. The FMU contains the sources, so that any platform can compile them.
 
@@ -267,7 +267,7 @@ def _zipped(members: dict[str, bytes]) -> bytes:
 
 FILES = (HEADER, SOURCE, UNIT)
 HELD = "held_0"  # memory entry: the pressure of the last sample
-_LISTED_APART = ("gains", "sampling")  # written in another form
+_LISTED_APART = ("gains", "sampling")  # listed separately
 
 
 def controller_step(
@@ -278,7 +278,7 @@ def controller_step(
     scheme: str | Scheme | None = None,
     remarks: tuple[str, ...] = (),
 ) -> ControllerStep:
-    """Sampled step of a controller, built from that of `simulate` with the same scheme, without noise.
+    """Sampled step of a controller, as in `simulate` with the same scheme, but without noise.
 
     Parameters
     ----------
@@ -286,10 +286,10 @@ def controller_step(
         Gives the reference, and the input gain if the scheme needs it.
     controller : Controller
     step : float, optional
-        T_s [s]; unless given, that of a sampled law, or else the fault's sampling time.
+        T_s [s]; by default that of a sampled law, or else the fault's sampling time.
     scheme : str or Scheme, optional
-        A sampled scheme; unless given, that of a sampled law, or else ``explicit``. Only the software part of its
-        measurement is exported. Inputs are the slip and, if the step uses it, the slip rate.
+        A sampled scheme; by default that of a sampled law, or else ``explicit``. Of its measurement only the part that
+        runs in software is exported. The inputs of the step are the slip and, if it is used, the slip rate.
     remarks : tuple of str
         Further sentences at the top of the header, after those on T_s and on the stages between controller and fault.
 
@@ -369,7 +369,7 @@ def export_controller(
 def write_step(
     exported: ControllerStep, folder: str | Path, *, fmu: bool = False, force: bool = False
 ) -> ControllerStep:
-    """Write the files of a sampled step; folder, fmu, force and errors as of `export_controller`."""
+    """Write the files of a sampled step; folder, fmu, force and errors as in `export_controller`."""
     target = Path(folder)
     require_free(target, force)
     contents: dict[str, str | bytes] = {HEADER: header_text(exported), SOURCE: source_text(exported, HEADER)}
@@ -390,7 +390,7 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
     chain : BlockChain
         Gives the reference, and the averages that wells measure.
     law : MatrixLaw
-        Without delay, as that of a guarantee.
+        Law without delay, such as the law that a guarantee returns.
     remarks : tuple of str
         Sentences at the top of the header.
 
@@ -417,24 +417,26 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
 
 
 def require_free(folder: Path, force: bool) -> None:
-    """Reject an existing folder; with `force` only one that contains other files than an export."""
+    """Raise if the folder exists; with `force`, only if it contains files other than those of an export."""
     if os.path.exists(folder) and not force:
         raise OutputError(
             f"the folder of an export must be new. Received {folder}, which exists. Give --force to replace it."
         )
     if os.path.exists(folder) and not (folder.is_dir() and {f.name for f in folder.iterdir()} <= set(FILES)):
-        raise OutputError(f"only a folder with {', '.join(FILES)} is replaced. Received {folder}. Choose a new folder.")
+        raise OutputError(
+            f"only a folder with no files but {', '.join(FILES)} is replaced. Received {folder}. Choose another."
+        )
     require_writable(folder)
 
 
 def _software(scheme: Scheme) -> Sampled:
     """Scheme without noise, transducer and substeps; rejects a scheme that a controller cannot execute."""
     if not isinstance(scheme, Sampled):
-        raise ParameterError(f"a controller is exported with a sampled scheme. Received {scheme.name}. Use explicit.")
+        raise ParameterError(f"export needs a sampled scheme. Received {scheme.name}. Use explicit.")
     if scheme.actuator.flowing:
         names = ", ".join(stage.name for stage in scheme.actuator.flowing)
         raise ParameterError(
-            f"a stage that changes the pressure between samples belongs to the plant. Received {names}. "
+            f"a stage with continuous-time dynamics is part of the plant and is not exported. Received {names}. "
             "Remove it from the scheme."
         )
     return replace(scheme, measurement=scheme.measurement.software, substeps=1)
@@ -458,7 +460,7 @@ def _function(loop: ClosedLoop, scheme: Sampled, step: float, measured: int) -> 
     own = [next(entries) if c else ca.SX(v) for v, c in zip(values, changing, strict=True)]
     change, *before = entries if count else (ca.SX(0),)
     commanded, own[names.index(HELD)] = own[names.index(HELD)], applied
-    for i in range(count):  # anti-windup, which `Sampled` does within a sample, where it knows the limit
+    for i in range(count):  # anti-windup; in simulation `Sampled` knows the limit and does this within the sample
         own[i] = ca.if_else((commanded - applied) * change > 0, before[i], own[i])
     state = ca.vertcat(measurement, ca.SX(2 - measured, 1), *own)
     moved = _after(loop, scheme, counter, state, step)
@@ -478,7 +480,7 @@ def _remarks(fault: Fault, controller: Controller) -> tuple[str, ...]:
     own = controller.sampling
     path = {"a delay of": own.delay, "a lag of": own.lag, "a diffusion path of L^2/D =": own.diffusion} if own else {}
     between = ", ".join(f"{what} {float(time):g} s" for what, time in path.items() if time)
-    behind = f"designed for {between} between controller and fault: the pressure is the command to the valve"
+    behind = f"designed for {between} between controller and fault: the output is the pressure commanded to the valve"
     by_a_clock = (
         f"to be called periodically, once every {float(own.step):.6g} s, since the reference is computed from the "
         "number of calls; the guarantee for aperiodic sampling covers periodic sampling"

@@ -1,4 +1,4 @@
-"""User-defined inputs of a run: perturbation as text, and prescribed fluid pressure.
+"""User-defined inputs of a run: a perturbation given as text, and a prescribed fluid pressure.
 
 The perturbation is an acceleration [m/s²]; the pressure [Pa] is piecewise linear in time and may have
 steps.
@@ -48,17 +48,17 @@ def perturbation(text: str) -> "sp.Expr":
     Raises
     ------
     ParameterError
-        For other text, or a value that is not a real number.
+        For text outside this grammar, or a number that is not real and finite.
     """
     try:
         tree = parsed(text.strip(), "eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise _refusal(text, text) from None
+        raise _text_error(text, text) from None
     if (nodes := sum(1 for _ in ast.walk(tree))) > MOST_NODES:
         raise ParameterError(f"a perturbation must be short, {MOST_NODES} terms at most. Received {nodes}. Shorten it.")
     expression = _value(tree.body, text.strip())
     if not all(part.is_real and part.is_finite for part in sp.preorder_traversal(expression) if part.is_number):
-        raise _refusal(text, text)
+        raise _text_error(text, text)
     return expression
 
 
@@ -77,21 +77,21 @@ def _value(node: ast.expr, text: str) -> sp.Expr:
             return _OPERATIONS[type(operation)](_value(left, text), _value(right, text), text)
         case ast.Call(func=ast.Name(id=name), args=[_, *_] as arguments, keywords=[]) if name in FUNCTIONS:
             if len(arguments) > 1 and name not in ("Min", "Max"):
-                raise _refusal(text, f"{name} of {len(arguments)} arguments")
+                raise _text_error(text, f"{name} of {len(arguments)} arguments")
             return getattr(sp, name)(*(_value(argument, text) for argument in arguments))
-    raise _refusal(text, ast.get_source_segment(text, node) or text)
+    raise _text_error(text, ast.get_source_segment(text, node) or text)
 
 
 def _power(base: sp.Expr, exponent: sp.Expr, text: str) -> sp.Expr:
     digits = max(base.p.bit_length(), base.q.bit_length()) if base.is_Rational else 1
     if not (exponent.is_Rational and abs(exponent) * digits <= MOST_BITS):
-        raise _refusal(text, f"the exponent {str(exponent)[:40]}")
+        raise _text_error(text, f"the exponent {str(exponent)[:40]}")
     return base**exponent
 
 
 def _quotient(numerator: sp.Expr, denominator: sp.Expr, text: str) -> sp.Expr:
     if denominator == 0:
-        raise _refusal(text, "a division by zero")
+        raise _text_error(text, "a division by zero")
     return numerator / denominator
 
 
@@ -104,7 +104,7 @@ _OPERATIONS: dict[type[ast.operator], Callable[[sp.Expr, sp.Expr, str], sp.Expr]
 }
 
 
-def _refusal(text: str, part: str) -> ParameterError:
+def _text_error(text: str, part: str) -> ParameterError:
     inside = f" in {text!r}" if part != text else ""
     return ParameterError(
         f"a perturbation consists of numbers, pi, {', '.join(SYMBOLS)}, + - * / ** with numbers as exponents, and "
@@ -122,13 +122,13 @@ _UNITS = {"time": "s", "pressure": "Pa"}
 
 
 @checked_dataclass(frozen=True, kw_only=True)
-class PressureCourse:
-    """Pressure p(t): constant before the first and after the last instant, linear between, a step at a repeated one.
+class PressureHistory:
+    """Pressure p(t): linear between instants, constant before the first and after the last; a repeated time is a step.
 
     Attributes
     ----------
     times : tuple of float
-        [s], never descending, each at most twice.
+        Times [s] in nondecreasing order, each at most twice.
     pressures : tuple of float
         [Pa], one for each time.
     """
@@ -139,8 +139,8 @@ class PressureCourse:
     def __post_init__(self) -> None:
         if not 0 < len(self.times) == len(self.pressures) <= MOST_POINTS:
             raise ParameterError(
-                f"a course of pressure must have 1 to {MOST_POINTS} instants, each with a pressure. Received "
-                f"{len(self.times)} times and {len(self.pressures)} pressures. Omit instants on a straight line."
+                f"a pressure history must have 1 to {MOST_POINTS} times, and one pressure for each. Received "
+                f"{len(self.times)} times and {len(self.pressures)} pressures. Omit points on a straight line."
             )
         if not all(map(is_finite, (*self.times, *self.pressures))):
             wrong = next(value for value in (*self.times, *self.pressures) if not is_finite(value))
@@ -148,12 +148,12 @@ class PressureCourse:
         thrice = any(late <= early for early, late in zip(self.times, self.times[2:], strict=False))
         if thrice or any(late < early for early, late in pairwise(self.times)):
             raise ParameterError(
-                "times of a course of pressure must ascend, with at most two equal times, for a step. "
-                f"Received {shown(list(self.times))} s. Sort them."
+                "times of a pressure history must not decrease, and a time may occur at most twice (a step). "
+                f"Received {shown(list(self.times))} s. Sort them, and remove repeated times."
             )
 
     @classmethod
-    def constant(cls, pressure: float) -> "PressureCourse":
+    def constant(cls, pressure: float) -> "PressureHistory":
         """The same pressure [Pa] at all times."""
         return cls(times=(0.0,), pressures=(pressure,))
 
@@ -182,8 +182,8 @@ class PressureCourse:
         return low + (high - low) * (time - start) / (end - start)
 
 
-def pressure_course(text: str) -> PressureCourse:
-    """Course from a quantity such as ``"5 MPa"``, instants, or the path of a CSV file.
+def pressure_history(text: str) -> PressureHistory:
+    """Pressure history from a quantity such as ``"5 MPa"``, a list of instants, or the path of a CSV file.
 
     Parameters
     ----------
@@ -195,16 +195,16 @@ def pressure_course(text: str) -> PressureCourse:
     Raises
     ------
     ParameterError, UnitError
-        For another form or unit, no instant or more than 4096, or times that descend.
+        For another form or unit, for no instant or more than 4096, or for times that decrease.
     """
     if Path(text).suffix.lower() == ".csv":
         rows = list(_rows(text))
     elif ":" in text:
         rows = [_instant(part) for part in text.split(",")]
     else:
-        return PressureCourse.constant(_number(text, "pressure"))
+        return PressureHistory.constant(_number(text, "pressure"))
     times, pressures = zip(*rows, strict=True) if rows else ((), ())
-    return PressureCourse(times=tuple(times), pressures=tuple(pressures))
+    return PressureHistory(times=tuple(times), pressures=tuple(pressures))
 
 
 def _number(text: str, name: str) -> float:
@@ -218,7 +218,7 @@ def _instant(part: str) -> tuple[float, float]:
     time, colon, pressure = part.partition(":")
     if not colon:
         raise ParameterError(
-            f"an instant of a course of pressure must be written 'time: pressure'. Received {shown(part)}. "
+            f"a point of a pressure history must be written 'time: pressure'. Received {shown(part)}. "
             "Write for example '1 day: 5 MPa'."
         )
     return _number(time, "time"), _number(pressure, "pressure")
@@ -243,7 +243,7 @@ def _unit_of(name: str, column: str) -> str:
     word, bracket, unit = column.strip().partition("[")
     if word.strip().lower() != name or not bracket or not unit.endswith("]"):
         raise UnitError(
-            f"a course of pressure must have the columns 'time [s]' and 'pressure [Pa]', in this order, with any units "
-            f"of these dimensions. Received {shown(column)}. Name the columns in the first row."
+            f"a pressure history must have the columns 'time [s]' and 'pressure [Pa]', in this order; other units of "
+            f"time and pressure are accepted. Received {shown(column)}. Name the columns in the first row."
         )
     return unit[:-1]

@@ -1,7 +1,7 @@
 """Integrators by name: fixed-step Runge–Kutta, and adaptive CVODES and IDAS.
 
-Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: backward differentiation formulas
-of SUNDIALS through CasADi. The last function tests whether a fixed step is short enough for a linear loop.
+Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: backward differentiation formulas of
+SUNDIALS, called through CasADi. The last function tests whether a fixed step is short enough for a linear loop.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -32,10 +32,8 @@ class Integrator:
     source : str
     order : int
         Order of convergence on smooth problems.
-    nodes : tuple of Fraction
-    matrix : tuple of tuple of Fraction
-        Row i contains the weights of the stages before i.
-    weights : tuple of Fraction
+    nodes, matrix, weights
+    Butcher tableau c, A and b; row i of A contains the weights of the stages before i.
     """
 
     name: ClassVar[str]
@@ -52,8 +50,7 @@ class Integrator:
         Parameters
         ----------
         field : callable
-            Time derivative of the state [its unit per s] as a function of the elapsed share of the step
-            [-, 0 to 1] and the state.
+            Time derivative of the state as a function of the elapsed fraction of the step [-], 0 … 1, and of the state.
         state : SX, float or ndarray
         step : SX or float
             [s].
@@ -71,7 +68,7 @@ class Integrator:
 
 
 class DormandPrince(Integrator):
-    """Fifth-order method of the 5(4) pair with six stages, as Simulink's ode5."""
+    """Fifth-order, six-stage method of the 5(4) pair, the same as Simulink's ode5."""
 
     name: ClassVar[str] = "dormand-prince"
     source: ClassVar[str] = "Dormand and Prince (1980), J. Comput. Appl. Math. 6, 19"
@@ -106,19 +103,19 @@ class ClassicRungeKutta(Integrator):
 
 TIGHTEST, LOOSEST = 1e-13, 1e-3  # relative tolerances that a run may have
 RTOL = 1e-9  # default relative tolerance
-TIGHT_RTOL = 1e-11  # of velocity steps, and of slow sliding and blocks under control: small differences
-CYCLE_RTOL = 1e-8  # of commands that run seismic cycles
-FLOOR = 1e-4  # share of a variable's size below which its tolerance is absolute
+TIGHT_RTOL = 1e-11  # default for velocity steps and controlled slow sliding (small differences)
+CYCLE_RTOL = 1e-8  # default of the commands that simulate seismic cycles
+FLOOR = 1e-4  # fraction of the scale of a variable below which its tolerance is absolute
 _MOST_STEPS = 20000  # between two requested instants
-_ITERATION_ERROR = 1e-3  # share of the tolerance; with the default 0.33 the slip of stiff earthquakes drifts by 1 %
+_ITERATION_ERROR = 1e-3  # fraction of the tolerance; the default 0.33 gives 1 % error of slip in stiff runs
 
 
 class StoppedError(RuntimeError):
-    """The solver stopped; its caller reports the time."""
+    """The solver stopped. The caller adds the time to the message."""
 
 
 class AdaptiveIntegrator:
-    """A solver of smooth, possibly stiff problems to a tolerance, with output at any instants.
+    """An adaptive solver for smooth, possibly stiff problems, with output at arbitrary instants.
 
     Discontinuities are not located, since CasADi's events are not used: the caller must reject a discontinuous
     field.
@@ -149,11 +146,11 @@ class AdaptiveIntegrator:
         rates : casadi.Function
             (t [s], y, parameters) → dy/dt, and optional integrands of quadratures.
         scales : sequence of float
-            Size of each variable; below `FLOOR` times this size the tolerance is absolute.
+            Scale of each variable; below `FLOOR` times this scale its tolerance is absolute.
         shares : sequence of float
             Ascending output instants in (0, 1], as shares of the interval.
         rtol : float
-            Tolerance of one step relative to a variable, 1e-13 … 1e-3.
+            Relative tolerance of one step, 1e-13 … 1e-3.
         quadratures : int
             Number of integrands in the second output of `rates`; they do not influence the step size.
 
@@ -194,12 +191,12 @@ class Flow:
     def follow(
         self, time: float, length: float, y: "np.ndarray", parameters: Sequence[float] = ()
     ) -> "tuple[np.ndarray, np.ndarray]":
-        """Values and integrals at the instants of an interval that starts at a time [s] and has a length [s].
+        """Values and integrals at the output instants of an interval from `time` [s] with `length` [s] and initial y.
 
         Returns
         -------
         tuple of ndarray
-            Shapes (variables, instants) and (integrals, instants); integrals start with the interval.
+            Shapes (variables, instants) and (integrals, instants); integrals are 0 at the beginning of the interval.
 
         Raises
         ------
@@ -223,7 +220,7 @@ def require_tolerance(rtol: float) -> None:
 
 
 def _reason(text: str) -> str:
-    """Name in the solver's message, such as ``CV_TOO_MUCH_WORK``."""
+    """Name of the error in the solver's message, such as ``CV_TOO_MUCH_WORK``."""
     quoted = text.split('"')
     return quoted[1] if len(quoted) > 2 else text.strip().splitlines()[-1]
 
@@ -268,7 +265,7 @@ def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
     if name not in known:
         raise ParameterError(
             f"method must be one of {', '.join(sorted(integrators()))} (fixed step) or "
-            f"{', '.join(sorted(adaptive_integrators()))} (to a tolerance, smooth loops). Received {name!r}."
+            f"{', '.join(sorted(adaptive_integrators()))} (adaptive step, smooth loops only). Received {name!r}."
             f"{nearest_name(name, known)}"
         )
     return known[name]
@@ -291,7 +288,7 @@ class Idas(AdaptiveIntegrator):
 
 
 def amplification(poles: Iterable[complex], step: float, method: str = "dormand-prince") -> float:
-    """Growth per step of the fastest growing mode [-] for poles [1/s] and a step [s]; stable below 1.
+    """Largest growth factor per step over the modes of given poles [1/s], for a step [s]; stable below 1.
 
     Valid for the scheme ``continuous``, where the law is part of the integrated field, not for a sampled law.
     """

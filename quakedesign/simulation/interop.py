@@ -1,7 +1,6 @@
 """Plants, laws and loops as CasADi functions and python-control systems.
 
-The second chapter linearises about an equilibrium: `StateSpace`, loop transfer function and stability
-margins.
+The second chapter linearises about an equilibrium: state space, loop transfer function and stability margins.
 """
 
 import math
@@ -45,14 +44,14 @@ def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters:
     controller : Controller, optional
     parameters : sequence of str, optional
         Free parameters of a fault without a controller: density [kg/m³], shear_modulus [Pa], damping [kg/s],
-        effective_normal_stress [Pa] or a friction parameter such as ``critical_slip`` [m]. They become one more
-        input, for sensitivities and estimation.
+        effective_normal_stress [Pa] or a friction parameter such as ``critical_slip`` [m]. They form an additional
+        input of the Function, for sensitivities and estimation.
 
     Returns
     -------
     casadi.Function
         Without a controller: (t [s], x = [x1 m, x2 m/s], p [Pa]) → dx, with `parameters` as a last input in their
-        order. With one: (t, x = [x1, x2, ξ…]) → dx, p, h [unit of ν], reference = [r m, r' m/s, r'' m/s²].
+        order. With one: (t [s], x = [x1, x2, ξ…]) → dx, p [Pa], h [m/s²], reference = [r m, r' m/s, r'' m/s²].
 
     Raises
     ------
@@ -84,12 +83,12 @@ def _free_plant(fault: Fault, controller: Controller | None, names: tuple[str, .
     known = (*plant.PARAMETERS, *fault.friction.quantities())
     if controller is not None:
         raise ParameterError(
-            f"free parameters need a fault without a controller. Received the controller {controller.name}. Omit it."
+            f"parameters apply only without a controller. Received the controller {controller.name}. Omit it."
         )
     for name in names:
         if name not in known or names.count(name) > 1:
             raise ParameterError(
-                f"parameters must be different ones of {', '.join(known)}. Received {name!r}"
+                f"parameters must be distinct names out of {', '.join(known)}. Received {name!r}"
                 f"{', twice' if name in known else ''}.{nearest_name(name, known) if name not in known else ''}"
             )
     acceleration, symbols = acceleration_with_parameters(fault, names)
@@ -104,13 +103,13 @@ def to_iosystem(subject: Fault | Controller) -> Any:
     ----------
     subject : Fault or Controller
         A fault has the input ``p`` [Pa] and the outputs ``slip`` [m] and ``slip_rate`` [m/s]. A controller has the
-        inputs ``slip``, ``slip_rate``, ``r`` [m] and ``r_rate`` [m/s], with feed-forward of r'' also ``r_acceleration``
-        [m/s²], and the output ``p``.
+        inputs ``slip`` [m], ``slip_rate`` [m/s], ``r`` [m], ``r_rate`` [m/s] and, with feed-forward of r'',
+        ``r_acceleration`` [m/s²]; and the output ``p`` [Pa].
 
     Returns
     -------
     control.NonlinearIOSystem
-        The system of a fault is linearised with exact derivatives, not differences; at rest, for forward slip.
+        Nonlinear system. `linearize` of a fault uses exact derivatives; at rest, those for forward slip.
 
     Raises
     ------
@@ -181,7 +180,7 @@ def _controller_system(controller: Controller) -> Any:
 
 
 def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
-    """One step of the law's own scheme; the states are those of the law and the memory of the scheme."""
+    """Discrete-time system of a sampled law; its states are those of the law and the memory of the scheme."""
     import control
 
     scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})
@@ -202,8 +201,8 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     later = ca.vertcat(after, kept, pressure)
     if ca.depends_on(later, unknown):  # r'', future values of r and r', or B0
         raise UnsupportedError(
-            "a controller without its fault has neither the input gain nor future references. Received a law whose "
-            f"scheme {sampling} uses them. Use simulate, or export the law."
+            "a controller without its fault knows neither the input gain nor future references. Received a law whose "
+            f"scheme, {sampling}, uses them. Use simulate, or export the law."
         )
     used = [i for i in range(len(names)) if ca.depends_on(later, state[i]) and not ca.is_equal(later[i], state[i])]
     fixed = [i for i in range(len(names)) if i not in used]
@@ -226,7 +225,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
 
 _GAINS = np.exp(np.linspace(0, math.log(1e4), 1000)[1:])  # gain factors at which stability is tested
 _FREQUENCIES = 5000
-_LINEAR = 1e-9  # tolerance of linearity: 2 f(x) against f(2 x), relative
+_LINEAR = 1e-9  # relative tolerance of the linearity test, 2 f(x) = f(2 x)
 
 
 def resting_pressure(fault: Fault, slip: float) -> float:
@@ -253,7 +252,7 @@ def to_statespace(
     disturbance: bool = False,
     **given: Quantity | None,
 ) -> Any:
-    """State space of a fault linearised about rest at a slip, in series with the loop setup if one is given.
+    """State space of a fault linearised about rest at a given slip, in series with the loop setup.
 
     Parameters
     ----------
@@ -274,8 +273,8 @@ def to_statespace(
     Returns
     -------
     control.StateSpace
-        In deviations: inputs ``p`` [Pa] and ``disturbance`` [m/s²] if requested; outputs ``slip`` [m] and ``slip_rate``
-        [m/s], the first states. Where friction has a kink, the derivative for forward slip.
+        In deviations from equilibrium: inputs ``p`` [Pa] and, if requested, ``disturbance`` [m/s²]; outputs and first
+        states ``slip`` [m] and ``slip_rate`` [m/s]. At a kink of friction, the derivative for forward slip.
 
     Raises
     ------
@@ -289,11 +288,11 @@ def to_statespace(
     setup = setup.with_given(**given)
     if unknown := setup.given().keys() - {"step", "delay", "lag", "diffusion"}:
         raise ParameterError(
-            f"a plant has step, delay, lag and diffusion of the loop setup. Received {', '.join(sorted(unknown))}. "
-            "Omit these."
+            f"to_statespace takes only step, delay, lag and diffusion of the loop setup. Received "
+            f"{', '.join(sorted(unknown))}. Omit these."
         )
     if setup.delay and setup.step is None:
-        raise ParameterError("a delay needs a step, for discrete time. Received a delay without step. Give step.")
+        raise ParameterError("delay requires discrete time. Received a delay without a step. Give step.")
     if vertex:
         A, B = _vertex(fault, tuple(vertex))
     else:
@@ -339,12 +338,12 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     ----------
     fault : Fault
     controller : Controller
-        A linear law, taken as it acts while the fault moves. A sampled law has a zero-order hold over its T_s.
+        A linear law, in the form that applies while the fault slips. A sampled law has a zero-order hold over T_s.
     at : float
         Slip [m] about which the fault is linearised.
     actuator : Actuator, optional
-        Delay, lag and diffusion path between law and fault, which are part of L. Unless given, those for which a
-        sampled law is designed; an `Actuator` without stages has none.
+        Delay, lag and diffusion path between law and fault, as part of L. By default those for which a sampled law is
+        designed; pass an `Actuator` without stages for none.
 
     Returns
     -------
@@ -372,23 +371,23 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     plant = plant * before if before.nstates else plant  # an actuator without states has gain 1
     if controller.sampling is not None:
         plant = _held(plant, controller.sampling.step, late)
-    return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["answer"])
+    return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["commanded"])
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class LoopMargins:
-    """How far one linear loop is from instability.
+    """Stability margins of one linear loop.
 
     Attributes
     ----------
     stable : bool
-        Whether the closed loop is stable; if not, the numbers below are no margins.
+        Whether the closed loop is stable; if not, the values below are not margins.
     gain_reduction : float or None
-        Largest factor below 1 on L that destabilises the loop (stabilises an unstable one) [-]; None if none does.
+        Largest factor below 1 on L at which stability changes [-]; None if there is none down to 1e-4.
     gain_margin : float or None
-        Smallest such factor above 1 [-]; None if there is none.
+        Smallest factor above 1 on L at which stability changes [-]; None if there is none up to 1e4.
     phase_margin : float or None
-        Smallest over all crossings [deg].
+        Smallest phase margin over all gain crossover frequencies [deg]; None if there is no crossover.
     modulus_margin : float
         min |1 + L| over all frequencies [-]: distance of the Nyquist curve from −1.
     """
@@ -404,7 +403,7 @@ def loop_margins(loop: Any) -> LoopMargins:
     """Upper and lower gain margins, phase margin and modulus margin of a loop of `loop_transfer`.
 
     A discrete-time loop may lose stability at half the sampling frequency, z = −1, which
-    ``control.stability_margins`` omits. Factors from 1e-4 to 1e4 are tried.
+    ``control.stability_margins`` omits. Gain factors from 1e-4 to 1e4 are tested.
 
     Parameters
     ----------
@@ -420,8 +419,8 @@ def loop_margins(loop: Any) -> LoopMargins:
 
     if not isinstance(loop, control.StateSpace | control.TransferFunction):
         raise ParameterError(
-            f"loop must be a StateSpace or TransferFunction of python-control. Received {shown(loop)}. "
-            "Use loop_transfer."
+            f"loop must be a StateSpace or TransferFunction of python-control, as from loop_transfer. "
+            f"Received {shown(loop)}."
         )
     if (loop.ninputs, loop.noutputs) != (1, 1):
         raise ParameterError(
@@ -457,7 +456,7 @@ def _edge(stable: Callable[[float], bool], factors: "np.ndarray") -> float | Non
 
 @dataclass(frozen=True)
 class _FrequencyResponse:
-    """L on the stability boundary jω, or e^{jω} up to half the sampling frequency, at places x = ln ω."""
+    """L on the stability boundary s = jω or z = e^{jω}, ω ≤ π, on a grid of x = ln ω."""
 
     loop: Any
     places: "np.ndarray"
@@ -502,8 +501,8 @@ def _delay_and_stages(controller: Controller, actuator: Actuator | None) -> tupl
     late = [stage for stage in actuator.sampled if isinstance(stage, Delay) and not stage.jitter and own]
     if others := [stage.name for stage in actuator.sampled if stage not in late]:
         raise UnsupportedError(
-            "a loop transfer function takes a lag, a diffusion path and, for a sampled law, a delay without jitter. "
-            f"Received {', '.join(others)}. Omit these stages, or simulate."
+            "a loop transfer function can contain a lag, a diffusion path and, for a sampled law, a delay without "
+            f"jitter. Received {', '.join(others)}. Omit these stages, or use simulate."
         )
     periods = sum((stage.samples + Fraction(stage.part) for stage in late), Fraction(0))
     return periods * (own.step if own else 0), Actuator(stages=actuator.flowing)
@@ -573,7 +572,7 @@ def _linear(system: Any, names: tuple[str, ...]) -> Any:
     )
     if not straight:
         raise UnsupportedError(
-            f"a loop transfer function needs a linear law and linear stages. Received {system.name}. Simulate it."
+            f"a loop transfer function needs a linear law and linear stages. Received {system.name}. Use simulate."
         )
     A, B, C, D = once[:n, :n], once[:n, n : n + len(names)], once[n:, :n], once[n:, n : n + len(names)]
     return control.ss(A, B, C, D, system.dt or 0, inputs=list(names), outputs=system.output_labels, name=system.name)

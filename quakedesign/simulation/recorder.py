@@ -1,4 +1,4 @@
-"""Recorder inside the compiled loop, and the metrics of a run from every step."""
+"""Quantities recorded at every step inside the compiled loop, and metrics of a run computed from these."""
 
 import math
 from collections.abc import Iterable
@@ -21,7 +21,7 @@ from quakedesign.simulation.integrators import Integrator
 
 NEVER = -1.0
 LARGEST_MOTION = 1e9
-LARGEST_STATE = 1e100  # bound of ξ, p and h, whose squares do not overflow in sums
+LARGEST_STATE = 1e100  # largest |ξ|, |p| and |h|; sums of their squares do not overflow
 
 START = {
     "max_slip_error": 0.0,
@@ -95,12 +95,12 @@ class Recorder:
 
     @cached_property
     def watching(self) -> dict[str, float]:
-        """Accumulated quantities and their initial values, by name; with an actuator also extremes of its signals."""
+        """Initial values of the accumulated quantities, by name; with an actuator also the extremes of its signals."""
         extremes = (("max", -math.inf), ("min", math.inf))
         return START | {f"{side}_{signal}": start for signal in self.scheme.described for side, start in extremes}
 
     def loop_of(self, vector: ca.SX) -> ClosedLoop:
-        """Loop whose plant has the factors that the vector carries."""
+        """Loop whose plant has the factors contained in the vector."""
         return self.loop.with_factors(self.parts(vector).factors)
 
     def start(self, settled_from: float) -> list[float]:
@@ -113,7 +113,7 @@ class Recorder:
         return {name: float(value) for name, value in self.parts(vector).watched.items()}
 
     def observe(self, vector: ca.SX) -> ca.SX:
-        """Vector (SX) after the signals of its instant have been accumulated."""
+        """Vector (SX) with the signals at its instant added to the accumulated quantities."""
         now = self.parts(vector)
         after = self._after(now.watched, vector)
         return replace(now, watched={name: after[name] for name in self.watching}).joined()
@@ -127,14 +127,14 @@ class Recorder:
         return EnergyBudget(**{name: now[name] - before[name] for name in now if name != "residual"})
 
     def advance(self, vector: ca.SX, method: type[Integrator]) -> ca.SX:
-        """Vector (SX) after accumulation at its instant and one step."""
+        """Vector (SX) after the quantities at its instant are accumulated and one step is taken."""
         now, first = self.parts(vector), self.index(WORKS[0])
         meter = Meter(self.loop_of(vector), vector[first : first + len(WORKS)])
         moved = self.scheme.advance(cast(Stepped, meter), method, now.counter, now.state, self.step)
         return ca.cse([self.moved(vector, moved, meter.works)])[0]
 
     def moved(self, vector: ca.SX, state: ca.SX, done: ca.SX) -> ca.SX:
-        """Vector (SX) after accumulation at its instant, with given state and works of the next instant."""
+        """Vector (SX) at the next instant, given its state and works; quantities at this instant are accumulated."""
         now = self.parts(self.observe(vector))
         watched = now.watched | dict(zip(WORKS, (done[i] for i in range(len(WORKS))), strict=True))
         return replace(now, counter=now.counter + 1, state=state, watched=watched).joined()
@@ -217,15 +217,15 @@ EVENTS = ("diverged", "opening", "reverse_slip", "stick", "load_reversed")
 
 
 def _figure(unit: str) -> Any:
-    """Field with an SI unit, None unless given."""
+    """Dataclass field with an SI unit and the default None."""
     return field(default=None, metadata={"unit": unit})
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Metrics:
-    """Metrics of one run; None if not applicable. A diverged run has its peak slip rate only.
+    """Metrics of one run; None if not applicable. Of these, a diverged run has at most its peak slip rate.
 
-    All but `peak_slip_rate`, `max_h_rate` and the two extreme pressures are taken over t > settled_from.
+    All except `peak_slip_rate`, `max_h_rate`, `max_pressure` and `min_pressure` are evaluated for t > settled_from.
 
     Attributes
     ----------
@@ -236,23 +236,23 @@ class Metrics:
     mise_slip, mise_slip_rate : float or None
         Mean of the squared error [m², m²/s²].
     rms_pressure : float or None
-        [Pa].
+        Root mean square of the pressure [Pa].
     pressure_total_variation : float or None
         Sum of |Δp| between successive steps [Pa].
     reverse_slip_fraction : float or None
         Share of the steps with x2 < 0 [-].
     time_at_rest_fraction : float or None
-        Share of the steps with x2 = 0 on the stick–slip plant [-], also without a controller.
+        Fraction of the steps with x2 = 0 [-]; only for the stick–slip plant, with or without a controller.
     peak_slip_rate : float or None
         Largest |x2| of the whole run [m/s].
     max_h_rate : float or None
         Largest |Δh/Δt| between successive steps of the whole run [m/s³].
     max_pressure, min_pressure : float or None
-        Over the whole run [Pa].
+        Largest and smallest pressure of the whole run [Pa].
     settled_from : float
-        [s].
+        Time after which errors are evaluated [s].
     steps : int
-        Steps taken before the end or before divergence.
+        Number of steps until the end of the run or until divergence.
     seconds : float
         Computing time [s].
     """
@@ -294,7 +294,7 @@ class ActuatorMetrics(Metrics):
     max_well_pressure, min_well_pressure : float or None
         Pressure at the well, after delay, saturation and other stages [Pa].
     max_injected_volume, min_injected_volume : float or None
-        Fluid stored in the rock since the start, if a stage stores fluid [m³].
+        Fluid volume injected into the rock since t = 0 [m³]; None if no stage of the actuator stores fluid.
     max_flow_rate, min_flow_rate : float or None
         Flow rate into the well, negative for withdrawal [m³/s].
     """
@@ -327,11 +327,11 @@ def metrics(
     sticks: bool = False,
     further: Iterable[str] = (),
 ) -> Metrics:
-    """Metrics from accumulated values; `step` [s] is the length of one step, `further` are signals beyond p."""
+    """Metrics from accumulated values; `step` is the length of a step [s], `further` names signals of an actuator."""
     signals = list(further)
     kind = ActuatorMetrics if signals else Metrics
     if watched["diverged"] >= 0:
-        peak = watched["peak_slip_rate"]  # meaningful if ξ, p or h diverged, but not slip or slip rate
+        peak = watched["peak_slip_rate"]  # meaningful if ξ, p or h diverged, but slip and slip rate did not
         known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
         return kind(**known, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
     figures = {"peak_slip_rate": watched["peak_slip_rate"]}

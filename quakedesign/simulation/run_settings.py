@@ -1,4 +1,4 @@
-"""Settings of a run, its integration with fixed or adaptive step, and its trajectory."""
+"""Settings of a run, integration with a fixed or adaptive step, and the resulting trajectory."""
 
 import math
 from collections.abc import Callable
@@ -39,7 +39,7 @@ _ALMOST_A_STEP = Fraction(1, 10**6)
 
 @dataclass(frozen=True, slots=True)
 class RunSetting:
-    """Step, number of steps and output of a run, with times in s, checked."""
+    """Validated settings: step [s], number of steps, number of stored samples, time from which errors count [s]."""
 
     step: float
     steps: int
@@ -50,7 +50,7 @@ class RunSetting:
     def of(
         cls, fault: Fault, step: float | None, duration: float | None, samples: int, settled_from: float | None
     ) -> "RunSetting":
-        """Setting from arguments of `simulate`; None selects the default."""
+        """Settings from the arguments of `simulate`; None selects the default."""
         task = fault.reference.operation_time
         length = _positive("duration", task if duration is None else duration)
         pace = _positive("step", fault.sampling_time if step is None else step)
@@ -61,7 +61,7 @@ class RunSetting:
         start = min(task, length) / 4 if settled_from is None else settled_from
         if not 0 <= start < length:
             raise ParameterError(
-                f"settled_from must be from 0 to below the duration, {length!r} s. Received {start!r} s."
+                f"settled_from must be at least 0 s and less than the duration of {length!r} s. Received {start!r} s."
             )
         return cls(pace, steps, samples, float(start))
 
@@ -96,7 +96,7 @@ def trajectory(
     Raises
     ------
     SimulationError
-        If not even the initial values are finite.
+        If the initial values are not finite.
     """
     vector = ca.SX.sym("z", recorder.size)
     named = recorder.signals(vector)
@@ -106,9 +106,7 @@ def trajectory(
     if watched["diverged"] >= 0:
         kept = kept[:, kept[0] * setting.step < watched["diverged"]]
     if not kept.size:
-        raise SimulationError(
-            "the loop must have finite initial values. Received infinite or undefined ones. Check gains and load."
-        )
+        raise SimulationError("the initial values of the loop are infinite or undefined: check the gains and the load")
     took = {"preparation_seconds": began[1] - began[0], "stepping_seconds": ended - began[1]}
     loop = recorder.loop
     measured = metrics(
@@ -153,10 +151,10 @@ def sampled_scheme(
     measurement: Sensor | None = None,
     **numbers: Any,
 ) -> Scheme:
-    """Scheme with the loop setup of the controller, from the arguments of `simulate`.
+    """Scheme with its actuator and measurement, from the arguments of `simulate`.
 
     An actuator without stages and a measurement without noise are ignored, so that every scheme accepts them. `numbers`
-    are those of a sampled law for its scheme, see `scheme_of_run`.
+    are the settings that a sampled law prescribes for its scheme, see `scheme_of_run`.
 
     Raises
     ------
@@ -170,7 +168,7 @@ def sampled_scheme(
         return simulation_scheme(scheme, **settings)
     if settings:
         raise ParameterError(
-            f"a Scheme object has its own settings. Received also {', '.join(settings)}. Set them in the scheme."
+            f"a Scheme contains its settings. Received also {', '.join(settings)}. Set these in the scheme."
         )
     return scheme
 
@@ -178,7 +176,7 @@ def sampled_scheme(
 def designed_path(
     controller: Controller | None, actuator: Actuator | None, substeps: int = 1
 ) -> tuple[Actuator | None, int]:
-    """Actuator and substeps of a named scheme: as given, else those for which a sampled law is designed."""
+    """Actuator and substeps of a named scheme: the given actuator, else that for which a sampled law is designed."""
     sampling = controller.sampling if controller else None
     if actuator is not None or sampling is None:
         return actuator, substeps
@@ -189,10 +187,10 @@ def designed_path(
 def with_aperiodic_clock(
     controller: Controller | None, scheme: str | Scheme, step: float | None, numbers: dict[str, Any]
 ) -> tuple[float | None, dict[str, Any]]:
-    """Step [s] and numbers of a run; with aperiodic sampling, a shorter step, and the clock in the numbers.
+    """Step [s] and scheme settings of a run; for aperiodic sampling, a divided step, and settings with the clock.
 
-    `step` is then the shortest interval, which is divided into whole steps. A `Scheme` has its own intervals, or is
-    periodic.
+    For aperiodic sampling `step` [s] is the shortest interval; the run uses an integer fraction of it. A `Scheme` keeps
+    its clock; without a clock it samples periodically.
     """
     sampling = controller.sampling if controller else None
     clock = getattr(scheme, "clock", None)

@@ -1,4 +1,4 @@
-"""Uncontrolled run of a fault whose friction has a state: slip events (nucleation, onset, arrest), cycle, outcome."""
+"""Uncontrolled run of a fault with a friction state: slip events (nucleation, onset, arrest), cycle and outcome."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,10 +16,11 @@ from quakedesign.simulation.trajectory import EARTHQUAKE_SHARE, Outcome, Traject
 class SlipEvent:
     """One slip event of a fault, as far as the run covers it."""
 
-    # Time [s] at which the slip rate last rose through the loading rate before the onset; None if it began above
+    # Time [s] of the last rise of the slip rate through the loading rate before the onset; None if there is no rise
     nucleation: float | None
     onset: float  # Time [s] at which the slip rate rises through the `onset_rate` of the run
-    # Time [s] at which it falls below that again; None, with the last three fields, if the run ends earlier
+    # Time [s] at which the slip rate falls below `onset_rate` again; None, as are slip, moment and magnitude, if the
+    # run ends earlier
     arrest: float | None
     peak_slip_rate: float  # [m/s]
     slip: float | None  # From onset to arrest [m]
@@ -31,7 +32,7 @@ class SlipEvent:
 class StateTrajectory(Trajectory):
     """One uncontrolled run of a spring-slider; see `Trajectory`.
 
-    At a step of the pressure an instant occurs twice, before and after the step.
+    At a step of the pressure the time occurs twice, with the values before and after the step.
 
     Attributes
     ----------
@@ -41,12 +42,12 @@ class StateTrajectory(Trajectory):
         State variables of friction, shape (number of variables, n), with `state_names` and `state_units`.
     state_names, state_units : tuple of str
     imbalance : ndarray
-        Driving minus resisting stress over normal stress [-], shape (n,), which accelerates the mass.
-        Without mass it is zero but for the integration error.
+        Driving minus resisting stress, divided by σ' at p = 0 [-], shape (n,). It accelerates the mass; without mass
+        it is zero except for the integration error.
     onsets : ndarray
         Times [s] at which the slip rate rises through `onset_rate`.
     onset_rate, loading_rate : float
-        [m/s]; the latter is the largest v_∞.
+        Slip rate above which an event begins, and largest v_∞ [m/s].
     dynamic_rate, moment_per_slip : float
         aσ'A/(η + √(km)) [m/s] and G·A [N]; infinite and nan for a `SpringSlider`.
     energy : EnergyBudget
@@ -82,12 +83,12 @@ class StateTrajectory(Trajectory):
 
     @property
     def natural_peak(self) -> float | None:
-        """Largest slip rate of its events [m/s]; None without any."""
+        """Largest slip rate of the events of this run [m/s]; None without events."""
         return self.metrics.peak_slip_rate if self.slip_events else None
 
     @property
     def cycle(self) -> dict[str, float | None]:
-        """Last recurrence interval [s], and slip [m] and magnitude of the last complete event; None without one."""
+        """Last recurrence interval [s]; slip [m] and magnitude of the last complete event; None if undefined."""
         intervals = [later.onset - event.onset for event, later in pairwise(self.slip_events)]
         whole = [event for event in self.slip_events if event.arrest is not None]
         return {
@@ -98,7 +99,7 @@ class StateTrajectory(Trajectory):
 
     @cached_property
     def slip_events(self) -> tuple[SlipEvent, ...]:
-        """All events; the run must have returned every step."""
+        """All events of the run; valid only if every step was returned (no `times` given)."""
         ends = (self.onsets.tolist(), self.arrests.tolist(), self.event_slips.tolist())
         return tuple(self._event(*one) for one in zip_longest(*ends))
 

@@ -37,7 +37,7 @@ _KEPT = 20_000
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Study:
-    """Largest errors of several schemes against one parameter.
+    """Largest errors of several schemes as functions of one parameter.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ def accuracy(
     duration: float,
     settled_from: float,
 ) -> Study:
-    """Errors of a sliding mode against the sampling period, on the plant without stick, where orders are known.
+    """Errors of a sliding-mode law versus the sampling period, on the plant without stick, for which orders are known.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def accuracy(
     controller : Controller
         Without feed-forward, so that e3 = ξ1 + h.
     steps : sequence of float
-        T_s [s].
+        Sampling periods T_s [s].
     schemes : sequence of str
     duration, settled_from : float
         Duration of every run, and time from which errors count [s].
@@ -138,7 +138,7 @@ def accuracy(
     Returns
     -------
     Study
-        `orders` gives the exponents: 3, 2 and 1 for the explicit scheme.
+        `orders` gives the exponents of e1, e2 and e3: 3, 2 and 1 for the explicit scheme.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def accuracy(
         For a law with feed-forward.
     """
     if any(controller.feedforward.coefficients.values()):
-        raise ParameterError("the accuracy of e3 = xi1 + h needs a law without feed-forward. Received one with it.")
+        raise ParameterError("accuracy needs a law without feed-forward, since e3 = xi1 + h. Received a law with it.")
 
     def run(scheme: str, step: float) -> "Trajectory":
         return simulate(
@@ -175,7 +175,7 @@ def noise_sensitivity(
     duration: float | None = None,
     plant: str | None = None,
 ) -> Study:
-    """Errors against the measurement noise.
+    """Errors versus the standard deviation of the measurement noise.
 
     Parameters
     ----------
@@ -214,10 +214,10 @@ def gain_sensitivity(
     duration: float | None = None,
     plant: str | None = None,
 ) -> Study:
-    """Errors against the true input gain, over the whole range of β = μN̂/(μ0N̂0) in the fault's box.
+    """Errors versus the true input gain, over the range of β = μN̂/(μ0N̂0) in the fault's box.
 
-    At every level, N̂ is chosen such that β at rest is the level times the geometric mean of the ends of the
-    range of β, which the scheme ``compensated`` assumes. In the run β decreases further as friction weakens.
+    A level is the ratio of β at rest to the geometric mean of the bounds of β, which is the value that the scheme
+    ``compensated`` assumes. N̂ is varied. During the run β decreases as friction weakens.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def gain_sensitivity(
         return simulate(fault, controller, scheme=scheme, variation=variation, duration=duration, plant=plant)
 
     title = f"{fault.name}, {controller.title}: sensitivity to the input gain"
-    return _study(title, ("beta at rest over its middle", ""), tuple(levels), schemes, run)
+    return _study(title, ("beta at rest / geometric mean of its bounds", ""), tuple(levels), schemes, run)
 
 
 def _slope(levels: Sequence[float], values: Sequence[float]) -> float | None:
@@ -274,13 +274,13 @@ def _study(
 
 
 def _errors(run: "Trajectory", matched: bool) -> dict[str, float]:
-    """Largest errors of a run; that of e3 from the returned instants alone."""
+    """Largest errors of a run; that of e3 is evaluated only at the stored instants."""
     metrics, infinite = run.metrics, math.inf
     errors = {"slip_error": metrics.max_slip_error, "slip_rate_error": metrics.max_slip_rate_error}
     if "diverged" in run.events:
         return dict.fromkeys([*errors, "matched_error"] if matched else errors, infinite)
     if None in errors.values():
-        raise SimulationError(f"a study needs runs of over {metrics.settled_from:g} s. Received {run.time[-1]:g} s.")
+        raise SimulationError(f"duration must exceed {metrics.settled_from:g} s. Received {run.time[-1]:g} s.")
     if matched:
         settled = run.time > metrics.settled_from
         assert run.matched_perturbation is not None

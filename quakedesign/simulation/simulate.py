@@ -1,4 +1,4 @@
-"""Simulation of one closed loop, by default from rest over the whole task."""
+"""Simulation of one closed loop; by default over the operation time, with the fault at rest initially."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -59,11 +59,11 @@ def simulate(
     initial_slip_rate: float = 0.0,
     tide: Tide | None = None,
 ) -> Trajectory:
-    """Simulate a fault under a controller, from rest by default, with the fault's own disturbance and reference.
+    """Simulate a fault under a controller, with the fault's disturbance and reference; initially at rest by default.
 
-    A fault with a friction state starts in steady sliding at the mean rate of its task. It needs a sampled law that
-    measures the slip alone, such as one from `design`, with its own scheme and step. Of the parameters below, only
-    those up to `progress` apply to it, and `plant`, `variation`, `actuator`, `measurement` (a `Transducer`) and `tide`.
+    A fault with a friction state is initially in steady sliding at the first rate of its reference. It needs a sampled
+    law that measures the slip alone, such as one from `design`. Only the parameters up to `progress`, and `plant`,
+    `variation`, `actuator`, `measurement` (a `Transducer`) and `tide` apply; scheme and step are those of the law.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def simulate(
         Length of one step [s]; by default T_s of a sampled law, else of the fault.
     scheme : str or Scheme, optional
         Discretisation of the law, by name or as an instance, see `quakedesign.loop.schemes`. All but ``"continuous"``
-        sample once per step, with a zero-order hold of the pressure. A sampled law has its own scheme and takes no
-        other; for other laws the default is ``"continuous"``.
+        sample once per step, with a zero-order hold of the pressure. A sampled law can be run only with
+        the scheme of its design; for other laws the default is ``"continuous"``.
     method : str
         Integrator with a fixed step, or, for the printed plant, ``"cvodes"`` or ``"idas"`` with an adaptive step; see
         `quakedesign.simulation.integrators`. The latter return the state at every multiple of `step`, where the run is
@@ -87,9 +87,9 @@ def simulate(
     samples : int
         Approximate number of stored instants; metrics are computed from every step.
     settled_from : float, optional
-        Time [s] from which errors are evaluated; by default a quarter of the operation time, or of a shorter run.
+        Time [s] from which errors are evaluated; by default a quarter of the shorter of operation time and duration.
     progress : callable, optional
-        Called with the fraction done [-].
+        Called with the completed fraction of the run [-].
     compiled : bool, optional
         True: machine code or an error. False: CasADi's virtual machine. None: machine code for a long run if a C
         compiler works. Results are bitwise the same.
@@ -98,10 +98,10 @@ def simulate(
         paper's plant without stick, eq. shift continued to negative slip rates. With a friction state, which never
         rests: ``"smooth"`` or ``"quasi-dynamic"`` (without inertia). The first of each pair is the default.
     load : Load, optional
-        Drift of the far end of the spring and a perturbation, besides the fault's own disturbance.
+        Drift of the far end of the spring and a perturbation, in addition to the disturbance of the fault.
     variation : Variation or SlidingVariation, optional
-        True parameters other than the nominal ones, within the fault's box; `SlidingVariation` for friction with a
-        state. The compiled code is the same for all.
+        Ratios of the true to the nominal parameters, within the fault's box; `SlidingVariation` for friction with a
+        state. All variations use the same compiled code.
     rtol : float
         Tolerance of ``"cvodes"`` and ``"idas"``, 1e-13 … 1e-3; not used with a fixed step.
     checkpoint : str or Path, optional
@@ -113,12 +113,12 @@ def simulate(
         Path from commanded pressure to fault pressure, for a named sampled scheme. By default the delay, lag and
         diffusion path for which a sampled law is designed, with the substeps that they need; with an `Actuator` without
         stages the pressure acts at once. With a friction state: stages that act once per sample, then a lag, a
-        diffusion path or both; by default the lag and the diffusion path of the design.
+        diffusion path or both. If the actuator has neither of these, the lag and diffusion path of the design apply.
     measurement : Measurement, Sensor or Transducer, optional
-        Measurement noise, or a sensor that gives the law estimates from the slip alone, for a named sampled scheme.
+        Measurement noise, or a sensor that estimates signals from the slip alone, for a named sampled scheme.
         With a friction state: the transducer of the slip.
     initial_slip, initial_slip_rate : float
-        x1 [m] and x2 [m/s] at the start, zero or positive. The reference starts at zero in any case.
+        Initial x1 [m] and x2 [m/s], not negative. The reference r is 0 at t = 0 in any case.
     tide : Tide, optional
         Shear stress on a fault whose friction has a state; none unless given.
 
@@ -189,8 +189,8 @@ def simulate(
     def stepped(fault: Fault) -> Trajectory:
         if tide is not None or isinstance(variation, SlidingVariation) or isinstance(measurement, Transducer):
             raise ParameterError(
-                "a tide, a SlidingVariation or a Transducer needs friction with a state. Received "
-                f"{fault.friction.name}. Give a load, a variation or a measurement."
+                "tide, SlidingVariation and Transducer apply only to friction with a state. Received "
+                f"{fault.friction.name}. Use Load, Variation and Measurement instead."
             )
         require_tolerance(rtol)
         way, period, own = scheme_of_run(controller, scheme, step, "continuous")
@@ -246,8 +246,8 @@ def _sampled_law(
     """Sampled law of the slip alone, with its path; rejects arguments that do not apply to slow sliding."""
     if controller.of_slip is None or controller.sampling is None or inapplicable:
         raise ParameterError(
-            "a fault with a friction state takes a sampled law of the slip, as from design, with "
-            f"{', '.join(_OF_SLIDING)} (a SlidingVariation), method, plant, actuator and a Transducer as measurement. "
+            "a fault with a friction state needs a sampled law that measures slip alone, as from design; it accepts "
+            f"{', '.join(_OF_SLIDING)}, method, plant, actuator and measurement (a Transducer). "
             f"Received {', '.join(inapplicable) or repr(controller)} with {fault.friction.name}."
         )
     return controller, PressurePath.of(controller.sampling, actuator)

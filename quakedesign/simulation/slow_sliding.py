@@ -30,11 +30,11 @@ PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class SlidingRun(LoopTrajectory):
-    """One controlled run in slow sliding, with four instants a period and without an energy budget.
+    """One controlled run in slow sliding, with four instants per sampling period and without an energy budget.
 
     Attributes
     ----------
-    theta, asked, stress : ndarray
+    theta, feedback_pressure, stress : ndarray
         State of friction [s], feedback pressure commanded in addition to the planned one, and shear stress disturbance
         [Pa], shape (n,).
     """
@@ -67,45 +67,45 @@ def simulate_sliding(
     method: str = "cvodes",
     progress: Callable[[float], None] = lambda _: None,
 ) -> SlidingRun:
-    """Simulate a controlled fault that tracks r of `SlidingReference`, from steady sliding at its first rate V.
+    """Simulate a controlled fault that tracks r of `SlidingReference`; initially it slides steadily at first rate V.
 
-    The far end rests. The planned pressure kr/(μ*A), with which the nominal fault slides at V at the slip r, reaches
-    the fault directly. The law measures the slip error at every sample; the pressure that it commands in addition
-    passes a zero-order hold, the lag and the diffusion path.
+    The far end is fixed. The planned pressure kr/(μ*A), at which the nominal fault slides steadily at V with slip r,
+    acts on the fault directly. At every sample the law measures the slip error and commands an additional feedback
+    pressure, which passes through a zero-order hold, the lag and the diffusion path.
 
     Parameters
     ----------
     fault : Fault
-        With one state; its table of disturbances is not used.
+        Fault with one friction state. Its disturbance is ignored.
     law : LinearLaw
-        From the slip error alone [m → Pa].
+        Linear law from the slip error [m] to the feedback pressure [Pa].
     step : Fraction
         T_s [s].
     lag, diffusion, stages : Fraction, Fraction, tuple of SampledStage
         As in `PressurePath`.
     transducer : Transducer, optional
-        Transducer of the slip; exact unless given.
+        Transducer of the slip; unless given, the measurement is exact.
     tide : Tide, optional
         None: no disturbance.
     variation : SlidingVariation, optional
-        True constants that differ from the nominal ones; the fault still starts in steady sliding at V.
+        Ratios of the true to the nominal constants. The fault is initially in steady sliding at V in any case.
     duration : float, optional
         [s]; the operation time unless given.
     pressure_per_slip : float, optional
         Planned pressure per slip [Pa/m]; k/(μ*A) of the nominal fault unless given.
     settled_from : float, optional
-        Time [s] from which errors count; a quarter of the operation time, or of a shorter run.
+        Time [s] from which errors are evaluated; by default a quarter of the shorter of operation time and duration.
     samples : int, optional
         Approximate number of instants to return; all unless given. Metrics use all instants.
     inertia : bool
-        Whether the fault has its mass.
+        Whether the inertia of the fault is included.
     method : str
         ``"cvodes"`` or ``"idas"``.
 
     Returns
     -------
     SlidingRun
-        It ends if the fault opens. If the solver stops, the run has diverged and has no metrics.
+        The run ends if the fault opens. If the solver stops, the run counts as diverged and has no metrics.
     """
     if len(fault.friction.state_names) != 1 or not law.of_slip_alone:
         raise ParameterError(
@@ -193,7 +193,7 @@ def simulate_sliding(
 
 @dataclass(frozen=True)
 class _Loop:
-    """Plant between samples: slip, stretch plus tide over stiffness, log rate and log state."""
+    """Plant between samples, in the variables slip, stretch + tide/stiffness, log rate and log state."""
 
     slider: SpringSlider
     reference: SlidingReference
@@ -219,7 +219,7 @@ class _Loop:
 
     @property
     def start(self) -> "np.ndarray":
-        """Vector after a step of the tide's initial stress in steady sliding."""
+        """Initial vector: steady sliding, followed by a step of the shear stress to the initial value of the tide."""
         y = np.array(self.slider.start(float(self.reference.first_rate)))
         y[1] += self.tide.at(0.0) / self.slider.stiffness
         return self.slider.stepped(y, 0.0, 0.0)
@@ -229,7 +229,7 @@ class _Loop:
         return self.pressure_per_slip * self.reference.slip(time)
 
     def pressure(self, time: Any, held: Any, since: Any, modes: Any, exp: Callable[[Any], Any] = np.exp) -> Any:
-        """Pressure [Pa] in the fault at a time [s], `since` [s] after the hold changed to `held` [Pa]."""
+        """Fault pressure [Pa] at `time` [s], when `since` [s] have passed since the hold changed to `held` [Pa]."""
         direct, layered = held * (1 - sum(self.share)), 0
         for i, (rate, share) in enumerate(zip(self.decay, self.share, strict=True)):
             layered = layered + share * (held + (modes[i] - held) * exp(-rate * since))
@@ -277,7 +277,7 @@ def _followed(
 
 
 def criterion_of(fault: Fault) -> OutcomeCriterion:
-    """Criterion for the outcome of a run in slow sliding, without a natural peak, which would need a cycle."""
+    """Outcome criterion in slow sliding; it has no natural peak, which would require the simulation of a cycle."""
     reference = SlidingReference(task=fault.reference)
     return OutcomeCriterion(
         natural_peak=None,

@@ -1,6 +1,6 @@
-"""Adaptive integration of smooth equations with CVODES or IDAS, and level crossings.
+"""Adaptive integration of smooth equations with SciPy, CVODES or IDAS, and detection of level crossings.
 
-The solution is nearly linear within each output interval, so that no earthquake is missed.
+With CVODES and IDAS the solution is nearly linear within each output interval, so that no earthquake is missed.
 """
 
 from collections import deque
@@ -38,9 +38,9 @@ class Resolved(OdeSolver):  # type: ignore[misc]
     fun, t0, y0, t_bound, vectorized
         As of SciPy's `OdeSolver`.
     pieces, whole : Flow
-        Solvers over an interval, with output at `SHARES` of it, and at its end alone.
+        Solvers over one interval, with output at the fractions `SHARES`, and at the end alone.
     parameters : list of float
-        Parameters of both.
+        Parameters of `pieces` and `whole`.
     """
 
     t: float
@@ -115,14 +115,14 @@ class _Between(DenseOutput):  # type: ignore[misc]
 # ----------------------------------------------------------------------
 # Integration of smooth differential equations to a tolerance, with detection of crossings of one level.
 
-_FRESH = 1.0  # s; before this time a new time origin would not help, since floats resolve about 1e-16 s
+_FRESH = 1.0  # s; below this time floats already resolve 1e-16 s, so that a new origin of time would not help
 Field = Callable[[float, np.ndarray], np.ndarray]
 METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
 
 @dataclass(frozen=True)
 class Ramp:
-    """Load with a value at the time `start` [s] and a constant slope [1/s]."""
+    """Load that is linear in time: its values at the time `start` [s], and their constant rates of change [1/s]."""
 
     start: float
     value: tuple[float, ...]
@@ -149,7 +149,7 @@ class SmoothProblem:
 
     rates: ca.Function
     scales: "np.ndarray"  # Size of each variable below which its tolerance is absolute
-    # Index of the variable whose upward crossings of `level` are detected, or a slice whose largest variable counts
+    # Index of the variable whose upward crossings of `level` are detected; for a slice, the largest of its variables
     watched: int | slice
     level: float
 
@@ -166,9 +166,9 @@ class SmoothProblem:
         times : ndarray
             Ascending instants [s].
         every_step : bool
-            Return the accepted steps of the method; otherwise the values at `times`.
+            If True, return every accepted step; otherwise the values at `times`.
         method : str
-            ``"dop853"`` (explicit, order 8, output by its interpolant of order 7), ``"radau"`` (implicit, order 5, for
+            ``"dop853"`` (explicit, order 8, with dense output of order 7), ``"radau"`` (implicit, order 5, for
             stiff problems, with a step end at each instant), or ``"cvodes"`` or ``"idas"`` (implicit, orders 1 to 5;
             nearly linear pieces replace the accepted steps).
         rtol : float
@@ -201,7 +201,7 @@ class SmoothProblem:
         for span in spans:
             begin, reached = float(span[0]), False
             while not reached:
-                with np.errstate(over="ignore", invalid="ignore"):  # in trial steps that are too long, and rejected
+                with np.errstate(over="ignore", invalid="ignore"):  # overflow only in rejected trial steps
                     part = solve_ivp(
                         field,
                         (begin - clock, span[-1] - clock),

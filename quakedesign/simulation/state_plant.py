@@ -1,7 +1,7 @@
 """Spring-sliders with rate-and-state friction in logarithms of slip rate and state.
 
-The second chapter gives the conditions of a run in slow sliding: tide, deviation of the true constants
-from the nominal ones, pressure path, and instruments with their memory.
+The second chapter defines the setup of a run in slow sliding: tide, ratios of true to nominal constants,
+pressure path, and instruments with their memory.
 """
 
 import math
@@ -37,9 +37,9 @@ _WIDEST = 1e3  # largest change of the logarithm of a rate in a step
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SpringSlider:
-    """A block per unit of area: mass·v' = stiffness·stretch − (normal_stress − p)·μ(slip, v, state) − damping·v.
+    """A block per unit area: mass·v' = stiffness·stretch − (normal_stress − p)·μ(slip, v, state) − damping·v.
 
-    The stretch of the spring grows with the loading rate less the slip rate. Without mass the balance of forces is a
+    The rate of the stretch is the loading rate minus the slip rate. Without mass the balance of forces is a
     constraint, whose time derivative gives v' (quasi-dynamic; needs (normal_stress − p)·∂μ/∂v + damping > 0).
     The pressure p also changes the state if the law has `FrictionLaw.stress_exponents`.
 
@@ -92,7 +92,7 @@ class SpringSlider:
 
     @property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
-        """Exact values for the symbols of the force balance of 1 m²; the mass of a massless block is arbitrary."""
+        """Exact values of the symbols in the force balance of 1 m²; for a block without mass, the mass is set to 1."""
         held = {
             plant.m: self.mass or 1.0,
             plant.k: self.stiffness,
@@ -104,7 +104,7 @@ class SpringSlider:
 
     @cached_property
     def derivation(self) -> tuple[sp.Expr, ...]:
-        """Rates of slip, stretch, v and the states in these variables, p, `loading_rate` and `pressure_rate`."""
+        """Time derivatives of slip, stretch, v and states in these, p, `loading_rate` and `pressure_rate`."""
         law, states = self.law.exact(), state_symbols(self.law.state_names)
         stressing = -pressure_rate / (self.numbers[plant.sigma] - plant.p)
         state_rates = tuple(
@@ -151,10 +151,10 @@ class SpringSlider:
         ParameterError
             If the rate or a state is not positive, or the number of states is not that of the law.
         """
-        require_positive("Rate and state enter by their logarithms.", start_rate=at_rate)
+        require_positive("Their logarithms are the variables of the simulation.", start_rate=at_rate)
         held = self.law.steady_state(at_rate) if states is None else states
         if len(held) != len(self.law.state_names):
-            raise ParameterError(f"start_state must hold {len(self.law.state_names)} values. Received {len(held)}.")
+            raise ParameterError(f"start_state must have {len(self.law.state_names)} values. Received {len(held)}.")
         require_positive(
             "Rate and state enter by their logarithms.", **dict(zip(self.law.state_names, held, strict=True))
         )
@@ -164,14 +164,14 @@ class SpringSlider:
         return [0.0, resisting / self.stiffness, *logs]
 
     def stepped(self, y: "np.ndarray", before: float, after: float) -> "np.ndarray":
-        """Vector y after a step of the pressure [Pa]: the slip stays, the state changes by the law.
+        """Vector y after a step of the pressure [Pa]: the slip is unchanged; the state changes as given by the law.
 
         Without mass the slip rate jumps to a value at which the forces balance.
 
         Raises
         ------
         SimulationError
-            If they balance at no rate.
+            If the forces do not balance at any slip rate.
         """
         found = np.array(y)
         change = math.log((self.normal_stress - after) / (self.normal_stress - before))
@@ -193,8 +193,8 @@ class SpringSlider:
             width *= 2
             if abs(width) > _WIDEST:
                 raise SimulationError(
-                    f"the forces must balance after a step of the pressure to {pressure:.6g} Pa. Received a slip rate "
-                    f"that changes by more than a factor e^{_WIDEST:g}. Give a smaller step, or inertia."
+                    f"after the pressure step to {pressure:.6g} Pa the forces do not balance at any slip rate within a "
+                    f"factor e^{_WIDEST:g} of the previous one. Reduce the step, or use inertia."
                 )
         return float(brentq(excess, *sorted((y[2], y[2] + width)), xtol=1e-14, rtol=1e-15))
 
@@ -256,7 +256,7 @@ class Tide:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class SlidingVariation:
-    """Ratios of a fault's true constants to the nominal ones of its law and its plan [-], each positive.
+    """Ratios of a fault's true constants to the nominal ones of controller and planned pressure [-], each positive.
 
     Attributes
     ----------
@@ -292,8 +292,8 @@ class PressurePath:
     # lag, diffusion: Time constant and L²/D [s], not negative; 0 for none
     lag: Fraction = Fraction(0)
     diffusion: Fraction = Fraction(0)
-    # Stages that act once per sample, before the zero-order hold. All but a delay act on the total pressure of the
-    # pump, including the planned one, which is known ahead and thus not delayed.
+    # Stages that act once per sample, before the zero-order hold. A delay acts on the feedback pressure alone, since
+    # the planned pressure is known in advance; all other stages act on the sum of both.
     stages: tuple[SampledStage, ...] = ()
 
     @classmethod
@@ -311,11 +311,11 @@ class PressurePath:
                 f"Received {', '.join(stage.name for stage in flowing)}. Omit all other stages."
             )
         by_name = {stage.name: stage for stage in flowing}
-        lag, rock = by_name.get("lag"), by_name.get("diffusion")
+        lag, path = by_name.get("lag"), by_name.get("diffusion")
         return cls(
             stages=stages,
             lag=rational(lag.time_constant) if isinstance(lag, Lag) else Fraction(0),
-            diffusion=rational(rock.time) if isinstance(rock, Diffusion) else Fraction(0),
+            diffusion=rational(path.time) if isinstance(path, Diffusion) else Fraction(0),
         )
 
     @property
@@ -323,7 +323,7 @@ class PressurePath:
         """Rates λ_i [1/s] and shares c_i [-] of parallel filters with the step response 1 − Σ c_i·e^{−λ_i·t}.
 
         Partial fractions of the diffusion path in series with the lag: exact but for the truncation error of 24
-        modes. A lag with the rate of a mode is made slower by 1e-9.
+        modes. If the rate of the lag equals that of a mode, it is reduced by a relative 1e-9.
         """
         rock = Layer(time=self.diffusion or Fraction(1))
         found = [(float(rock.rate(i)), float(rock.share(i))) for i in range(MODES if self.diffusion else 0)]
@@ -364,7 +364,7 @@ class Instruments:
         return float(self._reading(slip))
 
     def pump(self, commanded: float, planned: float) -> float:
-        """Pressure [Pa] of the hold less the planned one, from the commanded pressure less the planned one."""
+        """Held feedback pressure [Pa], from the commanded feedback pressure and the planned pressure [Pa]."""
         return float(self._pumped(float(self._late(commanded)) + planned)) - planned
 
     def sections(self, now: float, before: float, after: float) -> list[tuple[float, float, float]]:
@@ -388,13 +388,13 @@ def _held(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tu
         return None
     chain, start = Actuator(stages=tuple(stages)), tuple(v for stage in stages for v in stage.start)
     numbers = [ca.SX(v) for stage in stages for v in stage.numbers]
-    memory, commanded = ca.SX.sym("memory", len(start)), ca.SX.sym("asked")
+    memory, commanded = ca.SX.sym("memory", len(start)), ca.SX.sym("commanded")
     held, _, after = chain.hold(numbers, ca.vertsplit(memory), commanded, step)
     return ca.Function("held", [memory, commanded], [held, ca.vertcat(*after)]), start
 
 
 def _remembering(element: tuple[ca.Function, tuple[float, ...]] | None) -> Callable[[float], Any]:
-    """Callable on numbers that stores the memory of such a Function; the identity without one."""
+    """Callable on numbers that keeps the memory of an element between calls; the identity if the element is None."""
     if element is None:
         return float
     function, start = element

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # ----------------------------------------------------------------------
 # Checkpoints: long runs that are interrupted at any moment and resumed with bitwise equal results.
 
-SECONDS = 30.0
+SECONDS = 30.0  # least time between two writes of a checkpoint
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Checkpoint:
         return cls(Path(path), hashlib.sha256("\n".join(inputs).encode()).hexdigest())
 
     def read(self) -> "list[np.ndarray]":
-        """Vectors stored so far; none without a file.
+        """Vectors stored so far; an empty list if there is no file.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class Checkpoint:
             fingerprint, vectors = "", np.empty((0, 0))
         if fingerprint != self.fingerprint:
             raise SimulationError(
-                f"checkpoint {self.path} must be that of the same run. Received that of another run, or another file. "
+                f"checkpoint {self.path} does not belong to this run, or is not a checkpoint. "
                 "Delete it, or choose another name."
             )
         return list(vectors)
@@ -158,11 +158,11 @@ def _bound(function: Any, vector: "np.ndarray") -> tuple[Callable[[], None], obj
 
 
 def instants(steps: int, samples: int) -> list[int]:
-    """Step numbers to store: the first, the last, and one of each of at most `samples` strides of equal length.
+    """Step numbers to store: the first, the last, and one from each of at most `samples` strides of equal length.
 
-    The place within the stride advances by its golden section (Weyl 1916: such places are uniformly distributed).
-    Equidistant instants would sample chatter, a disturbance or any other signal whose period divides their distance at
-    one phase only, and could miss its amplitude.
+    The position within the stride advances by the golden ratio, hence positions are uniformly distributed (Weyl 1916).
+    Equidistant instants would sample a signal whose period divides their spacing, such as chatter, always at the same
+    phase, and could miss its amplitude.
     """
     stride = max(1, -(-steps // samples))
     starts = enumerate(range(stride, steps, stride), start=1)
@@ -178,8 +178,8 @@ def march(
 ) -> "np.ndarray":
     """Vectors at the instants `kept`, one per column; ends early once the entry `diverged_at` is set.
 
-    Python runs between two calls, so that the user can interrupt and sees the progress. The vectors stored so far are
-    in the checkpoint, if there is one, from which the next march resumes.
+    Python code runs between two calls, so that the user can interrupt the run and see its progress. The vectors stored
+    so far are in the checkpoint, if there is one; the next call resumes from these.
     """
     found = (checkpoint.read() if checkpoint else []) or [advancer.vector.copy()]
     advancer.vector[:] = found[-1]
@@ -219,7 +219,7 @@ def run_key(
 
 
 def recall_run(key: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | None:
-    """Cached vectors, one per column, and backend with its reason as in the provenance of a run; None if not cached."""
+    """Cached vectors, one per column, and the provenance entries of the backend; None if the run is not cached."""
     if not key or (content := cache.load("run", *key)) is None:
         return None
     with np.load(BytesIO(content), allow_pickle=False) as kept:

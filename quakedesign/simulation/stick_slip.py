@@ -1,6 +1,6 @@
 """Uncontrolled runs with rate-and-state friction: velocity steps and stick–slip cycles.
 
-The last part gives initial conditions: steady sliding, after a hold, or late in a cycle.
+The last part gives initial conditions: in steady sliding, after a hold, and late in a cycle.
 """
 
 import math
@@ -16,7 +16,7 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.fault.model import require_positive
 from quakedesign.simulation.closed_loop import EnergyBudget
-from quakedesign.simulation.inputs import PressureCourse
+from quakedesign.simulation.inputs import PressureHistory
 from quakedesign.simulation.integrators import RTOL, TIGHT_RTOL
 from quakedesign.simulation.recorder import Metrics
 from quakedesign.simulation.run_settings import library_versions
@@ -30,8 +30,8 @@ from quakedesign.symbolic import derive
 
 _ONSET = 10.0
 _SHARE_OF_STRETCH = 1e-3
-_FARTHEST = 1e7  # critical slips that the load point travels; one earthquake may take a million
-_LONGEST = 1e9  # s of one time variable, whose resolution is then 1.2e-7 s
+_FARTHEST = 1e7  # largest displacement of the load point, in critical slips; one earthquake may need a million
+_LONGEST = 1e9  # s, longest span of one time variable: the resolution of its floats is then 1.2e-7 s
 _LONGEST_RUN = 1e5 * _LONGEST  # s, three million years: limits the number of spans of a run
 
 
@@ -41,7 +41,7 @@ def simulate_state(
     *,
     duration: float | None = None,
     inertia: bool = True,
-    pressure: "float | PressureCourse" = 0.0,
+    pressure: "float | PressureHistory" = 0.0,
     start_rate: float | None = None,
     start_state: Sequence[float] | None = None,
     times: "Sequence[float] | np.ndarray | None" = None,
@@ -51,22 +51,22 @@ def simulate_state(
 ) -> StateTrajectory:
     """Simulate an uncontrolled fault whose friction has a state, under remote loading and a prescribed pressure.
 
-    The logarithms of rate and state are integrated, so that a hold of years and a slip of milliseconds have the same
-    relative accuracy. Initially the forces are in balance, under the pressure before a step at t = 0.
+    The logarithms of rate and state are integrated, so that a hold of years and slip within milliseconds have the same
+    relative accuracy. Initially the forces balance; if the pressure has a step at t = 0, at the pressure before it.
 
     Parameters
     ----------
     subject : Fault or SpringSlider
-        A fault has its own damping.
+        A `Fault` is converted by `SpringSlider.of`, with its damping.
     loading : float or sequence of (float, float)
         v_∞ [m/s] for `duration`; or consecutive pairs of (length [s], v_∞ [m/s]). Not negative.
     duration : float, optional
         [s]; only for a single loading rate.
     inertia : bool
-        For a fault: third order with inertia, quasi-dynamic without. A `SpringSlider` has its own mass.
-    pressure : float or PressureCourse
+        For a `Fault`: True for inertia, False for quasi-dynamic motion. Ignored for a `SpringSlider`.
+    pressure : float or PressureHistory
         Fluid pressure [Pa], below the effective normal stress. At a step of the pressure the values before and after it
-        are both returned, at the same time; at instants of `times` only those after.
+        are both returned, at the same time; at instants given by `times` only the values after it.
     start_rate : float, optional
         Initial slip rate [m/s]; the first loading rate unless given.
     start_state : sequence of float, optional
@@ -76,25 +76,25 @@ def simulate_state(
     onset_rate : float, optional
         Slip rate whose upward crossings are events [m/s]; ten times the fastest loading rate unless given.
     method : str
-        ``"radau"`` (stiff: inertia), ``"dop853"`` (usually faster without inertia), ``"cvodes"`` or ``"idas"`` (both
-        for stiff problems, as independent codes).
+        ``"radau"`` (stiff problems, as with inertia), ``"dop853"`` (usually faster without inertia), or ``"cvodes"``,
+        ``"idas"`` (stiff problems; independent implementations).
     rtol : float
         Tolerance of one step, 1e-13 … 1e-3; absolute for the logarithms of rate and state.
 
     Raises
     ------
     ParameterError
-        For a law without state, or settings that are not positive, finite or known.
+        For a law without a state, a setting that is not positive and finite, or an unknown method.
     SimulationError
         If the integration fails, as when the slip rate grows without bound (no inertia and no damping).
     """
     slider = subject if isinstance(subject, SpringSlider) else SpringSlider.of(subject, inertia=inertia)
     slider.law.require(simulate_state=subject)
-    course = pressure if isinstance(pressure, PressureCourse) else PressureCourse.constant(pressure)
+    course = pressure if isinstance(pressure, PressureHistory) else PressureHistory.constant(pressure)
     if course.largest >= slider.normal_stress:
         raise ParameterError(
             f"pressure must stay below the effective normal stress, {slider.normal_stress:.6g} Pa, at which the fault "
-            f"opens. Received {course.largest:.6g} Pa. Inject less."
+            f"opens. Received {course.largest:.6g} Pa. Reduce the pressure."
         )
     pieces = _pieces(loading, duration)
     first = pieces[0][1] if start_rate is None else start_rate
@@ -123,14 +123,14 @@ def velocity_step(
     method: str = "dop853",
     rtol: float = TIGHT_RTOL,
 ) -> StateTrajectory:
-    """Slide a sample through a spring whose far end moves at given rates, as in the laboratory.
+    """Simulate a laboratory sample that is driven through a spring whose far end moves at given rates.
 
     The run starts in steady sliding at the first rate, without inertia or damping. A rate of 0 is a hold.
 
     Parameters
     ----------
     law : FrictionLaw
-        With state.
+        Friction law with a state.
     stiffness : float
         Change of friction per displacement of the far end [1/m]: stiffness per area over normal stress.
     loading : sequence of (float, float)
@@ -151,20 +151,20 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
     single = isinstance(loading, int | float)
     if single == (duration is None):
         raise ParameterError(
-            "loading must be one rate with a duration, or pairs of (time, rate) without. "
+            "loading must be one rate together with duration, or pairs of (length, rate) without duration. "
             f"Received loading={loading!r}, duration={duration!r}."
         )
     pieces: list[tuple[Any, Any]] = [(duration, loading)] if single else list(loading)
     for length, speed in pieces:
         if not (math.isfinite(length) and length > 0 and math.isfinite(speed) and speed >= 0):
             raise ParameterError(
-                "loading must last a positive time at a rate that is not negative, both finite. "
+                "each pair of loading must have a positive, finite length and a finite rate ≥ 0. "
                 f"Received {length!r} s at {speed!r} m/s."
             )
     if (whole := math.fsum(length for length, _ in pieces)) > _LONGEST_RUN:
         raise ParameterError(f"duration must be at most {_LONGEST_RUN:g} s, got {whole:g} s: give a shorter duration")
     if not pieces:
-        raise ParameterError("loading must hold at least one pair of (time, rate). Received none.")
+        raise ParameterError("loading must have at least one pair of (length, rate). Received none.")
     return [(float(length), float(speed)) for length, speed in pieces]
 
 
@@ -188,7 +188,7 @@ class _History:
     slider: SpringSlider
     problem: SmoothProblem
     pieces: list[tuple[float, float]]
-    course: PressureCourse
+    course: PressureHistory
     wanted: "np.ndarray | None"
     method: str
     rtol: float
@@ -268,7 +268,7 @@ def _trajectory(
     if isinstance(subject, Fault):
         name, area, dynamic, moment = subject.name, subject.area, dynamic_rate(subject), subject.moment_of(1.0)
     return StateTrajectory(
-        name=f"{name}, loaded from afar",
+        name=f"{name}, remote loading",
         time=solution.time,
         load_point=loaded,
         slip=solution.values[0],
@@ -337,7 +337,7 @@ def _energy(
 
 
 def direct_strength(fault: Fault) -> float:
-    """aσ' [Pa]: instantaneous increase of the strength in steady sliding when the slip rate grows e-fold."""
+    """aσ' [Pa]: instantaneous increase of the strength in steady sliding if the slip rate is multiplied by e."""
     law = fault.friction
     rate, state = law.operating_rate, law.steady_state(law.operating_rate)
     gain = law.coefficient(0, math.e * rate, *state) - law.coefficient(0, rate, *state)
@@ -354,12 +354,12 @@ def dynamic_rate(fault: Fault) -> float:
 # Initial conditions of a fault with a state: in steady sliding, after a hold, or late in its cycle.
 
 _CYCLES = 3  # the first cycle depends on the initial condition
-_FIRST_LOADS, _MOST_LOADS = 10.0, 1000.0  # loads in units of aσ' of the first and longest run
+_FIRST_LOADS, _MOST_LOADS = 10.0, 1000.0  # loads of the first and of the longest run, in units of aσ'
 _OLDER = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StartingState:
+class InitialCondition:
     """Initial slip rate and friction state; the stretch of the spring balances the forces."""
 
     slip_rate: float  # [m/s]
@@ -371,23 +371,23 @@ class StartingState:
         return {"start_rate": self.slip_rate, "start_state": self.state}
 
 
-def sliding(fault: Fault, rate: float) -> StartingState:
+def sliding(fault: Fault, rate: float) -> InitialCondition:
     """Steady sliding at a rate [m/s]."""
-    return StartingState(slip_rate=rate, state=tuple(map(float, fault.friction.steady_state(rate))))
+    return InitialCondition(slip_rate=rate, state=tuple(map(float, fault.friction.steady_state(rate))))
 
 
-def locked(fault: Fault, rate: float, hold: float, **settings: Any) -> StartingState:
-    """A fault after steady sliding at a rate [m/s] and a hold of the far end for a time [s].
+def locked(fault: Fault, rate: float, hold: float, **settings: Any) -> InitialCondition:
+    """Initial condition after steady sliding at `rate` [m/s] and a hold of the far end for the time `hold` [s].
 
     `settings` are ``inertia, method, rtol`` of `simulate_state`.
     """
     require_positive(hold=hold)
     run = simulate_state(fault, [(hold, 0.0)], start_rate=rate, times=[hold], **settings)
-    return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
+    return InitialCondition(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
 
 
-def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> StartingState:
-    """A fault loaded at a rate [m/s], at a given share of the time between the onsets of two events.
+def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> InitialCondition:
+    """Initial condition at the fraction `share` of the time between two onsets, for a loading rate [m/s].
 
     `settings` are ``inertia, method, rtol`` of `simulate_state`.
 
@@ -396,6 +396,7 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
     ParameterError
         For a share outside [0, 1), or a fault without repeated events.
     SimulationError
+        If the integration fails.
     """
     require_positive(loading_rate=rate)
     if not 0 <= share < 1:
@@ -404,8 +405,8 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
         )
     if not derive(fault).unstable:
         raise ParameterError(
-            f"a start late in the cycle needs repeated events. Received {fault.name}, which slides stably. "
-            "Start it in steady sliding."
+            f"an initial condition late in the cycle needs repeated events. Received {fault.name}, which is stable. "
+            "Use steady sliding as initial condition."
         )
     found = cycles(fault, rate, **settings)
     if len(found.onsets) < _CYCLES:
@@ -417,11 +418,11 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> S
     time = float(before + share * (after - before))
     settings |= disturbed(fault, rate).settings
     run = simulate_state(fault, rate, duration=math.nextafter(time, math.inf), times=[time], **settings)
-    return StartingState(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
+    return InitialCondition(slip_rate=float(run.slip_rate[-1]), state=tuple(map(float, run.states[:, -1])))
 
 
 def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
-    """A run at a loading rate [m/s] from near steady sliding, until events repeat.
+    """Run at a loading rate [m/s], initially near steady sliding, until three events have begun.
 
     Without repeated events the run ends at a load of at most 1000 aσ'; the run of a stable fault ends at 10 aσ'.
     `settings` as in `locked`.
@@ -435,6 +436,6 @@ def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
             return run
 
 
-def disturbed(fault: Fault, rate: float) -> StartingState:
-    """Sliding at a rate [m/s] with `_OLDER` times the steady state."""
-    return StartingState(slip_rate=rate, state=tuple(_OLDER * float(v) for v in fault.friction.steady_state(rate)))
+def disturbed(fault: Fault, rate: float) -> InitialCondition:
+    """Initial condition at a slip rate [m/s], with 1.5 times the friction state of steady sliding."""
+    return InitialCondition(slip_rate=rate, state=tuple(_OLDER * float(v) for v in fault.friction.steady_state(rate)))

@@ -20,9 +20,9 @@ class StickSlipLoop(ClosedLoop):
 
     While the fault slips it obeys eq. shift, and results equal those of `ClosedLoop` bitwise as long as p < σ'. It
     stops when the slip rate falls to zero. It rests as long as friction can carry the load, with a slip rate of exactly
-    zero. A step locates at most one release and one stop, to the order of the integrator. Backward slip is not
-    modelled: `reversing` indicates that the load would overcome friction backward. Friction with healing carries
-    `rest_excess` of the law in addition at rest, which is lost at the release.
+    zero. In one step at most one release and one stop are located, with the integrator's order. Backward slip is not
+    modelled: `reversing` indicates that the load would overcome friction backward. With healing, the friction at
+    rest is larger by `rest_excess` of the law; this excess vanishes at the release.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class StickSlipLoop(ClosedLoop):
 
     @property
     def plant(self) -> Motion:
-        """Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²] while it slips; without friction beyond p = σ'."""
+        """Function (t [s], x [m, m/s], p [Pa]) → dx [m/s, m/s²] while the fault slips; no friction where p > σ'."""
         _, normal, _, stress = self.hats()
 
         def rates(time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
-            # cancels the friction of the printed plant where p > σ'
+            # where p > σ', friction of the printed plant would be negative; this term cancels it
             pulling = normal * self.friction(x) * ca.fmin(stress - pressure, 0)
             rate = self.printed(time, x, pressure)
             return rate + ca.vertcat(0, pulling)
@@ -49,7 +49,7 @@ class StickSlipLoop(ClosedLoop):
 
     @property
     def held(self) -> Motion:
-        """As `plant`, with the larger friction of a fault at rest."""
+        """As `plant`, with the friction of a fault at rest, which is larger with healing."""
         plant, excess = self.plant, self.fault.friction.rest_excess
         _, normal, _, stress = self.hats()
         if not excess:
@@ -57,7 +57,7 @@ class StickSlipLoop(ClosedLoop):
         return lambda time, x, p: plant(time, x, p) - ca.vertcat(0, normal * excess * ca.fmax(stress - p, 0))
 
     def resting_load(self, time: ca.SX, slip: ca.SX, pressure: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Load minus friction and load plus friction [m/s²] at rest (SX); rest persists if they are ≤ 0 and ≥ 0."""
+        """Load minus friction, load plus friction [m/s²] at rest (SX); rest persists while first ≤ 0 ≤ second."""
         forward = self.held(time, ca.vertcat(slip, 0), pressure)[1]
         _, normal, _, stress = self.hats()
         friction = self.friction(ca.vertcat(slip, 0)) + self.fault.friction.rest_excess
@@ -75,7 +75,7 @@ class StickSlipLoop(ClosedLoop):
         return ca.if_else(state[1] == 0, ca.fmin(load, held), strength)
 
     def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float, works: int = 0) -> ca.SX:
-        """State after one step, with at most one release and one stop; its last `works` entries are works of forces."""
+        """State after one step, with at most one release and one stop; the last `works` states are works."""
         moved = _SplitStep(self.plant, self.held, method, motion, step, works)
         rests, starting = state[1] == 0, moved.starting_acceleration(0.0, state)
         release = _crossing(starting, moved.starting_acceleration(1.0, moved.rested(0.0, 1.0, state)))
@@ -126,7 +126,7 @@ class _SplitStep:
     def stop(self, begin: Number, start: ca.SX, ahead: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Share of the step at which the slip rate falls to zero, and the state at this time.
 
-        The slip rate is interpolated by the quartic in time with the values and slopes at both ends and the same slip.
+        The slip rate is interpolated by a quartic in time with the same end values, end slopes and integral (slip).
         States of the law and of the pressure path are integrated to this time; without these, works are cubic in time.
         """
         length = (1 - begin) * self.step

@@ -1,7 +1,7 @@
 """Trajectories of runs with export to xarray, pandas and NetCDF, their outcome and figure.
 
 Every run is a `Trajectory`; `LoopTrajectory` is that of a closed loop, with or without an actuator.
-The outcome is tracked, slow slip, earthquake, diverged or opened.
+The outcome of a closed loop is ``tracked``, ``slow slip``, ``earthquake``, ``diverged`` or ``opened``.
 """
 
 import json
@@ -35,13 +35,13 @@ CONVENTIONS = "CF-1.11"
 
 
 def signal(title: str, unit: str, default: Any = MISSING) -> Any:
-    """Field that is a signal, with its long name and SI unit; None means that the run does not have the signal."""
+    """Dataclass field for a signal, with long name and SI unit; its value is None if the run has no such signal."""
     return field(repr=False, metadata={"title": title, "unit": unit}, default=default)
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class Trajectory(ABC):
-    """Result of a run: signals over time with their SI units, metrics, outcome; None for what a run does not have.
+    """Result of a run: signals over time with SI units, metrics and outcome. A missing signal is None.
 
     Attributes
     ----------
@@ -51,11 +51,11 @@ class Trajectory(ABC):
     slip, slip_rate, pressure : ndarray
         x1 [m], x2 [m/s], p [Pa], shape (n,).
     reference, reference_rate, matched_perturbation : ndarray or None
-        r [m], r' [m/s], h [unit of ν], shape (n,); None without a controller.
+        r [m], r' [m/s], h [m/s²], shape (n,); None without a controller.
     friction : ndarray
         Friction coefficient [-], shape (n,).
     metrics : Metrics
-        From all instants.
+        Metrics, computed from every step.
     energy : EnergyBudget or None
         None for a run that diverged, and in slow sliding.
     events : mapping of str to float
@@ -63,7 +63,7 @@ class Trajectory(ABC):
     provenance : mapping
         Method, settings and versions.
     failed : str
-        Reason why the run ended early, other than divergence; empty if it did not.
+        Reason if the run ended early other than by divergence; otherwise empty.
     """
 
     name: str
@@ -93,7 +93,7 @@ class Trajectory(ABC):
 
     @property
     def cycle(self) -> dict[str, float | None] | None:
-        """Recurrence interval [s], slip [m] and magnitude of its last event; None without a seismic cycle."""
+        """Last recurrence interval [s], and slip [m] and magnitude of the last event; None without a seismic cycle."""
         return None
 
     @property
@@ -112,14 +112,14 @@ class Trajectory(ABC):
         return {name: (v, part["title"], part["unit"]) for name, v, part in every if part and v is not None}
 
     def attributes(self) -> Mapping[str, Any]:
-        """Texts and numbers about the run as a whole."""
+        """Metadata of the run: text and numbers."""
         return self.provenance
 
     def to_xarray(self) -> "xr.Dataset":
         """Return an xarray Dataset over ``time``, with the attributes of the CF conventions.
 
-        The time [s] is that since the start of the run. It is not marked as CF's axis T, which is for dates: its unit
-        would have to name a reference date, which a simulation does not have. No value is missing: no fill values.
+        Time is measured from the beginning of the run [s]. It is not marked as axis T of the CF conventions, whose unit
+        must name a reference date. No fill value is set, since no value is missing.
         """
         import xarray as xr
 
@@ -136,7 +136,7 @@ class Trajectory(ABC):
         return dataset
 
     def resample(self, dt: float) -> "xr.Dataset":
-        """Return an xarray Dataset at uniform instants, as for filters and spectra, interpolated linearly.
+        """Return an xarray Dataset at uniform instants by linear interpolation, for example for filters and spectra.
 
         Parameters
         ----------
@@ -184,11 +184,11 @@ class Trajectory(ABC):
 KINDS = ("tracked", "slow slip", "earthquake", "diverged", "opened")
 HARMLESS = ("tracked", "slow slip")
 EARTHQUAKE_SHARE = 0.1
-"""Share of the natural peak: a run that exceeds the reference rate by this much or more is an earthquake."""
+"""A run whose slip rate exceeds the reference rate by at least this fraction of the natural peak is an earthquake."""
 TRACKED_SHARE = 0.01
-"""Share of the natural peak: a tracked run never exceeds the reference rate by more."""
+"""The slip rate of a tracked run exceeds the reference rate by at most this fraction of the natural peak."""
 SLIP_BAND = 0.02
-"""Share of the target slip: largest slip error of a tracked run, the usual settling band."""
+"""Largest slip error of a tracked run, as a fraction of the target slip: the usual 2 % settling band."""
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,11 +198,11 @@ class Outcome:
     Attributes
     ----------
     kind : str
-        One of `KINDS`.
+        One of `KINDS`; for an uncontrolled run with a friction state also ``creep`` or ``unknown``.
     peak_slip_rate : float or None
-        Largest |x2| of the run [m/s], up to an overflow of the law; None after an overflow of the plant.
+        Largest |x2| of the run [m/s], until the law overflows if it does; None if the plant overflows.
     share_of_natural : float or None
-        Its ratio to the peak of the natural earthquake [-]; None also for a fault without a natural earthquake.
+        Ratio of `peak_slip_rate` to the peak of the natural earthquake [-]; None if either does not exist.
     """
 
     kind: str
@@ -232,8 +232,8 @@ class OutcomeCriterion:
     - an ``earthquake``, if its slip rate ever exceeds the largest of the reference by 10 % of the natural peak or more;
     - ``slow slip`` otherwise, or ``diverged`` if the numbers of its law overflow, since the rest of the run is unknown.
 
-    A stable fault has no natural earthquake. Its natural peak is replaced by ω_n·d_max, the peak slip rate of a
-    harmonic oscillation with the target slip as amplitude; with a friction state always by `dynamic_rate`.
+    A stable fault has no natural earthquake: its natural peak is replaced by ω_n·d_max, the peak slip rate of a
+    harmonic oscillation with the target slip as amplitude. For friction with a state it is always `dynamic_rate`.
 
     Attributes
     ----------
@@ -246,7 +246,7 @@ class OutcomeCriterion:
     target_slip : float
         d_max [m].
     dynamic_rate : float, optional
-        aσ'A/(η + √(km)) [m/s] of friction with a state, whose natural peak needs the simulation of a cycle.
+        aσ'A/(η + √(km)) [m/s], for friction with a state, where the natural peak would require simulating a cycle.
     """
 
     natural_peak: float | None
@@ -276,10 +276,10 @@ class OutcomeCriterion:
         peak_slip_rate : float or None
             [m/s]; None where the motion of the plant overflows.
         max_slip_error : float or None
-            [m]; None for a run that ends before errors are evaluated: then the slip rate alone decides.
+            [m]; None for a run that ends before errors are evaluated; the slip rate alone then decides.
         events : mapping of str to float
             Time of first occurrence [s].
-        followed : bool
+        controlled : bool
             Whether there was a controller, and therefore a reference.
         """
         if peak_slip_rate is None:
@@ -376,15 +376,15 @@ class LoopTrajectory(Trajectory):
     moment_per_slip : float
         G·A [N], the seismic moment of one metre of slip.
     integrals : ndarray
-        The law's own states ξ, shape (number of them, n), in `integral_units`.
+        Integral states ξ of the law, shape (number of states, n), in `integral_units`.
     integral_units : tuple of str
     actuation : mapping of str to tuple
-        Signals of an actuator, where `pressure` is that in the fault: values, shape (n,), long name and SI unit of
-        ``well_pressure`` [Pa]; if the actuator stores fluid, also ``injected_volume`` [m³] and ``flow_rate`` [m³/s].
+        Values, shape (n,), long name and SI unit of the signals of an actuator: ``well_pressure`` [Pa] and, if fluid is
+        stored, ``injected_volume`` [m³] and ``flow_rate`` [m³/s]. With an actuator, `pressure` is that in the fault.
     events : mapping of str to float
-        Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'_n), ``reverse_slip`` (x2 < 0), ``stick``
-        (friction holds the fault at rest after the start), ``load_reversed`` (the load at rest exceeds friction
-        backward, which the stick–slip plant leaves out).
+        Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'), ``reverse_slip`` (x2 < 0), ``stick`` (the
+        fault comes to rest after t = 0), ``load_reversed`` (the load on a fault at rest exceeds friction backward; the
+        stick–slip plant does not model the backward slip that would follow).
     criterion : OutcomeCriterion
         Criterion of `outcome`.
     provenance : mapping
@@ -406,7 +406,7 @@ class LoopTrajectory(Trajectory):
 
     @property
     def natural_peak(self) -> float | None:
-        """Largest slip rate of the natural earthquake [m/s], where it was simulated."""
+        """Peak slip rate of the natural earthquake [m/s]; None for a stable fault and in slow sliding."""
         return self.criterion.natural_peak
 
     @property
@@ -453,7 +453,7 @@ class LoopTrajectory(Trajectory):
 
     @property
     def heading(self) -> str:
-        """Name, and number of drawn steps if some are omitted; metrics are of all steps."""
+        """Title: the name and, if steps are omitted, the number of drawn steps. Metrics use all steps."""
         drawn = len(self.time) - 1
         return self.name + (f"\n{drawn} of {self.metrics.steps} steps drawn" if drawn < self.metrics.steps else "")
 

@@ -47,7 +47,7 @@ from quakedesign.lyapunov.exact.premises import Premise
 from quakedesign.plant import plant_like, slow_sliding_plant
 from quakedesign.simulation import (
     Load,
-    PressureCourse,
+    PressureHistory,
     StateTrajectory,
     Trajectory,
     natural_earthquake,
@@ -60,7 +60,7 @@ from quakedesign.simulation.run_settings import PRINTED, STICK_SLIP
 from quakedesign.simulation.slow_sliding import PLANTS, SlidingRun, simulate_sliding
 from quakedesign.simulation.state_plant import TIDE, Tide
 from quakedesign.simulation.stick_slip import (
-    StartingState,
+    InitialCondition,
     cycles,
     disturbed,
     dynamic_rate,
@@ -89,7 +89,7 @@ def run_state(
     start: str = "steady",
     hold: float | None = None,
     share: float | None = None,
-    pressure: PressureCourse | None = None,
+    pressure: PressureHistory | None = None,
     loading_rate: float | None = None,
     duration: float | None = None,
     plant: str = "smooth",
@@ -106,7 +106,7 @@ def run_state(
         Duration of the hold [s].
     share : float, optional
         Share of the recurrence time [-], 0 to 1; 0.9 by default.
-    pressure : PressureCourse, optional
+    pressure : PressureHistory, optional
         None: no pressure.
     loading_rate : float, optional
         v_∞ [m/s]; by default the reference rate of the law.
@@ -314,7 +314,7 @@ def _require_runnable(fault: Fault, plant: str) -> None:
 
 def _start(
     fault: Fault, kind: str, rate: float, hold: float | None, share: float | None, settings: dict[str, Any]
-) -> StartingState:
+) -> InitialCondition:
     options = {"hold": hold, "share": share}
     wanted: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
     require_known(kind, wanted, "start", UnknownNameError)

@@ -20,40 +20,48 @@ Operations = Mapping[type[sp.Basic], Callable[..., Value]]
 
 
 def to_casadi(expressions: Sequence[sp.Expr], values: Values, motion: Sequence[ca.SX] = ()) -> list[ca.SX]:
-    """Expressions as CasADi SX; subexpressions that SymPy shares are shared there too.
+    """Translate expressions to CasADi SX; every common subexpression is translated once.
 
     Parameters
     ----------
     expressions : sequence of Expr
-        In signed and absolute powers, sums, products, powers, comparisons and elementary functions.
+        Expressions of signed and absolute powers, sums, products, powers, comparisons and elementary functions.
     values : mapping of Symbol to SX
         Value of every free symbol.
     motion : sequence of SX
-        Symbols that grow in motion. Where two branches of Max, Min or Abs meet, the derivative is that of the branch
-        which is entered when the first of these symbols grows, or the second if the first has no effect, and so on.
-        Without symbols it is the mean of both branches, as in CasADi. Values do not depend on `motion`.
+        Symbols whose increase defines the direction of motion. Where two branches of Max, Min or Abs meet, the
+        derivative is that of the branch that is entered when the first symbol increases; if this symbol has no effect,
+        the next one decides. Without symbols the derivative is the mean of both branches, as in CasADi. The values do
+        not depend on `motion`.
 
     Returns
     -------
     list of SX
-        The sign at zero is 0.
+        Translated expressions, with sign(0) = 0.
 
     Raises
     ------
     ParameterError
-        For a symbol without a value or an operation that is not known.
+        If a symbol has no value, or an operation is not supported.
     """
     table = {**_casadi_operations(), **(_kinks(ca.vertcat(*motion)) if motion else {})}
     return [ca.SX(item) for item in _translate(expressions, values, table)]
 
 
 def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Value]) -> list[Value]:
-    """Values of expressions at floats or NumPy arrays of one shape, with the operations of `to_casadi`.
+    """Evaluate expressions at floats or at NumPy arrays of one shape, with the operations of `to_casadi`.
+
+    Parameters
+    ----------
+    expressions : sequence of Expr
+        As in `to_casadi`.
+    values : mapping of Symbol to float or array
+        Value of every free symbol.
 
     Raises
     ------
     ParameterError
-        For a symbol without a value or an operation that is not known.
+        If a symbol has no value, or an operation is not supported.
     """
     return _translate(expressions, values, _numpy_operations())
 
@@ -93,13 +101,13 @@ def _operate(node: sp.Basic, table: Operations, walk: Callable[[sp.Basic], Value
             result = table[sp.Piecewise](walk(condition), walk(value), result)
         return result
     if node.func not in table:
-        what = "a value for the symbol" if node.is_Symbol else "a known operation instead of"
-        raise ParameterError(f"an expression to evaluate needs {what} {node}. Received none.")
+        reason = f"the symbol {node} has no value" if node.is_Symbol else f"{node.func.__name__} is not supported"
+        raise ParameterError(f"the expression cannot be evaluated: {reason}.")
     return table[node.func](*(walk(arg) for arg in node.args))
 
 
 def _power(library: ModuleType, base: Value, exponent: sp.Expr) -> Value:
-    """Power, with the exponent ½ as a square root, which is cheaper and correctly rounded."""
+    """Power; exponents ±1, 2, 3, ±1/2 and ±3/2 use products and square roots, which is faster and more accurate."""
     if exponent in (1, -1):
         return base if exponent == 1 else 1 / base
     if exponent in (2, 3):
@@ -188,7 +196,7 @@ def _operations(library: ModuleType, *others: Callable[..., Value]) -> Operation
 
 
 def vectorised(function: ca.Function) -> Callable[..., "np.ndarray"]:
-    """Evaluate a Function of SX at many points at once in NumPy, several times as fast as `Function.map`.
+    """Function that evaluates a CasADi SX Function at many points at once in NumPy, faster than `Function.map`.
 
     Parameters
     ----------
@@ -198,14 +206,19 @@ def vectorised(function: ca.Function) -> Callable[..., "np.ndarray"]:
     Returns
     -------
     callable
-        From arrays of shape (numbers of an input, points), or (numbers, 1) if all points share the input, to the
-        numbers of the output, column by column, in shape (numbers, points).
+        Function of one array per input, of shape (entries, points), or (entries, 1) if all points share the input. It
+        returns the entries of the output in column-major order, of shape (entries, points).
+
+    Raises
+    ------
+    ParameterError
+        If the function contains an unsupported CasADi operation.
     """
     steps: list[tuple[int, list[int], Any]] = []  # operation, places of results, places of arguments or a constant
     for k in range(function.n_instructions()):
         code, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if code not in (ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT) and code not in _INSTRUCTIONS:
-            raise ParameterError(f"an instruction must be a known operation of CasADi. Received number {code}.")
+            raise ParameterError(f"the CasADi operation with code {code} is not supported in vectorised evaluation.")
         steps.append((code, out, function.instruction_constant(k) if code == ca.OP_CONST else into))
 
     def evaluated(*inputs: "np.ndarray") -> "np.ndarray":

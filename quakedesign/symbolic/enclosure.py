@@ -1,8 +1,8 @@
 """Rigorous enclosures of SymPy expressions over boxes, and proofs of upper limits.
 
 Interval arithmetic with rational ends over boxes that may be unbounded: rational operations are exact,
-all others are rounded outwards. Further chapters: ball arithmetic (python-flint), and proof by subdivision
-of the box that an expression stays below a limit.
+all others are rounded outwards. The module also contains ball arithmetic (python-flint), and proofs by
+subdivision of the box that an expression stays below a limit.
 """
 
 import heapq
@@ -38,7 +38,7 @@ EVERYTHING: Interval = (-inf, inf)
 _ZERO, _ONE = Fraction(0), Fraction(1)
 _BITS = 256
 _LONGEST = 3 * _BITS  # bits of a numerator or denominator beyond which an end is rounded
-_LARGEST = 16 * _BITS  # bits of magnitude beyond which an end is rounded to infinity, zero or ±2^∓`_LARGEST`
+_LARGEST = 16 * _BITS  # largest magnitude of a binary exponent of an end; see `upper_end`
 _POWERS = sp.Pow, SignedPower, AbsolutePower
 _RISING: dict[type[sp.Basic], Interval] = {  # with their limits at −inf and inf
     sp.exp: (_ZERO, inf),
@@ -51,7 +51,7 @@ _RISING: dict[type[sp.Basic], Interval] = {  # with their limits at −inf and i
 
 
 def interval(expression: sp.Expr, box: Box) -> Interval:
-    """Interval that contains every value of an expression over a box; the whole line if it may be undefined there.
+    """Interval that contains every value of an expression on a box; (−∞, ∞) if the expression may be undefined there.
 
     Parameters
     ----------
@@ -70,9 +70,10 @@ def interval(expression: sp.Expr, box: Box) -> Interval:
 
 
 def regular(expression: sp.Expr, box: Box) -> bool:
-    """Whether an expression has no pole, no end of its domain and no jump of a signed power on a box.
+    """Whether an expression has no pole, no boundary point of its domain and no jump of a signed power on a box.
 
-    Then its derivatives off the kinks determine its monotonicity; those of `Heaviside` and `sign` contain an impulse.
+    If so, its derivatives off the kinks determine its monotonicity; jumps of `Heaviside` and `sign` appear in them as
+    `DiracDelta`.
     """
     intervals = _intervals(expression, box)
     ends = [intervals[node.args[0]] for node in intervals if _singular_at_zero(node)]
@@ -121,7 +122,7 @@ def _operate(node: sp.Basic, walk: Callable[[sp.Basic], Interval]) -> Interval:
 
 def _without(what: str) -> NoReturn:
     raise UnsupportedError(
-        f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, sinh, tanh, Abs, Min or Max."
+        f"no enclosure for {what}: use rational powers, exp, log, sin, cos, asinh, sinh, tanh, Abs, Min and Max only."
     )
 
 
@@ -317,7 +318,7 @@ def enclose(expression: sp.Expr, box: BallBox) -> arb:
     Returns
     -------
     flint.arb
-        Not finite if the expression is undefined somewhere in the box.
+        Enclosure; not finite if the expression may be undefined somewhere in the box.
 
     Raises
     ------
@@ -419,7 +420,7 @@ def _operation(e: sp.Expr) -> Operation:
 
 def _without_ball(what: str) -> Operation:
     def reject(values: list[arb]) -> arb:
-        raise UnsupportedError(f"no enclosure for {what}. Write it with powers, exp, log, sin, cos, asinh, Min or Max.")
+        raise UnsupportedError(f"no enclosure for {what}: use rational powers, exp, log, sin, cos, asinh, Min, Max.")
 
     return reject
 
@@ -481,14 +482,18 @@ def upper_bound(
     pieces: int = 1500,
     limit: Fraction | None = None,
 ) -> Fraction:
-    """Rigorous upper bound of |expression| over a box, by subdivision.
+    """Rigorous upper bound on |expression| over a box, by subdivision.
 
     Parameters
     ----------
+    expression : Expr
+        As in `enclose`.
+    box : mapping of Symbol to (low, high)
+        Range of every symbol.
     tolerance : Fraction
         Stop when the bound is within this relative distance of an attained value.
     pieces : int
-        Largest number of subdivisions; the bound is rigorous whenever it stops.
+        Largest number of subdivisions; the bound is rigorous even if this number is reached.
     limit : Fraction, optional
         Stop as soon as the bound is below the limit, or an attained value shows that it cannot be.
 
@@ -594,7 +599,8 @@ def upper_limit(expression: sp.Expr, box: Box, limit: Fraction, slack: Fraction)
     Returns
     -------
     Fraction, Excess or Undecided
-        Bound; or `Excess` with a point at which the expression exceeds limit + slack.
+        Proved bound; `Excess` with a point at which the expression exceeds limit + slack; `Undecided` if subdivision
+        gave neither.
 
     Raises
     ------
@@ -646,7 +652,7 @@ class _Form:
         return interval(self.slopes[symbol], box)
 
     def highest(self, box: Box) -> End:
-        """Smaller upper end of the plain enclosure and, on a bounded box, of the mean-value form."""
+        """Upper bound: the smaller of the plain enclosure's and, on a bounded box, the mean-value form's upper end."""
         high = interval(self.expression, box)[1]
         if any(isinstance(end, float) for ends in box.values() for end in ends) or not regular(self.expression, box):
             return high

@@ -22,12 +22,12 @@ _UNITS = {"slip": "m", "rate": "m/s"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionBounds:
-    """Bounds of a friction law and of its continuation, for every slip and slip rate."""
+    """Proved bounds of a friction law on its domain and, for a law without state, of its continuation."""
 
     # least, most: Bounds of the friction coefficient [-], 0 < least
     least: Fraction
     most: Fraction
-    slip_slope: Fraction  # Largest chord slope in slip [1/m]; with state, along a motion in which the state evolves
+    slip_slope: Fraction  # Largest chord slope in slip [1/m]; with state variables, along a motion in which they evolve
     rate_slope: Fraction  # Largest chord slope in slip rate [s/m], at a fixed state
     weakens: bool  # Whether friction is proved not to grow with slip
 
@@ -48,7 +48,8 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
 
     A declared value is returned if it is proved; otherwise the proved value, if it exceeds the declared one by less
     than 1e-9 relative. `coefficient` is examined for slip ≥ 0 and slip rates ≥ 0 within `working_rates`, with states
-    between the steady ones of these rates; `extended` for all slips and slip rates.
+    between the steady states at the ends of `working_rates`. `extended` is examined for all slips and slip rates, but
+    only for a law without state.
 
     Raises
     ------
@@ -58,7 +59,7 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
         If this cannot be decided.
     """
     exact = law.exact()
-    courses = list(_courses(law, exact))
+    courses = list(_friction_ranges(law, exact))
     low, high = exact.bounds
     bounds = FrictionBounds(
         least=-_confirmed(law, courses, "the lower bound", -_declared(low), lambda c: [-c.friction]),
@@ -79,7 +80,7 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
     return bounds
 
 
-def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_FrictionRange]:
+def _friction_ranges(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_FrictionRange]:
     """The law within its domain, and its continuation if it has no state."""
     slip, rate = sp.symbols("slip rate", nonnegative=True)
     states = sp.symbols([*law.state_names], positive=True)
@@ -104,11 +105,11 @@ def _courses(law: FrictionLaw, exact: FrictionLaw) -> Iterator[_FrictionRange]:
 
 
 def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
-    """Friction without jumps, which slopes would not reveal."""
+    """Return the friction expression unchanged; reject it if it may jump, since slopes do not reveal jumps."""
     continued = sp.sympify(friction)
     signs = [power for power in continued.atoms(SignedPower) if power.args[1] == 0]
     if signs or continued.has(sp.sign, sp.Heaviside, sp.DiracDelta):
-        raise UnsupportedError(f"nothing can be proved with {law.name}, whose friction may jump. Make it continuous.")
+        raise UnsupportedError(f"no bounds can be proved: friction of {law.name} may jump. Make the law continuous.")
     return continued
 
 
@@ -126,7 +127,7 @@ def _confirmed(
             try:
                 answer = upper_limit(part, course.box, declared, SLACK * abs(declared))
             except UnsupportedError as error:
-                raise UnsupportedError(f"nothing can be proved with {law.name}: {error}") from None
+                raise UnsupportedError(f"no bounds of {law.name} can be proved: {error}") from None
             if isinstance(answer, Excess):
                 raise ParameterError(_disagreement(law, what, declared, answer))
             if isinstance(answer, Undecided):
@@ -138,15 +139,15 @@ def _confirmed(
 def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Excess) -> str:
     at = ", ".join(f"{x} {float(value):.4g} {_UNITS.get(str(x), '')}".rstrip() for x, value in answer.at.items())
     return (
-        f"{what} of {law.name} must be valid. Declared {float(abs(declared)):.6g}, but "
-        f"{'at ' + at if at else 'everywhere'} the law has {float(abs(answer.value)):.6g}. Correct the declared value."
+        f"{what} of {law.name} contradicts the law: declared {float(abs(declared)):.6g}, but "
+        f"{'at ' + at if at else 'everywhere'} it is {float(abs(answer.value)):.6g}. Correct the declared value."
     )
 
 
 def _undecided(law: FrictionLaw, what: str, declared: Fraction, answer: Undecided) -> str:
     at = ", ".join(f"{x} from {float(low):.3g} to {float(high):.3g}" for x, (low, high) in answer.where.items())
     return (
-        f"nothing can be proved with {law.name}: {what}, declared as {float(abs(declared)):.6g}, is not confirmed for "
+        f"no bounds of {law.name} can be proved: {what}, declared as {float(abs(declared)):.6g}, is undecided for "
         f"{at}. Write the law in another form, or limit the slip with Min."
     )
 

@@ -77,7 +77,7 @@ class Homogeneity:
     weights : mapping of Symbol to Rational
         r_i of every state.
     degree : Rational or None
-        Degree, if proved; also None for a function or field that is identically zero.
+        Degree, if proved. For a function or field that is identically zero, the requested degree or None.
     proof : tuple of Identity
         One identity for a function, one for every component of a field; empty without a proof.
     counterexample : Counterexample or None
@@ -142,17 +142,17 @@ def homogeneous(
     Parameters
     ----------
     subject : Expr or mapping of Symbol to Expr
-        A function V(Δx) = ε^m V(x), or a field f(Δx) = ε^m Δf(x), single- or set-valued; parameters in intervals and
-        all other symbols are not dilated.
+        A function V, tested for V(Δx) = ε^m V(x), or a field f, tested for f(Δx) = ε^m Δf(x), single- or set-valued.
+        Only the symbols in `weights` are dilated.
     weights : mapping of Symbol to int or Rational
         r_i > 0 of every state.
     degree : int or Rational, optional
-        Degree to prove or refute; computed unless given.
+        Degree to prove or refute; by default the degree is computed.
 
     Returns
     -------
     Homogeneity
-        True if homogeneity is proved.
+        Verdict with its proof or counterexample; its truth value is True only if homogeneity is proved.
 
     Raises
     ------
@@ -259,19 +259,19 @@ def _differ(left: sp.Expr, right: sp.Expr) -> bool:
 
 
 def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -> dict[sp.Symbol, sp.Rational]:
-    """Weights for homogeneity of a degree, from the linear equations of the field's terms, with proof.
+    """Unique weights for which a field is proved homogeneous of a given degree.
 
     Parameters
     ----------
     rates : mapping of Symbol to Expr
         Rate of every state.
     degree : int or Rational
-        For example −1 for sliding modes with a discontinuous integral.
+        Degree of homogeneity, for example −1 for sliding modes with a discontinuous integral.
 
     Raises
     ------
     ParameterError
-        If no weights exist, or they are not unique.
+        If positive weights do not exist or are not unique, a term has no degree, or homogeneity is not proved.
     """
     unknown = {state: sp.Dummy(f"r_{state}", positive=True) for state in rates}
     equations: list[sp.Expr] = []
@@ -299,12 +299,14 @@ def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -
 def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.Expr]) -> sp.Expr:
     """Degree of an expression from the degrees of its symbols; degrees add up in products.
 
-    Conditions for sums, extremes and arguments of functions are appended to `equations`, as expressions that vanish.
+    Conditions for sums, Max, Min and arguments of functions are appended to `equations`, as expressions that must be 0.
 
     Parameters
     ----------
     sizes : mapping of Symbol to Expr
-        Degrees, linear in the unknowns; every other symbol has degree 0.
+        Degrees of symbols, linear in the unknowns; every other symbol has degree 0.
+    equations : list of Expr
+        List that is extended in place.
     """
     if e in sizes or not e.has(*sizes):
         return sizes.get(e, sp.Integer(0))

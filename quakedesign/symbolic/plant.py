@@ -1,8 +1,8 @@
 """Symbolic plant and error dynamics, derived from the force balance of the spring-slider.
 
 SymPy derives the shifted plant, the error dynamics, the matched perturbation and the instability
-conditions. Further chapters: notation in LaTeX or plain text, and stored derivations (`derived.json`,
-re-derived by a test).
+conditions. The module also contains the notation in LaTeX and plain text, and stored derivations
+(`derived.json`, which a test derives again).
 """
 
 import json
@@ -29,10 +29,11 @@ def _read(text: str) -> sp.Basic:
 
 
 # ----------------------------------------------------------------------
-# Stored derivations, which are equal for every fault.
+# Stored derivations, which are the same for every fault.
 #
-# `derived.json` contains results that take SymPy half a second, by function and names of states; all others are
-# derived. A test derives every entry again and compares; ``write_whole(FILE, derived_again())`` updates the file.
+# `derived.json` contains the results that take SymPy half a second or more, with the names of function and states as
+# key; the others are derived at run time.
+# A test derives every entry again and compares; ``write_whole(FILE, derived_again())`` updates the file.
 
 FILE = Path(__file__).parent / "derived.json"
 _Given = ParamSpec("_Given")
@@ -40,7 +41,10 @@ _Result = TypeVar("_Result")
 
 
 def stored(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
-    """Decorator: read results of a derivation if stored. The derivation has one argument, names of states, or none."""
+    """Decorator that reads stored results of a derivation, whose only positional argument, if any, is the state names.
+
+    With keyword options, as for a result that is not stored, the derivation is run.
+    """
     home = derivation.__module__.rpartition(".")[2]
 
     @cache
@@ -178,18 +182,21 @@ def _error_acceleration() -> sp.Expr:
 
 @stored
 def control_coefficient() -> sp.Expr:
-    """β [-]."""
+    """Control coefficient β [-] of eq. esystem3."""
     return sp.simplify(sp.expand(_error_acceleration()).coeff(nu))
 
 
 @stored
 def matched_perturbation() -> sp.Expr:
-    """h [m/s²]."""
+    """Matched perturbation h [m/s²] of eq. esystem3."""
     return _error_acceleration().subs(nu, 0) / control_coefficient()
 
 
 def with_law(expression: sp.Expr, law: FrictionLaw, *, extended: bool = False) -> sp.Expr:
-    """Insert a friction law (with symbols, or `law.exact()` with numbers) for μ, and μ(0, 0) for μ*."""
+    """Insert a friction law (with symbols, or `law.exact()` with numbers) for μ, and μ(0, 0) for μ*.
+
+    With `extended`, the law's continuation `law.extended` is inserted for μ.
+    """
     coefficient = law.extended if extended else law.coefficient
     start = sp.sympify(law.coefficient(sp.Integer(0), sp.Integer(0)))
     return expression.replace(mu, coefficient).subs(mu_star, start)
@@ -202,7 +209,7 @@ def with_disturbance(expression: sp.Expr, fault: Fault) -> sp.Expr:
 
 @cache
 def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
-    """Exact nominal value of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] and σ'_n [Pa]."""
+    """Exact nominal values of k̂ [1/s²], η̂ [1/s], N̂ [m²/kg] and σ'_n [Pa]."""
     return hatted_parameters(fault, {name: sp.Rational(str(rational(getattr(fault, name)))) for name in PARAMETERS})
 
 
@@ -222,7 +229,7 @@ acceleration_error = sp.Symbol(r"\dot{e}_2", real=True)
 
 @stored
 def matched_rate() -> sp.Expr:
-    """h' along a solution, in friction, its slopes, the reference and its derivatives, and e1, e2, e2'.
+    """Rate h' [m/s³] along a solution, from friction and its slopes, the reference and its derivatives, e1, e2 and e2'.
 
     The disturbance enters by its value φ, its explicit rate φ_t and its growth φ_1 in slip and φ_2 in slip rate. The
     control acts on h' through e2' = β(ν + h) (ERRATA 16).
@@ -255,7 +262,7 @@ def matched_rate() -> sp.Expr:
 
 @stored
 def matched_rate_in_parts() -> sp.Tuple:
-    """h' as two expanded parts: the contribution of the slopes of friction, and the rest."""
+    """h' [m/s³] as two parts: the contribution of the friction slopes (collected), and the rest (expanded)."""
     slopes = (slip_slope, rate_slope)
     total = sp.expand(matched_rate())
     flat = sp.expand(total.subs(dict.fromkeys(slopes, 0)))

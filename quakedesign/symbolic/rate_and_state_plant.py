@@ -1,8 +1,8 @@
 """Plant with rate-and-state friction about steady sliding, with and without inertia.
 
-Chapters: third-order and quasi-dynamic plant with slopes and stability conditions; error dynamics about
-slow sliding in slip and the logarithms of slip rate and state; slip rate of the equilibrium for the
-linearisation.
+The module contains the third-order and the quasi-dynamic plant with slopes and stability conditions; the
+error dynamics about slow sliding, in slip and the logarithms of slip rate and state; and the slip rate of
+the equilibrium for the linearisation.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,8 @@ def _state_rates(names: tuple[str, ...]) -> list[sp.Expr]:
 def sliding_acceleration(names: tuple[str, ...] = ()) -> sp.Expr:
     """v' [m/s²] of the force balance, measured from sliding at v_∞ without pressure and disturbance.
 
-    x1 is the slip ahead of steady sliding [m], v the slip rate [m/s], and μ a function of x1, v and the states `names`.
+    x1 is the slip relative to steady sliding [m],
+    v the slip rate [m/s], and μ a function of x1, v and the states `names`.
     The far end moves at v_∞, so that the stretch of the spring is constant and balances μ* and the damping.
     """
     z, v, acceleration, far, z_star, far_start = sp.symbols("z v a delta_far z^* far", real=True)
@@ -66,7 +67,7 @@ def sliding_acceleration(names: tuple[str, ...] = ()) -> sp.Expr:
 
 @cache
 def slope_symbols(names: tuple[str, ...] = ()) -> dict[sp.Expr, sp.Symbol]:
-    """Real symbol of every slope of friction and of the state rates, by its derivative."""
+    """Map from every derivative of friction and of the state rates to the real symbol of this slope."""
     states = state_symbols(names)
     tags = ["x_1", "v", *names]
     slopes = dict(
@@ -92,7 +93,7 @@ def jacobian(names: tuple[str, ...] = ()) -> sp.Matrix:
 
 
 def slopes(law: FrictionLaw, at_rate: sp.Expr = loading_rate) -> dict[sp.Symbol, sp.Expr]:
-    """Every slope of a law in steady sliding, by the symbol in `jacobian`.
+    """Slopes of a law in steady sliding, keyed by their symbols in `jacobian`.
 
     Parameters
     ----------
@@ -210,8 +211,9 @@ def _solved(expression: sp.Expr, law: FrictionLaw) -> sp.Basic:
 def nucleation_length(law: FrictionLaw) -> sp.Expr:
     """Length L [m] whose stiffness per area G/L is critical without inertia and damping.
 
-    A fault shorter than L slides stably (Dieterich 1992, Tectonophysics 211, 115, with the stiffness of the
-    spring-slider, G/L, in place of a crack's). Infinite if no stiffness is critical, negative if none is unstable.
+    A fault shorter than L slides stably (Dieterich 1992, Tectonophysics 211, 115, with the stiffness G/L of the
+    spring-slider in place of that of a crack). Infinite if no stability condition depends on the stiffness; negative
+    if no stiffness is unstable.
     """
     critical = critical_stiffness(law, inertia=False).subs(eta_hat, 0)
     return _tidy(shear_modulus * N_hat / critical) if critical != 0 else sp.oo
@@ -220,7 +222,8 @@ def nucleation_length(law: FrictionLaw) -> sp.Expr:
 def quasi_dynamic_rates(law: FrictionLaw) -> tuple[sp.Expr, ...]:
     """(v', θ', …) of the plant without inertia, from the time derivative of the balance of forces.
 
-    The pressure is constant; needs η̂ + N̂(σ' − p)μ_v > 0, else the rate jumps (Rice and Ben-Zion 1996).
+    Pressure is constant and the disturbance is zero. Requires η̂ + N̂(σ' − p)μ_v > 0; otherwise the slip rate jumps
+    (Rice and Ben-Zion 1996).
     """
     names = law.state_names
     states = state_symbols(names)
@@ -265,7 +268,7 @@ def is_steady(law: FrictionLaw) -> bool:
 
 
 def without_overflow(friction: sp.Expr) -> sp.Expr:
-    """Friction with arsinh z = L + log(1 + √(1 + e^(−2L))), L = log z, for large z such as e^(μ/a)."""
+    """Replace arsinh z by L + log(1 + √(1 + e^(−2L))), L = log z, which does not overflow for z such as e^(μ/a)."""
 
     def of_logarithm(z: sp.Expr) -> sp.Expr:
         positive = {x: sp.Symbol(x.name, positive=True) for x in z.free_symbols}
@@ -277,7 +280,7 @@ def without_overflow(friction: sp.Expr) -> sp.Expr:
 
 
 # ----------------------------------------------------------------------
-# Errors about slow sliding of a fault with rate-and-state friction: slip, and the logarithms of rate and state.
+# Error dynamics about slow sliding with rate-and-state friction, in slip and the logarithms of slip rate and state.
 #
 # Errors are relative to sliding at V without inertia, with v = Ve^y, θ = θ_ss(V)e^z, the slip error x, the pressure
 # error q = p − p* and a shear stress s on the fault, all per unit of area:
@@ -294,10 +297,10 @@ sliding_rate = sp.Symbol("V", positive=True)
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingErrors:
-    """Changes of friction and state about sliding at `sliding_rate`, in `log_rate` y and `log_state` z."""
+    """Friction error and rate of the state error about sliding at `sliding_rate`, in `log_rate` y and `log_state` z."""
 
     friction_change: sp.Expr  # μ(y, z) − μ* [-]
-    state_change: sp.Expr  # z′ [1/s]
+    log_state_rate: sp.Expr  # z′ [1/s]
 
     @cached_property
     def slopes(self) -> tuple[sp.Expr, sp.Expr]:
@@ -307,7 +310,7 @@ class SlidingErrors:
     @cached_property
     def decays(self) -> tuple[sp.Expr, sp.Expr]:
         """−∂z′/∂y and −∂z′/∂z [1/s] in steady sliding."""
-        return -self._at_rest(self.state_change, log_rate), -self._at_rest(self.state_change, log_state)
+        return -self._at_rest(self.log_state_rate, log_rate), -self._at_rest(self.log_state_rate, log_state)
 
     @staticmethod
     def _at_rest(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
@@ -335,7 +338,7 @@ def sliding_errors(law: FrictionLaw) -> SlidingErrors:
     moved = law.state_rates(0, rate, state)[0] / state
     return SlidingErrors(
         friction_change=_tidy_sliding(change),
-        state_change=sp.simplify(sp.expand_log(sp.simplify(moved), force=True)),
+        log_state_rate=sp.simplify(sp.expand_log(sp.simplify(moved), force=True)),
     )
 
 
@@ -364,7 +367,7 @@ def operating_rate(fault: Fault, rate: float | str | Fraction | None = None) -> 
     if value < 0 or not low <= value <= high:
         raise ParameterError(
             f"loading_rate must be zero or positive and in the working range {low!r} to {high!r} m/s of {law.name}. "
-            f"Received {shortly(value)} m/s. Change it, or widen the range of the law."
+            f"Received {shortly(value)} m/s. Choose a rate in this range, or widen the range."
         )
     if value > 0 and not is_steady(law.symbolic()):
         raise ParameterError(

@@ -28,7 +28,7 @@ def off_kinks() -> Iterator[None]:
         yield
     finally:
         _ALLOW_KINKS.reset(token)
-        clear_cache()  # SymPy caches derivatives; these must not be used outside
+        clear_cache()  # SymPy caches derivatives; those from this context must not be reused outside it
 
 
 def slope_off_kinks(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
@@ -54,7 +54,7 @@ class _Power(sp.Function):  # type: ignore[misc]
         """
         x, a = self.args
         if argindex != 1:
-            raise KinkError("the exponent of a signed power is a constant; it cannot be differentiated.")
+            raise KinkError("a signed power cannot be differentiated with respect to its exponent, which is constant.")
         smooth = sp.simplify(a - 1).is_nonnegative if isinstance(self, SignedPower) else (a - 1).is_positive
         if not smooth and not _ALLOW_KINKS.get():
             raise KinkError(
@@ -84,7 +84,7 @@ class SignedPower(_Power):
 
     @classmethod
     def eval(cls, x: Any, a: Any) -> sp.Expr | None:
-        """Evaluate a = 1 and numbers, and extract signs."""
+        """Evaluate a = 1 and numeric arguments, and extract the sign of the argument."""
         if a == 1:
             return x
         if x.is_number and a.is_number and x.is_real and (x != 0 or a >= 0):
@@ -111,7 +111,7 @@ class AbsolutePower(_Power):
 
     @classmethod
     def eval(cls, x: Any, a: Any) -> sp.Expr | None:
-        """Evaluate a = 0, numbers, and drop signs."""
+        """Evaluate a = 0 and numeric arguments, and drop the sign of the argument."""
         if a == 0:
             return sp.Integer(1)
         if x.is_number and a.is_number and x.is_real and (x != 0 or a > 0):
@@ -130,11 +130,11 @@ _ROUNDS = 6
 
 
 def normal_form(expression: sp.Expr) -> sp.Expr:
-    """Equal expression, expanded, with every product of powers of one base merged and every nested power flattened.
+    """Equivalent expanded expression with products of powers of one base merged and nested powers flattened.
 
     Rules, for real arguments: ⌈⌈x⌋^a⌋^b = ⌈x⌋^{ab}, |⌈x⌋^a|^b = |x|^{ab}, ⌈xy⌋^a = ⌈x⌋^a⌈y⌋^a, |x|^a⌈x⌋^b = ⌈x⌋^{a+b},
-    ⌈x⌋^a⌈x⌋^b = |x|^{a+b}; `sympy.sign` and `sympy.Abs` become ⌈·⌋⁰ and |·|. A product of two signs of one argument is
-    1, as for the limits that span a Filippov set.
+    ⌈x⌋^a⌈x⌋^b = |x|^{a+b}; `sympy.sign` and `sympy.Abs` become ⌈·⌋⁰ and |·|. A product of two signs of the same
+    argument is 1 also where the argument is zero, which is correct for the limits that span a Filippov set.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def normal_form(expression: sp.Expr) -> sp.Expr:
     for power in current.atoms(AbsolutePower, SignedPower):
         if power.args[0].is_zero and power.args[1].is_negative:
             raise KinkError(
-                f"a negative power {power.args[1]} of zero remains: the expression is not defined on this set."
+                f"the expression contains 0 to the negative power {power.args[1]} and is therefore undefined."
             )
     return current
 
@@ -211,7 +211,7 @@ def _spread_factor(kind: type, factor: sp.Expr, a: sp.Expr) -> sp.Expr:
 
 
 def _content(inner: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Positive factor and rest of an expanded sum: common powers of positive symbols and common whole powers."""
+    """Common factor and remainder of an expanded sum; the factor has integer powers of symbols that may be negative."""
     terms = sp.Add.make_args(inner)
     if len(terms) == 1:
         return sp.Integer(1), inner

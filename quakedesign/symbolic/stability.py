@@ -36,11 +36,11 @@ _PIECES = 200
 
 
 class Stability(Enum):
-    """Three outcomes; the third one is a valid result at a stability boundary."""
+    """Outcome of a stability test; ``UNDECIDED`` is a valid result at a stability boundary."""
 
     STABLE = "every condition is positive"
     UNSTABLE = "a condition is negative"
-    UNDECIDED = "a condition is zero, or changes sign in the range"
+    UNDECIDED = "the enclosure of a condition contains zero, and no condition is proved negative"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,9 +48,9 @@ class Condition:
     """One expression that must be positive for stability, and its value."""
 
     expression: sp.Expr  # In the symbols of the plant and the slopes of friction (`state_plant.stability_conditions`)
-    # Enclosure of the expression over the sum of the magnitudes of its parts [-], in [−1, 1]. The parts are those
-    # with and without the stiffness k, so that a condition k > k_c has the margin (k − k_c)/(k + |k_c|). The parts of a
-    # condition without stiffness are its terms.
+    # Enclosure of the expression divided by the sum of the magnitudes of its parts [-], in [−1, 1]. The parts are the
+    # coefficients of the powers of the stiffness k, each times its power, so that k > k_c has the margin
+    # (k − k_c)/(k + |k_c|). The parts of a condition without stiffness are its terms.
     margin: Interval
     exact: bool  # Whether both ends are the same exact rational
 
@@ -103,7 +103,7 @@ def stability(
     inertia : bool
         Whether the plant has mass; without it the plant is quasi-dynamic.
     uncertain : bool
-        Whether stiffness, damping and authority vary over the fault's uncertainty box.
+        Whether stiffness, damping and control authority vary over the fault's uncertainty box.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def _interval(pressure: Pressure, fault: Fault) -> Interval:
     if not ends[0] <= ends[1] < rational(fault.effective_normal_stress):
         raise ParameterError(
             f"pressure must be below the effective normal stress {fault.effective_normal_stress!r} Pa, and a range "
-            f"must ascend. Received {shortly(ends[0])} to {shortly(ends[1])} Pa. Above it the fault opens."
+            f"must ascend. Received {shortly(ends[0])} to {shortly(ends[1])} Pa. At this stress the fault opens."
         )
     return ends
 
@@ -229,13 +229,22 @@ def _ratio(terms: list[sp.Expr], box: BallBox) -> Interval:
 def critical_stiffness(
     fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True
 ) -> float:
-    """Stiffness k_c [N/m] below which the fault is unstable, in closed form; not positive if it is always stable.
+    """Critical stiffness k_c [N/m] in closed form: a fault with a smaller stiffness is unstable.
+
+    Zero if no stability condition depends on the stiffness; zero or negative if every stiffness is stable.
 
     Parameters
     ----------
     fault : Fault
     pressure, loading_rate, inertia
+        As in `stability`, but with one pressure [Pa], not a range.
+
+    Raises
+    ------
+    ParameterError
         As in `stability`.
+    UnsupportedError
+        If the friction law has several state variables.
     """
     expression = state_plant.critical_stiffness(fault.friction.symbolic(), inertia=inertia)
     return float(_number(expression, fault, pressure, loading_rate)) * fault.mass
@@ -248,7 +257,14 @@ def nucleation_length(fault: Fault, *, pressure: float = 0, loading_rate: float 
     ----------
     fault : Fault
     pressure, loading_rate
+        As in `stability`, but with one pressure [Pa], not a range.
+
+    Raises
+    ------
+    ParameterError
         As in `stability`.
+    UnsupportedError
+        If the friction law has several state variables.
     """
     expression = state_plant.nucleation_length(fault.friction.symbolic())
     length = float(_number(expression, fault, pressure, loading_rate))
@@ -274,13 +290,13 @@ _DIGITS = 50
 
 
 class _Forms(NamedTuple):
-    """Derivations of a plant: `general` and `jacobian` from names of states, the others from a friction law."""
+    """Derivations of a plant; `general` and `jacobian` take state names, `acceleration` and `instability` a law."""
 
     general: Callable[[tuple[str, ...]], sp.Expr]
     jacobian: Callable[[tuple[str, ...]], sp.Matrix]
     acceleration: Callable[[FrictionLaw], sp.Expr]
     instability: Callable[[FrictionLaw], sp.Basic]
-    soft: str
+    soft: str  # Text of the cause if the stiffness is below its limit
 
 
 _AT_REST = _Forms(
@@ -295,7 +311,7 @@ _SLIDING = _Forms(
     jacobian=state_plant.jacobian,
     acceleration=lambda law: state_plant.third_order_rates(law)[1],
     instability=state_plant.instability,
-    soft="the spring is softer than the critical stiffness",
+    soft="the stiffness of the spring is below its critical value",
 )
 _forms_of = by_equilibrium(rest=lambda fault: _AT_REST, sliding=lambda fault: _SLIDING)
 
@@ -359,12 +375,12 @@ class Model:
 
     @property
     def unstable(self) -> bool:
-        """Whether the fault is unstable without control; decided in exact or ball arithmetic."""
+        """Whether the fault is proved unstable without control, in exact or ball arithmetic; False if undecided."""
         return self.stability.outcome is Stability.UNSTABLE
 
     @cached_property
     def reasons(self) -> tuple[str, ...]:
-        """Texts of the conditions for instability that hold, with their numbers [1/s², 1/s]."""
+        """Texts of the instability conditions that are met, with the values of both sides [1/s² or 1/s]."""
         if not self.unstable:
             return ()
         templates = {
@@ -382,7 +398,7 @@ class Model:
 
     @cached_property
     def eigenvalues(self) -> tuple[complex, ...]:
-        """Eigenvalues of the uncontrolled fault [1/s], largest real part first."""
+        """Eigenvalues [1/s] of the uncontrolled fault at zero pressure, largest real part first."""
         values = self.values | {state_plant.effective_stress: self.values[plant.sigma]}
         coefficients = [c.subs(values) for c in state_plant.characteristic(self._names)]
         with mpmath.workdps(_DIGITS):
@@ -412,6 +428,6 @@ def derive(fault: Fault) -> Model:
     Returns
     -------
     Model
-        With ``instability``, ``error_dynamics``, ``jacobian`` (SymPy) and ``_repr_latex_``.
+        Model with the SymPy properties ``instability``, ``error_dynamics`` and ``jacobian``; displays as LaTeX.
     """
     return Model(require_fault(fault))

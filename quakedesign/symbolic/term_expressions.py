@@ -34,7 +34,7 @@ def to_terms(expression: sp.Expr, states: Sequence[sp.Symbol]) -> tuple[Term, ..
 def without_nesting(
     expressions: Sequence[sp.Expr], states: Sequence[sp.Symbol], taken: Iterable[str] = ()
 ) -> tuple[dict[sp.Symbol, sp.Expr], list[sp.Expr]]:
-    """Replace the argument of every signed power of a sum by a new symbol (lift), so that no power is nested.
+    """Replace every sum inside a signed or absolute power by a new symbol (lift), so that no power is nested.
 
     Powers of a product of states need no symbol: ⌈x²⌋⁰ = 1 and ⌈xy⌋⁰ = ⌈x⌋⁰⌈y⌋⁰ where neither vanishes.
 
@@ -99,7 +99,7 @@ def _power(base: sp.Expr, power: sp.Expr, states: Container[sp.Symbol]) -> Facto
 
 
 def from_terms(terms: Iterable[Term], symbols: Mapping[str, sp.Symbol]) -> sp.Expr:
-    """SymPy expression of terms; `symbols` gives the symbol of every name."""
+    """SymPy expression of a sum of terms; `symbols` maps every name to its symbol."""
     kinds = {"s": SignedPower, "a": AbsolutePower}
     total = sp.Integer(0)
     for term in terms:
@@ -113,7 +113,7 @@ def from_terms(terms: Iterable[Term], symbols: Mapping[str, sp.Symbol]) -> sp.Ex
 
 
 def lie_derivative(function: sp.Expr, field: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """Σ ∂V/∂x_i · f_i.
+    """Lie derivative Σ ∂V/∂x_i·f_i of a function V along a field f.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def real_symbols(names: Iterable[str]) -> dict[str, sp.Symbol]:
     Raises
     ------
     ParameterError
-        For a name that is not a text.
+        If a name is not a string.
     """
     listed = list(names)
     if wrong := [name for name in listed if not isinstance(name, str)]:
@@ -142,17 +142,21 @@ def real_symbols(names: Iterable[str]) -> dict[str, sp.Symbol]:
 
 
 def signed_monomials(weights: Mapping[str, int], degree: int, domain: str) -> tuple[Term, ...]:
-    """Every C¹ product of signed powers of a degree that is even under x → −x.
+    """All C¹ products of signed and absolute powers that have a given degree and are even under x → −x.
 
     Parameters
     ----------
+    weights : mapping of str to int
+        Weight of every state.
+    degree : int
+        Weighted degree of every product.
     domain : str
         ``"cells"``, or ``"reals"`` for polynomials only.
 
     Returns
     -------
     tuple of Term
-        With coefficient 1.
+        Products with coefficient 1.
     """
     terms = []
     for degrees in product(range(degree + 1), repeat=len(weights)):

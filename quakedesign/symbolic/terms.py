@@ -14,11 +14,11 @@ Factor = tuple[str, Fraction, str]
 
 @dataclass(frozen=True, slots=True, order=True)
 class Term:
-    """coefficient · parameters · factors."""
+    """Product of a rational coefficient, parameters, and signed or absolute powers of states."""
 
     coefficient: Fraction
-    parameters: tuple[str, ...]  # Names, each repeated by its power
-    factors: tuple[Factor, ...]  # At most one for every state
+    parameters: tuple[str, ...]  # Names; a parameter to the power n occurs n times
+    factors: tuple[Factor, ...]  # At most one per state
 
 
 def plain(terms: Iterable[Term]) -> list[Any]:
@@ -39,7 +39,7 @@ def collected(terms: Iterable[Term], states: Sequence[str]) -> tuple[Term, ...]:
 
 
 def multiplied(factors: Iterable[Factor]) -> tuple[Factor, ...]:
-    """Product of signed powers with every state once; ⌈x⌋⁰ is its sign, |x|⁰ is omitted."""
+    """Product of signed and absolute powers with one factor per state; ⌈x⌋⁰ = sign(x) is retained, |x|⁰ is omitted."""
     powers: dict[str, tuple[Fraction, bool]] = {}
     for state, exponent, kind in factors:
         power, odd = powers.get(state, (Fraction(0), False))
@@ -78,7 +78,7 @@ def _written_size(term: Term) -> str:
 
 
 def value(term: Term, parameters: Mapping[str, Fraction]) -> Fraction:
-    """Coefficient of a term with numbers for the parameters."""
+    """Value of the coefficient of a term times its parameters."""
     product = term.coefficient
     for name in term.parameters:
         product *= parameters[name]
@@ -91,13 +91,18 @@ def cell_polynomial(
     signs: Mapping[str, int],
     parameters: Mapping[str, Fraction],
 ) -> dict[tuple[int, ...], Fraction]:
-    """Polynomial in u_i ≥ 0 after x_i = s_i·u_i^{r_i}.
+    """Polynomial of a sum of terms on a sign cell, in the variables u_i ≥ 0 with x_i = s_i·u_i^{r_i}.
 
     Parameters
     ----------
+    terms : iterable of Term
+        Terms of the sum.
     weights : mapping of state to r_i
-        In the order of the variables.
+        Weights, in the order of the variables.
     signs : mapping of state to ±1
+        Signs s_i of the cell.
+    parameters : mapping of str to Fraction
+        Value of every parameter.
 
     Raises
     ------
@@ -132,5 +137,6 @@ def real_polynomial(
     for term in terms:
         for state, exponent, kind in term.factors:
             if exponent.denominator != 1 or (kind == "s") != (exponent % 2 == 1):
-                raise CertificateError(f"{kind}-power {exponent} of {state} is not polynomial on the reals.")
+                word = "signed" if kind == "s" else "absolute"
+                raise CertificateError(f"the {word} power {exponent} of {state} is not polynomial on the reals.")
     return cell_polynomial(terms, dict.fromkeys(states, 1), dict.fromkeys(states, 1), parameters)

@@ -36,7 +36,7 @@ from quakedesign.laws.sampled_law import steady_states
 from quakedesign.linear.robust_stability import sector_loop
 from quakedesign.linear.sampled_stability import SampledStability
 from quakedesign.loop.loop_setup import IDEAL, MEASURED, LoopSetup
-from quakedesign.lyapunov import Certificate, Verdict, decided_once
+from quakedesign.lyapunov import Certificate, Verdict, cached_verdict
 from quakedesign.lyapunov.exact.domain import Domain
 from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.lyapunov.exact.premises import Premise, Variant, linear_premises
@@ -139,7 +139,7 @@ class GainProblem(Generic[Designed]):
         The default verdict is that on the certificate, or for a sampled law that on the sampled loop.
         """
         own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
-        verdict = decided_once(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
+        verdict = cached_verdict(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
         if runs is not None and controller.sampling is not None:
             verdict = runs.check()
         entries = {

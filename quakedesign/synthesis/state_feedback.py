@@ -40,7 +40,7 @@ from quakedesign.loop.loop_setup import MEASURED, LoopSetup
 from quakedesign.loop.sensing.differentiator import by_differences
 from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.perturbation_bounds import sectors
-from quakedesign.lyapunov.search.lyapunov_search import claims_of, find_certificate, finish, quadratic_margin
+from quakedesign.lyapunov.search.lyapunov_search import certificate_of, claims_of, find_certificate, quadratic_margin
 from quakedesign.plant import FaultPlant
 from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, SlowSlidingDesign, Wanted, method_of
 from quakedesign.text import quantity
@@ -233,7 +233,7 @@ def _of_riccati(loop: Loop, designed: RiccatiDesign) -> Certificate | None:
     """Certificate with the V of the Riccati equation."""
     margin = quadratic_margin(loop, designed.lyapunov)
     claims = claims_of(loop, designed.lyapunov, (margin, Fraction(0)))
-    return finish(loop, designed.lyapunov, claims) if min(claims.values()) > 0 else None
+    return certificate_of(loop, designed.lyapunov, claims) if min(claims.values()) > 0 else None
 
 
 def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certificate | None:

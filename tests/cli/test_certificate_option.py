@@ -91,7 +91,10 @@ def test_it_runs_behind_its_lag_with_its_noise(file, capsys):
 def test_a_run_that_is_not_what_is_proved_says_so(file, capsys, more, outside):
     out = " ".join(told(capsys, "simulate", "real-fault", "--certificate", file, *SHORT, *more)[1].split())
     if outside:
-        assert f"NOT covered by the proof, which is for another {outside}; the proof says: on the plant without" in out
+        assert (
+            f"NOT covered by the proof, from which it differs in: {outside}; the proof says: on the plant without"
+            in out
+        )
         assert " proved: " not in out
     else:
         assert f"proved: {CLAIM.sentence()}" in out
@@ -110,7 +113,7 @@ def test_the_pressure_of_a_run_is_compared_with_that_in_the_fault(file, capsys, 
     options = ("--duration", "3 s", "--plant", "printed")
     assert "TOO FAR" not in told(capsys, "simulate", "real-fault", "--certificate", file, *options)[1]
     said = told(capsys, "simulate", "real-fault", "--certificate", file, *options, "--initial-slip", "1 um")[1]
-    assert "which is for another initial_slip; TOO FAR; the proof says" in " ".join(said.split())
+    assert "from which it differs in: initial_slip; TOO FAR; the proof says" in " ".join(said.split())
     assert {(least, largest) for _, least, largest in compared} == {CLAIM.claims.pressures[-1]}
 
 

@@ -71,7 +71,9 @@ def test_a_run_that_is_not_what_is_proved_says_so(capsys, more, outside):
     run = ("simulate", "crustal-patch", "--certificate", FILE, "--duration", "1000 s", *more)
     assert json.loads(told(capsys, *run, "--json")[1])["outside"] == outside
     said = " ".join(told(capsys, *run)[1].split())
-    assert ("this run is NOT covered by the proof, which is for another " + ", ".join(outside) in said) == bool(outside)
+    assert ("this run is NOT covered by the proof, from which it differs in: " + ", ".join(outside) in said) == bool(
+        outside
+    )
     assert (" proved: from steady sliding" in said) == (not outside)
 
 

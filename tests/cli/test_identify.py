@@ -52,7 +52,9 @@ def test_text_keeps_within_80_columns_and_says_what_is_not_from_the_record(recor
     assert "from lab-fault, not from the record: normal stress, size, task, T_s, disturbance" in " ".join(
         written.split()
     )
-    assert "try: --figure, which shows where the fit fails; another --law; one step alone" in " ".join(written.split())
+    assert "suggested: --figure, which shows where the fit fails; another --law; one step alone" in " ".join(
+        written.split()
+    )
     assert "next: none: the fit does not explain the record" in written
     exponential = (*told[:2], "exponential-slip-weakening", *told[3:], "--out", str(tmp_path / "better.toml"))
     assert f"next: quakedesign design {tmp_path / 'better.toml'}" in run(capsys, *exponential)[1]

@@ -256,7 +256,7 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
     slip = friction_law("rate-and-state-slip")(**asdict(patch.friction) | moved | effects)
     found = replace(weak, law=slip, rival=OtherLaw(law=patch.friction.name, squares=2.0, excess=300.0))
     assert "mu0 = 0.6 at 1 µm/s was converted to 0.63454 at 1 nm/s for the file" in task_remarks(found, patch)
-    assert "that of steady sliding at 1 µm/s" in " ".join(identification_lines(found, verbose=True))
+    assert "the friction coefficient in steady sliding at 1 µm/s" in " ".join(identification_lines(found, verbose=True))
     assert "aging fits worse: squares 2 times as large, AIC higher by 300" in " ".join(
         " ".join(identification_lines(found, verbose=True)).split()
     )

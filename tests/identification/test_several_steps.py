@@ -101,7 +101,7 @@ def test_the_text_is_one_screen_with_a_row_a_step(agreeing):
         one.assessment.verdict.split()[-1].replace("record", "explains") for one in agreeing.steps
     ]
     assert [float(row[1]) for row in rows] == pytest.approx([0.008, 0.008], rel=0.1)
-    assert "All together: one set of parameters explains all steps (p-value" in text
+    assert "All steps jointly: one set of parameters explains all steps (p-value" in text
     assert len(identification_lines(agreeing, verbose=True)) > len(lines)
 
 

@@ -1197,5 +1197,5 @@ def test_a_proof_on_an_empty_set_says_so():
     nowhere = {"0,0": "-1", "2,0": "-1"}
     proof = sos(square([[1, 0]], "1"), square([[0, 0]], "1", product=[0]))
     said = checker.check(json.dumps(file({"0,0": "-1"}, "sos", proof, on=[nowhere], products=[[], [0]]))).statement
-    assert said[-1] == "the set is empty, so that this holds trivially"
+    assert said[-1] == "the set is empty, so the statement holds trivially"
     assert not any("empty" in line for line in checker.check(json.dumps(disc())).statement)

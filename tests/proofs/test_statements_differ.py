@@ -188,7 +188,7 @@ def on(inequalities=(), equalities=(), squares=(), polynomial=None):
 
 
 ON_FIRST = {"product": [0], "basis": [[0]], "gram": ["1"]}
-VACUOUS = "the set is empty, so that this holds trivially"
+VACUOUS = "the set is empty, so the statement holds trivially"
 SETS = [
     (on([{"0": "-1", "2": "-1"}], squares=[ON_FIRST]), True),
     (on(equalities=[{"0": "-1", "2": "-1"}]), True),

@@ -107,7 +107,7 @@ def test_friction_with_a_state_has_no_other_plant():
 def test_what_is_only_known_of_the_continuous_scheme_is_not_said_of_others(compared):
     assert all(e.growth_per_step is None and e.largest_step is None for e in compared.entries)
     said = {e.label: "; ".join(sentences(e)) for e in compared.entries}
-    assert all("this run has a zero-order hold over every step" in text for text in said.values())
+    assert all("this run uses a zero-order hold" in text for text in said.values())
     assert "; UNSTABLE with zero-order hold" in headline(compared.entries[1])
     assert "; with scheme explicit UNSTABLE with zero-order hold" in said["e-LQR (designed, compensated)"]
 

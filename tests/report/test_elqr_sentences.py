@@ -26,7 +26,7 @@ def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
 @pytest.mark.parametrize(
     ("loop", "said"),
     [
-        (held(Verdict.PROVED, step="0.1"), "stable with zero-order hold over T_s = 0.1 s, proved for any time history"),
+        (held(Verdict.PROVED, step="0.1"), "stable with zero-order hold over T_s = 0.1 s, proved for any time-varying parameters"),
         (held(Verdict.PROVED, step="0.1"), "T_s up to 0.1576 s and refuted for 0.15822 s"),
         (held(Verdict.REFUTED, witness=(F("1.4"), F(-1, 2), F(2))), "UNSTABLE with zero-order hold over T_s = 0.184 s"),
         (held(Verdict.UNDECIDED, step="0.158"), "undecided with zero-order hold over T_s = 0.158 s; stability is"),
@@ -61,5 +61,5 @@ def test_margins_are_rounded_towards_what_is_proved_and_limits_away_from_it():
     decay, slope, span = margin_lines(found)
     assert "0.5555 1/s certified" in decay
     assert slope == "friction-slope margin 1.2345 certified; unstable from 1.2346 on"
-    upper, lower = "from 0.7001 (unstable at 0.6999) to the box's upper end", "from its lower end to 5.699"
-    assert span == f"certified ranges of beta: {upper}; {lower}"
+    upper, lower = "[0.7001 (unstable at 0.6999), upper end of the box]", "[lower end of the box, 5.699]"
+    assert span == f"certified ranges of beta: {upper} and {lower}"

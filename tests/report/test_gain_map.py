@@ -10,7 +10,7 @@ from matplotlib.collections import PathCollection, QuadMesh
 
 from quakedesign.errors import OutputError
 from quakedesign.lyapunov import Verdict, load_certificate
-from quakedesign.lyapunov.maps.gain_map import GainMap, Sheet, gain_map
+from quakedesign.lyapunov.maps.gain_map import GainMap, MapDefinition, gain_map
 from quakedesign.lyapunov.search.certify import closed_loop
 from quakedesign.report import gain_map_drawing as report
 
@@ -26,7 +26,7 @@ def drawn():
 @pytest.fixture
 def made_up():
     """A map of four points: not found, screened only, tried in vain, proved."""
-    sheet = Sheet(
+    sheet = MapDefinition(
         subject="super-twisting",
         loop=closed_loop("super-twisting", ("1.5", "1.1"), lipschitz=1),
         over=("k1", "k2"),

@@ -141,5 +141,5 @@ def test_a_run_says_how_its_pressure_exceeds_the_proved_range(low, high, beyond)
     if low == -30e6:
         assert said == "its pressure EXCEEDS the proved range: -30 MPa to 0 Pa, proved -14.3 MPa to 2.5 MPa"
         line = proved_line("the slip stays", ["plant"], said)
-        others = "this run is NOT covered by the proof, which is for another plant"
+        others = "this run is NOT covered by the proof, from which it differs in: plant"
         assert line == f"{others}; {said}; the proof says: the slip stays"

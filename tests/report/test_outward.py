@@ -48,7 +48,7 @@ def test_every_certified_number_in_the_lines_about_a_linear_law(linear):
     expected = {
         "decay rate # 1/s certified": (found.decay.certified,),
         "margin # certified; unstable from # on": (found.slope.certified, found.slope.limit),
-        r"certified ranges of beta: from # \(unstable at #\) to the box's upper end; from its lower end to #": (
+        r"certified ranges of beta: \[# \(unstable at #\), upper end of the box\] and \[lower end of the box, #\]": (
             found.span.low,
             found.span.low_limit,
             found.span.high,

@@ -158,7 +158,7 @@ def test_the_report_is_the_one_of_all_faults(folder):
     assert first.index("Without control: the fault creeps") < first.index("With the e-LQR (designed) the slip rate")
     assert first.index("never exceeds") < first.index("Not designed, 2-CTA, 2-DIA")
     assert "the slip rate follows the pressure at once" in first
-    assert "guaranteed as it runs" in page
+    assert "guaranteed for the sampled loop" in page
     assert "Uncertainty box" not in page
     assert not re.search(r"for ever\b", page[: page.index("Glossary")])
     assert first.index("of slip of the task") < first.index("under every shear stress disturbance of at most")
@@ -308,14 +308,14 @@ def test_a_locked_fault_whose_run_ends_before_its_event_is_not_said_to_creep_for
     answer = {"outcome": outcome, "slip_events": [], "duration": 1e7, "slip": slip, "loading_rate": 1e-9}
     answer |= {"start": {"slip_rate": 1e-12, "state": {"state": 1e6}}, "pressure": [0.0, 0.0], "resting": False}
     answer |= {"cycle": {"recurrence_interval": None, "slip": None}, "energy": {"relative_residual": 0.0}}
-    assert any("is not in steady creep" in line for line in state_run_lines(answer)) == locked
+    assert any("this is not steady creep" in line for line in state_run_lines(answer)) == locked
 
 
 def test_figures_of_slow_sliding_show_rates_over_the_reference_and_errors_with_their_sign(comparison):
     (entry,) = comparison.entries
     rate = slow_sliding(entry, entry.run).axes[1]
     assert (rate.get_yscale(), rate.get_ylabel()) == ("linear", "slip rate / V [-]")
-    (never,) = (line.get_ydata()[0] for line in rate.lines if line.get_label() == "never exceeded, proved")
+    (never,) = (line.get_ydata()[0] for line in rate.lines if line.get_label() == "proved upper bound")
     assert never == pytest.approx(float(entry.proof.peak_slip_rate) / 1e-6)
     slip, speed = errors(entry, entry.run).axes
     assert (slip.get_yscale(), slip.get_ylabel(), speed.get_ylabel()) == (

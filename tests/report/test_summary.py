@@ -76,7 +76,7 @@ def test_the_table_has_proved_bounds_rounded_up_beside_the_worst_found_and_the_r
     assert name == "a law with a long name"
     assert other.split() == ["slow", "slip", "–", "–", "20", "–", "–", "–", "-0.8", "…", "0"]
     assert worst == "worst: worst case found; pressure (p < 0: withdrawal): proved, else simulated"
-    assert tracked == "tracked: slip error <= 2 % of target, rate <= reference + 1 % of uncontrolled"
+    assert tracked == "tracked: slip error <= 2 % of target, rate <= reference + 1 % of natural peak"
     assert max(map(len, lines)) <= 80
 
 

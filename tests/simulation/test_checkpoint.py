@@ -128,7 +128,7 @@ def test_the_checkpoint_of_another_run_is_refused(tmp_path, change):
     with pytest.raises(KeyboardInterrupt):
         simulate(REAL, published("real-fault")["elqr"], progress=stop, checkpoint=path, **SETTING)
     before = path.read_bytes()
-    with pytest.raises(SimulationError, match=r"must be that of the same run.*another run"):
+    with pytest.raises(SimulationError, match=r"does not belong to this run"):
         simulate(REAL, published("real-fault")["elqr"], checkpoint=path, **(SETTING | change))
     assert path.read_bytes() == before
 
@@ -137,6 +137,6 @@ def test_the_checkpoint_of_another_run_is_refused(tmp_path, change):
 def test_a_file_of_another_kind_is_refused_and_kept(tmp_path, content):
     path = tmp_path / "thesis.txt"
     path.write_bytes(content)
-    with pytest.raises(SimulationError, match="another file"):
+    with pytest.raises(SimulationError, match="or is not a checkpoint"):
         simulate(REAL, duration=10.0, checkpoint=path)
     assert path.read_bytes() == content

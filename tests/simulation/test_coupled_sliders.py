@@ -234,5 +234,5 @@ def test_friction_without_a_state_is_refused():
 def test_runs_that_never_end_are_refused(duration, far):
     with pytest.raises(ParameterError, match="Shorten the duration"):
         natural_cycles(CHAIN, duration, loading_rate=far)
-    with pytest.raises(ParameterError, match="at most 100000 samples"):
+    with pytest.raises(ParameterError, match="at most 100000 sampling periods"):
         simulate_sampled_blocks(CHAIN, LAW, lag=800.0, duration=duration)

@@ -79,7 +79,7 @@ def test_a_pressure_beyond_all_numbers_is_a_divergence():
 
 def test_a_loop_without_a_value_at_the_start_is_an_error():
     pole = 1 / sp.Symbol("time")
-    with pytest.raises(SimulationError, match="finite initial values"):
+    with pytest.raises(SimulationError, match="initial values of the loop are infinite or undefined"):
         simulate(REAL, duration=10.0, compiled=False, load=Load(perturbation=pole))
 
 

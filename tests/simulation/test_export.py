@@ -367,7 +367,7 @@ def test_only_an_export_is_replaced_by_force(tmp_path):
     (tmp_path / "whole").mkdir()
     for name in FILES:
         (tmp_path / "whole" / name).touch()
-    with pytest.raises(OutputError, match=r"^only a folder with controller\.h, .* is replaced"):
+    with pytest.raises(OutputError, match=r"^only a folder with no files but controller\.h, .* is replaced"):
         export_controller(LAB, PUBLISHED["cta"], tmp_path / "file", force=True)
     for place in ("empty", "whole"):
         export_controller(LAB, PUBLISHED["cta"], tmp_path / place, force=True)
@@ -415,7 +415,7 @@ def test_nothing_is_left_of_a_failed_export(tmp_path, monkeypatch):
         ({"scheme": "continuous"}, "sampled scheme"),
         (
             {"scheme": simulation_scheme("explicit", actuator=Actuator(stages=(Lag(time_constant=0.1),)))},
-            "between samples",
+            "continuous-time dynamics",
         ),
         ({"scheme": simulation_scheme("explicit", measurement=SENSED), "step": 2e-3}, "sampling period"),
         ({"step": 0.0}, "step"),

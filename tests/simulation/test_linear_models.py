@@ -247,7 +247,7 @@ def test_rock_answers_as_its_cells_do():
     [(AT_ONCE, Saturation(lowest=-1e7, highest=1e7)), (AT_ONCE, Delay(samples=1, jitter=1)), (LAW, Delay(samples=1))],
 )
 def test_stages_that_are_not_linear_and_delays_without_samples_have_no_transfer_function(law, stage):
-    with pytest.raises(UnsupportedError, match=rf"takes a lag, a diffusion path and.*Received {stage.name}"):
+    with pytest.raises(UnsupportedError, match=rf"can contain a lag, a diffusion path and.*Received {stage.name}"):
         qd.loop_transfer(REAL, law, actuator=Actuator(stages=(stage,)))
 
 
@@ -279,8 +279,8 @@ def test_a_vertex_of_the_box_is_that_of_the_guarantee():
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ({"delay": "1 s"}, "a delay needs a step"),
-        ({"step": "1 s", "slip_noise": "1 m"}, "a plant has step, delay, lag and diffusion"),
+        ({"delay": "1 s"}, "delay requires discrete time"),
+        ({"step": "1 s", "slip_noise": "1 m"}, "to_statespace takes only step, delay, lag and diffusion"),
         ({"vertex": ("high", "low")}, "vertex must be three"),
         ({"vertex": ("high", "low", "most")}, "end of a range"),
     ],

@@ -66,7 +66,7 @@ def test_without_control_only_peak_and_rest_are_given():
 
 
 def test_errors_that_count_from_the_end_of_the_run_on_are_refused(law):
-    with pytest.raises(ParameterError, match="settled_from must be from 0 to below the duration, 30"):
+    with pytest.raises(ParameterError, match="settled_from must be at least 0 s and less than the duration of 30"):
         simulate(REAL, law, duration=30.0, settled_from=31.0)
 
 

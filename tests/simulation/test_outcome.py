@@ -161,7 +161,7 @@ def test_an_earthquake_stays_one_where_the_numbers_of_the_law_overflow(push, kin
     assert peak >= run.slip_rate.max() * (1 - 1e-9)
     assert run.metrics.max_pressure is None
     assert f"{kind}: peak slip rate" in outcome_sentence(run)
-    assert outcome_sentence(run).endswith(f"its numbers overflow at {run.events['diverged']:.4g} s")
+    assert outcome_sentence(run).endswith(f"floating-point overflow at {run.events['diverged']:.4g} s")
 
 
 def test_every_file_of_a_run_holds_its_outcome():

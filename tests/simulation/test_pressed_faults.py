@@ -12,7 +12,7 @@ from thinned import few
 
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import friction_law
-from quakedesign.simulation import PressureCourse, SpringSlider, simulate_state
+from quakedesign.simulation import PressureHistory, SpringSlider, simulate_state
 
 A, B, D, V0, MU, ALPHA = 0.01, 0.015, 1e-5, 1e-5, 0.6, 0.2
 STIFFNESS, NORMAL, DAMPING = 2e9, 5e6, 2e9 / 3000 / 2
@@ -25,7 +25,7 @@ LAW = {
     "slowest_rate": 1e-14,
     "fastest_rate": 10.0,
 }
-COURSE = PressureCourse(times=(0.0, 20.0, 60.0, 60.0, 90.0), pressures=(0.0, 1e6, 2e5, 1.2e6, 4e5))
+COURSE = PressureHistory(times=(0.0, 20.0, 60.0, 60.0, 90.0), pressures=(0.0, 1e6, 2e5, 1.2e6, 4e5))
 END = 110.0
 
 
@@ -143,7 +143,7 @@ def test_a_sudden_pressure_changes_the_logarithm_of_the_rate_by_mu_dp_over_a_sig
     undamped = dataclasses.replace(slider(sensitivity=0.0), damping=0.0)
     errors = []
     for share in (1e-3, 1e-4, 1e-5):
-        course = PressureCourse(times=(1.0, 1.0), pressures=(0.0, share * NORMAL))
+        course = PressureHistory(times=(1.0, 1.0), pressures=(0.0, share * NORMAL))
         run = simulate_state(undamped, V0, duration=2.0, pressure=course, method="dop853")
         i = int(np.flatnonzero(np.diff(run.time) == 0)[0])
         assert run.time[i] == 1.0
@@ -172,7 +172,7 @@ def test_a_mass_does_not_jump_but_its_state_does():
 
 
 def test_a_step_that_lifts_the_rate_to_an_event_is_an_onset():
-    course = PressureCourse(times=(5.0, 5.0), pressures=(0.0, 1e6))
+    course = PressureHistory(times=(5.0, 5.0), pressures=(0.0, 1e6))
     run = simulate_state(slider(sensitivity=0.0), V0, duration=6.0, pressure=course, times=[1.0, 5.0, 6.0])
     assert run.onsets.tolist() == [5.0]
     assert run.time.tolist() == [1.0, 5.0, 6.0]

@@ -243,5 +243,5 @@ def test_a_tolerance_means_something_with_every_method(rtol):
 
 @pytest.mark.parametrize("begin", [math.nan, -1.0, 0.02, 1e300, math.inf])
 def test_errors_count_from_a_time_of_the_run(begin):
-    with pytest.raises(ParameterError, match="settled_from must be from 0 to below the duration"):
+    with pytest.raises(ParameterError, match="settled_from must be at least 0 s and less than the duration"):
         simulate(LAB, duration=0.02, settled_from=begin)

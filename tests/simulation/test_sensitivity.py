@@ -86,5 +86,5 @@ def test_meaningless_studies_are_refused():
         noise_sensitivity(REAL, LAW, levels=(1e-9,), of="colour")
     with pytest.raises(ParameterError, match="ten-percent"):
         gain_sensitivity(REAL, LAW)
-    with pytest.raises(ParameterError, match="settled_from must be from 0 to below the duration"):
+    with pytest.raises(ParameterError, match="settled_from must be at least 0 s and less than the duration"):
         accuracy(REAL, LAW, steps=(0.184,), schemes=("explicit",), duration=2.0, settled_from=9.0)

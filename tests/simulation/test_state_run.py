@@ -340,15 +340,15 @@ def test_a_run_can_be_handed_on():
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"loading": 1e-5}, "loading must be one rate with a duration"),
-        ({"loading": [(1.0, 1e-5)], "duration": 1.0}, "loading must be one rate with a duration"),
+        ({"loading": 1e-5}, "loading must be one rate together with duration"),
+        ({"loading": [(1.0, 1e-5)], "duration": 1.0}, "loading must be one rate together with duration"),
         ({"loading": []}, "at least one pair"),
         (
             {"loading": 1e-5, "duration": 1e13},
             r"at most 1e\+07 critical slips, .*Received 1e\+08 m. Shorten",
         ),
-        ({"loading": [(1.0, -1e-5)]}, "not negative"),
-        ({"loading": [(math.inf, 1e-5)]}, "positive time"),
+        ({"loading": [(1.0, -1e-5)]}, "finite rate ≥ 0"),
+        ({"loading": [(math.inf, 1e-5)]}, "positive, finite length"),
         ({"loading": [(1.0, 0.0)]}, "start_rate must be positive"),
         ({"loading": [(1.0, 1e-5)], "start_state": (1.0, 2.0)}, "1 values"),
         ({"loading": [(1.0, 1e-5)], "start_state": (-1.0,)}, "theta must be positive"),

@@ -115,7 +115,7 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     assert run("guarantee", healed) == 0
     assert "not covered: friction at rest up to 0.02 above" in " ".join(capsys.readouterr().out.split())
     assert run("simulate", healed, "--duration", "2 s") == 2
-    assert "has no healing" in " ".join(capsys.readouterr().err.split())
+    assert "does not support healing" in " ".join(capsys.readouterr().err.split())
     assert run("simulate", PATH, "--duration", "2 s") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "run: 1.84 s on the stick-slip plant, where errors and pressures may exceed bounds" in told
@@ -543,7 +543,7 @@ def test_the_law_of_slow_sliding_is_exported_with_its_plan(monkeypatch, capsys, 
     assert list(answer["measurement"].items()) == [(f"slip_{i}", "m") for i in (1, 2, 3)]
     assert answer["guarantee"]["verdict"] == "proved"
     header = " ".join((tmp_path / "c" / "controller.h").read_text(encoding="utf-8").replace("*", "").split())
-    assert "of CONTROLLER_PRESSURES wells, in addition to the planned pressure, to hold" in header
+    assert "of CONTROLLER_PRESSURES wells, in addition to the planned pressure, to be held" in header
     assert "the planned pressure reaches the fault unchanged" in header
     assert "|ln(v/V)| <= 0.0738" in header
 

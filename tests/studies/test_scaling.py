@@ -58,7 +58,7 @@ def test_the_linear_law_is_told_with_and_without_rounding():
     assert all(entry["agrees"] for entry in answer["unrounded"]["published"].values())
     assert "scale" not in answer
     text = "\n".join(scale_lines(answer))
-    assert "printed 1.88e9, off by 0.33 %" in text
+    assert "printed 1.88e9, deviation 0.33 %" in text
     assert "before they were rounded" in text
 
 

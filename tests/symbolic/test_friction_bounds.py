@@ -116,17 +116,20 @@ def test_a_law_that_exceeds_what_it_declares_is_refused_with_the_place(kind, cha
         friction_bounds(kind(**changes))
 
 
-JUMP = "own-law, whose friction may jump"
+JUMP = "friction of own-law may jump"
 UNPROVED = {
     "a sign": (lambda s, _: (1 - sp.sign(s - 1)) / 2, JUMP),
     "a set-valued sign": (lambda s, _: (1 - SignedPower(s - 1, 0)) / 2, JUMP),
     "a step": (lambda s, _: sp.Heaviside(1 - s), JUMP),
-    "a jump of branches": (lambda s, _: sp.Piecewise((1, s < 1), (0, True)), "own-law: no enclosure for Piecewise"),
+    "a jump of branches": (
+        lambda s, _: sp.Piecewise((1, s < 1), (0, True)),
+        "no bounds of own-law can be proved: no enclosure for Piecewise",
+    ),
     "no enclosure": (lambda s, _: sp.erfc(s), "own-law: no enclosure for erfc"),
     "steep at rest": (lambda s, _: 1 - sp.sqrt(sp.Min(s, 1)), r"slip_slope of own-law .* but at slip .* m it is"),
     "no end of a half-line": (
         lambda s, _: s * sp.sin(s) / (1 + s) ** 2,
-        r"own-law: .* bound, declared as 0\.[36], is not confirmed for slip from \S+e\+\d\d to inf",
+        r"own-law can be proved: .* bound, declared as 0\.[36], is undecided for slip from \S+e\+\d\d to inf",
     ),
 }
 
@@ -170,7 +173,7 @@ def test_a_declared_slope_is_a_finite_number(wrong):
 
 
 def test_constant_friction_counts_everywhere():
-    with pytest.raises(ParameterError, match=r"Declared 0\.45, but everywhere the law has 0\.5\."):
+    with pytest.raises(ParameterError, match=r"declared 0\.45, but everywhere it is 0\.5\."):
         friction_bounds(shape((0.4, 0.45, 0, 0))(lambda s, _: sp.Integer(1))())
 
 
@@ -185,7 +188,7 @@ def test_slow_and_short_slip_counts(axis):
         def extended(self, slip, rate):
             return sp.Rational(2, 5)
 
-    with pytest.raises(ParameterError, match=rf"upper bound .* but at {axis} .* the law has 1\."):
+    with pytest.raises(ParameterError, match=rf"upper bound .* but at {axis} .* it is 1\."):
         friction_bounds(Raised(rate_slope=1.0))
 
 
@@ -259,7 +262,7 @@ def test_laws_with_state_reach_what_they_declare(name, what):
         slip_slope = changed["slip_slope"]
         rate_slope = changed["rate_slope"]
 
-    with pytest.raises(ParameterError, match="must be valid"):
+    with pytest.raises(ParameterError, match="contradicts the law"):
         friction_bounds(Tighter(**{quantity: QUANTITIES[quantity] for quantity in kind.quantities()}))
 
 

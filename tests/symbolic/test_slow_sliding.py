@@ -36,7 +36,7 @@ def test_logarithmic_friction_is_linear_and_only_the_state_is_not(name, ageing):
     found = sliding_errors(chosen)
     linear = chosen.direct_effect * log_rate + chosen.evolution_effect * log_state
     assert sp.simplify(found.friction_change - linear) == 0
-    assert sp.simplify(found.state_change - sliding_rate / chosen.critical_slip * ageing) == 0
+    assert sp.simplify(found.log_state_rate - sliding_rate / chosen.critical_slip * ageing) == 0
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -120,7 +120,7 @@ def test_a_sliding_mode_is_guaranteed_without_stick_where_that_is_asked_for(monk
 
 def test_the_scheme_for_friction_that_sticks_has_no_guarantee_without_stick():
     said = qd.guarantee(REAL, "cta", scheme="stick-slip", plant="printed").proof.reason
-    assert said.startswith("the estimate of the scheme stick-slip is cut off at rest")
+    assert said.startswith("the disturbance estimate of the scheme stick-slip is limited at rest")
 
 
 def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(monkeypatch):
@@ -141,7 +141,7 @@ def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(m
     again = recovered(design.guarantee)
     assert sticking_loop(again.controller).law.target_gain == found.law.target_gain
     assert guarantee_of(uncertain_plant(REAL), design.controller, setup=ExactSetup(rate_noise=F(1))).reason.endswith(
-        "rate_noise"
+        "do not cover rate_noise: set it to 0"
     )
     without = replace(design.controller.sampling, settings=design.controller.sampling.settings[:2])
     bare = replace(design.controller, gains=dict(design.controller.gains), sampling=without)
@@ -176,7 +176,7 @@ def test_where_no_scale_makes_the_step_deadbeat_there_is_no_guarantee(monkeypatc
     monkeypatch.setattr(COMPENSATED, "sector_is_valid", lambda step, *_: step.slopes[0] < 1)
     base = control_law("cta").base_gains()[0].law.with_divisor(stored.task.authority)
     found = COMPENSATED.design_sticking(stored.task, base, stored.sampled_loop.step)
-    assert found.reason == "the implicit step is deadbeat for no scale that is tried"
+    assert found.reason == "the implicit step is not deadbeat for any tried scale λ"
 
 
 @pytest.mark.parametrize(

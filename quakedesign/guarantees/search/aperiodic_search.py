@@ -25,7 +25,7 @@ _DIRECTIONS = 3  # directions followed per facet
 _TURNS, _TURN, _STILL, _FAR = 400, 8, 1e-3, 1e4
 _ROUNDS, _ANEW, _POLICIES = 8, 2, 40
 _LOOSE = 1.02  # largest excess of input bounds over the required ones
-_TRACE = 1e-3  # share of the other inputs beside one, so that every entry of the state moves
+_TRACE = 1e-3  # relative size of the other inputs in the response to one input, so that every state is excited
 _NONE = 9.0  # small gain reported without a set
 _RAISED = (1.002, 1.01, 1.04)  # enlargements per sample, so that numbers can be rounded
 _SEED = 5
@@ -34,7 +34,7 @@ _DIGITS = 7
 
 def aperiodic_guarantee(task: FaultPlant, sampled_loop: SampledLoop) -> TrackingProof | NoProof:
     """Guarantee with an invariant set from a search, or the reason why there is none."""
-    proof: TrackingProof | NoProof = NoProof(reason="no set was found that the loop never leaves")
+    proof: TrackingProof | NoProof = NoProof(reason="no invariant set was found")
     for raised in _RAISED:
         invariant_set = _rounded_set(task, sampled_loop, raised)
         if not isinstance(invariant_set, InvariantPolytope):
@@ -125,7 +125,7 @@ class _Floats:
         return [float(v) for v in np.linspace(0, self.interval[1], _BETWEEN_PIECES + 1)]
 
     def reached(self, bounds: np.ndarray, directions: int) -> np.ndarray | None:
-        """Points reached by bounded inputs, extreme in many directions; None if they grow.
+        """Points reachable with bounded inputs, extreme in many directions; None if they grow without bound.
 
         The interval is the shortest, the middle or the longest one, whichever reaches farthest.
         """
@@ -217,10 +217,10 @@ def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pus
 
 
 def _rounded_set(task: FaultPlant, sampled_loop: SampledLoop, raised: float) -> InvariantPolytope | NoProof | None:
-    """Invariant set in rounded numbers, which keeps its inputs within their bounds."""
+    """Invariant set in rounded numbers, on which all inputs satisfy their bounds; None or `NoProof` if not found."""
     loop = _Floats.of(task, sampled_loop)
     if not loop.fits:
-        return NoProof(reason="the law has too many states for a set that the loop never leaves")
+        return NoProof(reason="the law has too many states for an invariant-set search")
     bounds, sides, invariant_set = loop.own, loop.sides(loop.own, _MANY), None
     if sides is None:
         return None
@@ -235,7 +235,7 @@ def _rounded_set(task: FaultPlant, sampled_loop: SampledLoop, raised: float) -> 
         share, more = loop.solved(bounds, largest, columns)
         if more is None:
             gain = UpperBound(Fraction(share))
-            reason = f"small gain {gain:.3g}, which must be below 1, of intervals up to the longest"
+            reason = f"small gain {gain:.3g} for the given range of intervals, must be below 1"
             return NoProof(reason=reason, small_gain=gain)
         bounds = np.maximum(more, loop.own) * raised
         again = loop.force and turn < _ANEW  # enough turns for the inputs' effects on each other's sets
@@ -268,11 +268,11 @@ class _Sides:
 
     @classmethod
     def still(cls, loop: _Floats, normals: np.ndarray, bounds: np.ndarray, raised: float) -> "_Sides | None":
-        """Smallest invariant set with these normals; None if it grows."""
+        """Smallest invariant set with these normals; None if the iteration diverges or does not converge."""
         sides, before = cls(normals), np.inf
         for _ in range(_POLICIES):
             now = sides._grown(loop, bounds, raised)
-            if now is None or now.max() > _FAR:
+            if now.max() > _FAR:
                 return None
             sides = cls(sides.facets / now[:, None])
             if (change := float(np.abs(now - 1).max())) < 1e-6 or (change < 1e-3 and change >= before):
@@ -280,8 +280,8 @@ class _Sides:
             before = change
         return None
 
-    def _grown(self, loop: _Floats, bounds: np.ndarray, raised: float) -> np.ndarray | None:
-        """Factors by which the present best policies move every side."""
+    def _grown(self, loop: _Floats, bounds: np.ndarray, raised: float) -> np.ndarray:
+        """Factors of all sides after one step of policy iteration."""
         along, added, bends = loop.along(self.facets @ loop.seen, loop.at_samples, SOONEST, self._frame, bounds)
         above = np.maximum(np.pad(bends, ((0, 0), (1, 0))), np.pad(bends, ((0, 0), (0, 1))))
         added = (added + above) * raised

@@ -2,7 +2,8 @@
 
 Linear-quadratic feedback of the measurements, with an estimate of the disturbance from the innovation of the slip
 rates: of all blocks if each has a well, else of one average per well. In a decentralised law all wells have the same
-feedback of their own slip and slip rate. A law for pressures that diffuse along the fault models these.
+feedback of their own slip and slip rate. If pressures diffuse along the fault, the law contains a model of the
+diffusion.
 """
 
 from collections.abc import Sequence
@@ -21,13 +22,14 @@ from quakedesign.plant.plant_values import Matrix, Row, unit
 from quakedesign.plant.user_plant import UncertainPlant
 
 _START = (0.0325, 1.6e-4, 0.13, 0.88, 1.2)
-"""Weight of the slip rates, of the pressures, share of an innovation, gain of the model over the middle, and how much
-more differences of neighbours weigh than means."""
+"""Weights of slip rates and of pressures, gain of the innovation, ratio of the model's input gain to the midpoint, and
+additional weight of differences between neighbours."""
 _STEPS = (0.5, 0.7, 0.5, 0.1, 0.5)
-_EVALUATIONS = (300, 40000)  # largest number, and this times the number of blocks cubed
+# largest number of evaluations, and largest product of this number and the cubed number of blocks
+_EVALUATIONS = (300, 40000)
 _DIGITS = 8
 _SLOWEST = 0.92  # largest eigenvalue of a period: slower loops take longer to prove
-_FORGET, _LEFT = 400, 1e-4  # largest number of periods of an estimate, remaining share
+_FORGET, _LEFT = 400, 1e-4  # largest number of summed periods; relative size of an addend at which the sum ends
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -37,6 +39,7 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
     Parameters
     ----------
     plant : UncertainPlant
+        From `UncertainPlant.from_blocks`.
     step : Fraction
         T_s [s].
     decentralised : bool
@@ -133,7 +136,7 @@ def _law(
     size, zero, inverse = len(feedback), Fraction(0), inverse_of(gains)
     still, more = (zero,) * size, len(expected) - size
     if inverse is None:
-        raise ValueError("gains that are singular once rounded")
+        raise ValueError("the input gains are singular after rounding")
 
     def acting(rows: Sequence[Row]) -> Matrix:
         return tuple(tuple(-v for v in row) for row in product(inverse, rows, len(rows[0])))

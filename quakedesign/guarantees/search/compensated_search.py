@@ -57,12 +57,12 @@ from quakedesign.symbolic import SignedPower
 
 _NAMES = {end_slip: "slip", end_rate: "rate"}
 _DIGITS = 60
-_MOST_DENOMINATOR = 10**18  # of a gain derived from a power of it
+_MOST_DENOMINATOR = 10**18  # of a gain that is recovered from a power of itself
 _WIDTH = Fraction(1, 10**40)  # relative width of intervals around irrational numbers
 
 
 def implicit_pull(controller: Controller, step: Fraction, authority: Fraction) -> tuple[Power, ...]:
-    """q of w = e2 − q(e1 + T_s·w, w), for the scheme ``compensated``.
+    """Function q of the implicit equation w = e2 − q(e1 + T_s·w, w) of the scheme ``compensated``.
 
     Parameters
     ----------
@@ -125,10 +125,11 @@ _RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # ratios of B0 to the m
 _ROOM = Fraction(5, 4)  # largest peak of `tracking` over the smallest
 _SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8", "0.7", "0.6"))
 _REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # shares of a deadbeat slip-rate error
-_NEARLY = 2  # number of _SLOPES accepted as nearly deadbeat in the choice of a scale
+_NEARLY = 2  # leading entries of _SLOPES that count as nearly deadbeat in the choice of λ
 _MARGIN = Fraction(21, 20)
 _DEADBEAT = ImplicitStep(pull=(Power(factor=(Fraction(1), Fraction(1)), exponent=Fraction(0), argument="slip"),))
-_STARTS = (0.2, 0.75), (0.35, 1.0)  # weight, and B0 over the midpoint of the input gain, for long and short T_s
+# initial (weight, B0 divided by the midpoint of the input gain); both starts are tried in turn
+_STARTS = (0.2, 0.75), (0.35, 1.0)
 _BESIDE = 0.2, 3.0  # range of B0 over the midpoint
 _EVALUATIONS, _NEAR_ENOUGH, _WORST = 60, 0.9, 9.0
 _ROOTS = tuple(Fraction(f"{10 ** (k / 24):.1e}") for k in range(-48, 73))  # ρ of λ = ρ⁶
@@ -278,8 +279,8 @@ def design_compensated(
     Where the set-valued sign of the slip error contains the solution, the step is deadbeat, e1 + T_s·w = 0, for any
     gains. So weight and authority are chosen for the deadbeat step, on a grid of `weights`. ``peak``: the smallest
     estimated slip-rate error. ``tracking``: the smallest slip error under a drifting disturbance, among laws whose
-    estimated slip-rate error is at most 1.25 times the smallest. λ = ρ⁶ is then the smallest scale for which the step
-    is nearly deadbeat for 1.05 times all estimated errors.
+    estimated slip-rate error is at most 1.25 times the smallest. λ = ρ⁶ is then the smallest tried scale for which the
+    step is nearly deadbeat for errors up to 1.05 times the estimated ones.
     """
     require_ordinary(step=step)
     return _made(task, controller, step, _deadbeat(task, step, objective, weights, setup=setup), setup)
@@ -314,7 +315,7 @@ class Deadbeat(LawSearch):
     def closest(
         self, task: FaultPlant, step: Fraction, near: np.ndarray | None, setup: ExactSetup = PLAIN
     ) -> Closest | NoProof:
-        """The weight and B0 with which a deadbeat step comes nearest to a guarantee, for any gains."""
+        """Weight and B0 with which a deadbeat step comes closest to a guarantee; they do not depend on the gains."""
         if (none := unpredictable(task, step)) is not None:
             return none
         if setup.delay > MOST_DELAY * step:
@@ -327,10 +328,10 @@ class Deadbeat(LawSearch):
             value = distance(task, sampled_loop)[0]
             return value if value < _WORST else _WORST + min(spectral_radius(sampled_loop.loop(task)), 1.0)
 
-        question = "nearly deadbeat", task, step, setup
+        problem = "nearly deadbeat", task, step, setup
         least, x = inf, np.array(_STARTS[0])
         for start in _STARTS if near is None else (near,):
-            minimum = search_near(question, cost, start, enough=_NEAR_ENOUGH, evaluations=_EVALUATIONS)
+            minimum = search_near(problem, cost, start, enough=_NEAR_ENOUGH, evaluations=_EVALUATIONS)
             least, x = min((least, x), minimum, key=lambda reached: reached[0])
             if least < _NEAR_ENOUGH:
                 break
@@ -366,7 +367,7 @@ class Deadbeat(LawSearch):
     def design_near_longer_step(
         self, task: FaultPlant, step: Fraction, longest: Longest | None, setup: ExactSetup = PLAIN
     ) -> Compensation | None:
-        """Design for a T_s [s] up to the longest, near given numbers; None without a proof."""
+        """Design at T_s [s] near the law for the longest T_s; None for a longer T_s or without a proof."""
         if longest is None or longest.guarantee.sampled_loop.step < step:
             return None
         near = self.closest(task, step, longest.numbers, setup=setup)
@@ -374,7 +375,7 @@ class Deadbeat(LawSearch):
         return made if made is not None and made.proof.available else None
 
     def at(self, task: FaultPlant, longest: Longest, objective: str = "peak") -> Compensation:
-        """Design for the longest T_s with a guarantee, else the law of the search."""
+        """Design at the longest T_s with a guarantee; if it has no proof, the law found by the search for this T_s."""
         sampled_loop = longest.guarantee.sampled_loop
         made = design_compensated(
             task, self.controller, sampled_loop.step, objective=objective, setup=sampled_loop.setup
@@ -390,14 +391,14 @@ def _settled(task: FaultPlant, numbers: np.ndarray) -> tuple[Fraction, Fraction]
 
 
 def recovered(proof: TrackingProof | StickSlipProof) -> Compensation:
-    """Sliding mode (2-CTA or 2-DIA) whose implicit step a certificate states.
+    """Recover the sliding mode (2-CTA or 2-DIA) from the implicit step in a certificate.
 
     The law with these gains must be exactly that of the guarantee.
 
     Raises
     ------
     UnsupportedError
-        For the step of another law, or of gains that with λ = 1 are not rational.
+        When the step belongs to another law, or the gains for λ = 1 are not rational.
     """
     if isinstance(proof, StickSlipProof):
         again = _sticking(proof)
@@ -427,7 +428,7 @@ _NOT_RECOVERED = (
 
 
 def _sticking(proof: StickSlipProof) -> Compensation | None:
-    """Sliding mode whose implicit step a certificate on the stick–slip plant states."""
+    """Sliding mode recovered from a certificate on the stick–slip plant; None if it is not a 2-CTA or 2-DIA."""
     sampled_loop, law = proof.sampled_loop, proof.sampled_loop.law
     authority = 1 / (sampled_loop.step * law.target_gain)
     for base in _with_gains(law.pull, sampled_loop.step, authority) if law.pull else ():
@@ -478,8 +479,8 @@ def sticking_loop(controller: SlidingMode, slip_noise: Fraction = Fraction(0)) -
 def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, **wanted: Any) -> Compensation | NoProof:
     """Sliding mode with given base gains and a guarantee on the stick–slip plant.
 
-    The estimate and B0 are those with which a deadbeat step has a guarantee; λ = ρ⁶ is the smallest of a ladder for
-    which the step is deadbeat everywhere in its polytope.
+    The disturbance estimator and B0 are those for which a deadbeat step has a guarantee; λ = ρ⁶ is the smallest tried
+    scale for which the step is deadbeat in the whole invariant polytope.
 
     Parameters
     ----------
@@ -502,7 +503,7 @@ def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, *
     except UnsupportedError as error:
         return NoProof(reason=str(error))
     if scale is None:
-        return NoProof(reason="the implicit step is deadbeat for no scale that is tried")
+        return NoProof(reason="the implicit step is not deadbeat for any tried scale λ")
     law = sticking_controller(controller.scaled(scale), sampled_loop)
     return Compensation(controller=law, proof=replace(proof, sampled_loop=sticking_loop(law, sampled_loop.slip_noise)))
 
@@ -578,7 +579,7 @@ def _deadbeat_search(
 
 
 def _scale(controller: SlidingMode, authority: Fraction, step: Fraction, errors: tuple[Fraction, Fraction]) -> Fraction:
-    """Smallest λ of a ladder for which the step is nearly deadbeat for slightly larger errors."""
+    """Smallest tried λ with a nearly deadbeat step for 1.05 times the errors; else the present λ."""
     scale = _smallest_scale(controller, authority, step, errors, _SLOPES[:_NEARLY])
     return controller.scale if scale is None else scale
 
@@ -590,11 +591,11 @@ def _smallest_scale(
     errors: tuple[Fraction, Fraction],
     slopes: tuple[Fraction, ...],
 ) -> Fraction | None:
-    """Smallest λ of the ladder with γ from the first possible slope to 1; else None."""
+    """Smallest λ of `_ROOTS`⁶ for which γ lies in [slope, 1], for the first slope that any λ satisfies; else None."""
     slip, rate = (_MARGIN * v for v in errors)
 
-    def deadbeat(slope: Fraction, implicit_step: Fraction) -> bool:
-        pull = implicit_pull(controller.scaled(implicit_step**6), step, authority)
+    def deadbeat(slope: Fraction, root: Fraction) -> bool:
+        pull = implicit_pull(controller.scaled(root**6), step, authority)
         return sector_is_valid(ImplicitStep(pull=pull, slopes=(slope, Fraction(1))), step, slip, rate)
 
     for slope in slopes:

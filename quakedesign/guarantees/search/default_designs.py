@@ -84,8 +84,8 @@ class SampledDesign:
                 required=self.runs.sampled_loop.delay if self.runs else Fraction(0),
                 certified=self.longest_delay,
                 unit="s",
-                note="from the measurement to the pressure: that of the design, and the longest for which a design, an "
-                "e-LQR that knows it, has a guarantee",
+                note="from the measurement to the pressure: that of the design, and the longest for which a design of "
+                "the same kind was found with a guarantee",
             ),
         )
 
@@ -132,7 +132,8 @@ def sampled_sliding_mode(
 ) -> tuple[Compensation, SampledDesign]:
     """Sliding mode for a T_s [s], or for the longest shorter T_s that has a guarantee.
 
-    The longest T_s and delay of such designs are searched as for linear laws; no such law has a model of the delay.
+    The longest T_s and delay of such designs are searched as for linear laws; sliding modes contain no model of the
+    delay.
 
     Raises
     ------
@@ -175,7 +176,7 @@ def guarantee_of(
             reason = f"the scheme {STICK_SLIP} has a guarantee with {', '.join(sorted(missing))} given in its settings"
             return NoProof(reason=reason)
         if setup.rate_noise:
-            reason = "the stick-slip plant is proved without rate_noise"
+            reason = "guarantees on the stick-slip plant do not cover rate_noise: set it to 0"
             return NoProof(reason=reason)
         try:
             return proved(task, sticking_loop(law, setup.slip_noise))
@@ -186,7 +187,7 @@ def guarantee_of(
         return NoProof(reason=_why_none(task, type(law), scheme, step))
     settings = dict(own.settings)
     if not {"weight", "authority"} <= settings.keys():
-        reason = f"the scheme {GUARANTEED} has a guarantee with a weight and an authority. Give both in its settings"
+        reason = f"a guarantee in the scheme {GUARANTEED} requires the settings weight and authority"
         return NoProof(reason=reason)
     setup = replace(setup, **own.path)
     return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, setup=setup))
@@ -213,6 +214,7 @@ def sliding_mode(
     gains : tuple of str
         Base gains (λ = 1); empty for the first ones that a design tries.
     scheme : str
+        Discretisation scheme; only ``compensated`` has a guarantee.
     objective : str
         ``tracking`` or ``peak``.
     setup : ExactSetup
@@ -244,7 +246,10 @@ def _why_none(task: FaultPlant, law: type[SlidingMode], scheme: str, step: Fract
             "instant. Design the law for the sampled loop: without --continuous, and in the scheme stick-slip"
         )
     if scheme == STICK_SLIP:
-        return f"the estimate of the scheme {STICK_SLIP} is cut off at rest, so that no linear loop covers it{_REMEDY}"
+        return (
+            f"the disturbance estimate of the scheme {STICK_SLIP} is limited at rest, which the linear small-gain "
+            f"theorem does not cover{_REMEDY}"
+        )
     if scheme == "implicit":
         rest = UpperBound(step**2 * task.authority * max(map(abs, task.rest_pressure)))
         return (

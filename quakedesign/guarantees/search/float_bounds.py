@@ -32,9 +32,11 @@ _FORGOTTEN = 1e-4  # relative size of the neglected tail of the response
 _ALIKE = 0.99  # ratio of decays above which two modes are not separated
 _SOON = 1024  # periods
 _ENDS = (Fraction(0), Fraction(1, 2), Fraction(1))  # positions of nominal loops in the range of a slowly varying gain
-_SPREAD = Fraction(1, 16)  # deviation of the gain from theirs, relative to its range
-PARTS = VaryingGain(parts=8, growth=Fraction(1))  # of estimates, which neglect the input ``aged``, and of proofs
-_TURNS, _LEAP = 10, 1.4  # iterations of the slip error to its fixed point, and least factor of a late one
+_SPREAD = Fraction(1, 16)  # deviation of the gain from those of the nominal loops, relative to its range
+# parts of the gain range in estimates and proofs; `growth` is only for proofs, as estimates neglect the input ``aged``
+PARTS = VaryingGain(parts=8, growth=Fraction(1))
+# largest number of fixed-point iterations of the slip error; least growth factor in late iterations
+_TURNS, _LEAP = 10, 1.4
 _FEW = 2
 
 
@@ -81,9 +83,9 @@ def _bounds(
 def distance(task: FaultPlant, sampled_loop: SampledLoop) -> tuple[float, Bounds | None]:
     """Small gain [-] with bounds if a proof is expected; else 1 + the small gain at zero error.
 
-    For friction that depends on the slip alone the input gain varies slowly. Its deviation depends on the bound of the
-    slip error, a fixed point for the nominal loops of the first and the last part of the range. The result is infinite
-    for an unstable or very slow nominal loop.
+    For friction that depends on the slip alone the input gain varies slowly. Its deviation depends on the slip-error
+    bound, which is computed as a fixed point for the nominal loops of the first and the last part of the range. The
+    result is infinite for an unstable or very slow nominal loop.
     """
     if task.friction.rate_slope:
         values = estimated(task, sampled_loop)
@@ -121,7 +123,7 @@ def _distance(bounds: Bounds | NoProof | None, least: float) -> tuple[float, Bou
 
 
 def gains_of(loop: PeriodicLoop) -> dict[tuple[str, str], tuple[float, ...]] | None:
-    """Gains at every end of a piece."""
+    """Gains from every input to every output at the ends of all pieces; None for an unstable or very slow loop."""
     try:
         of, gains = LoopResponses(FLOATS, loop), dict[str, list[Any]]()
         for name in (*loop.inputs, *loop.sampled, *loop.fading, *loop.pulses):
@@ -165,9 +167,9 @@ def floats(values: np.ndarray) -> Any:
 
 
 def _slowest(period: _FloatMatrix) -> SlowestMode:
-    """Slowest mode; a complex pair, or two modes with nearly equal decay, are summed until they decay instead.
+    """Slowest mode, whose tail is summed in closed form.
 
-    The same applies if all modes decay within a few periods.
+    If it is complex, or not separated from the next mode, or decays fast, responses are summed period by period.
     """
     values, vectors = np.linalg.eig(period.view(np.ndarray))
     first, *rest = np.argsort(-abs(values))
@@ -236,7 +238,7 @@ def moved(flow: np.ndarray, inputs: np.ndarray, length: float) -> tuple[np.ndarr
 
 
 def periods_to_forget(radius: float) -> int:
-    """Periods until a decay factor per period reaches 1/100, within limits."""
+    """Periods after which a mode with a given decay factor per period is below 1/100, within limits."""
     pace = -np.log(np.clip(radius, 1e-9, 1 - 1e-9))
     return int(np.clip(np.ceil(np.log(_FORGOTTEN_POLE) / pace), PERIODS, _MOST_POLE_PERIODS))
 

@@ -78,7 +78,7 @@ def best_guarantee(task: FaultPlant, sampled_loop: SampledLoop) -> TrackingProof
     anyhow = guarantee(task, sampled_loop)
     return (
         anyhow if anyhow.available or anyhow.only_pressure_fails else proof
-    )  # the pressure is easier to reduce than the small-gain factor
+    )  # a pressure violation is easier to remedy than a small gain above 1, so it is the reason reported
 
 
 @overload
@@ -122,7 +122,7 @@ _CREEPING = 0.1  # weight of slip error per period over that of slip-rate error,
 MOST_DELAY = 7  # periods: law and loop then have 20 states, the most that a file may have
 _MOST_GROWTH = 50.0  # logarithm of growth per period that no sampled law stabilises; far above it predictions overflow
 _FAILED = 1e6
-_HOPELESS = 1.2  # diffusion path: no other start is tried above this final small gain
+_TOO_FAR = 1.2  # diffusion path: no other start is tried above this final small gain
 _SETTLES = 0.9  # largest decay factor per period of the law's poles, fault at rest, except the integral's
 _WIDE = 0.05  # initial range around a small number
 _FAR, _ENOUGH = 3.0, 40  # a search stops if the small gain is still above _FAR after _ENOUGH evaluations
@@ -135,7 +135,7 @@ class Closest:
     Attributes
     ----------
     distance : float
-        Distance from a guarantee in floats: below 1 if a proof is expected, else the small-gain factor plus 1.
+        Distance from a guarantee in floats: small gain (below 1) if a proof is expected, else 1 plus the small gain.
     numbers : numpy.ndarray
         Parameters of the law in its family.
     sampled_loop : SampledLoop
@@ -159,7 +159,7 @@ def closest(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> Closest | NoProof:
-    """Law nearest to a guarantee; the search stops at a law that clearly has one. `NoProof` if there is no law.
+    """Law closest to a guarantee, or `NoProof` if there is no law; the search stops at a distance below 0.9.
 
     The search begins near the parameters of another law if given, else near those of good laws of the family.
     """
@@ -182,7 +182,7 @@ def nearby(
 ) -> TrackingProof | NoProof:
     """Design for the least certified slip-rate error near the parameters of another law.
 
-    Near the longest T_s or delay only a slowly varying input gain gives a proof; `design_sampled_law` uses it last.
+    Near the longest T_s or delay only proofs with a slowly varying input gain succeed; this search optimises for them.
     """
     laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
@@ -219,7 +219,7 @@ def design_sampled_law(
         Largest slip-rate error of ``tracking``, relative to the smallest certified one [-]. Default 1.6; with an
         observer, whose smallest error is larger, 1.4; with aperiodic sampling 1.25.
     measured : str
-        One of `MEASURED`; the differentiator is the implicit one of order 2, from rest.
+        One of `MEASURED`; the differentiator is implicit, of order 2, and starts from zero.
     setup : ExactSetup
         Delay, lag and L²/D [s], bounds of the noise of slip [m] and slip rate [m/s]; 0 unless given.
 
@@ -272,7 +272,7 @@ def _with_noise(without: TrackingProof, noise: Mapping[str, Fraction]) -> Tracki
     why = anyhow.reason if not anyhow.available and anyhow.small_gain is None else "nothing is proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     noises = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
-    return replace(proof, reason=f"with {noises} {why}; without it a law is proved")
+    return replace(proof, reason=f"with {noises}: {why}; without noise a law is proved")
 
 
 @dataclass(frozen=True)
@@ -294,7 +294,8 @@ class _Laws:
         if reason := why_no_law(step, measured, setup):
             return NoProof(reason=reason)
         require_known(measured, MEASURED, "measured")
-        middle = (step + (setup.longest_step or step)) / 2  # prediction horizon of a law without a time input
+        # the law cannot measure the interval; it predicts over the mean one
+        middle = (step + (setup.longest_step or step)) / 2
         family = family_of(task, middle, measured, setup)
         template = setup.with_law(family.law(np.array(family.starts[0])), step)
         return cls(task, family, template, (task, step, measured, setup))
@@ -350,7 +351,7 @@ class _Laws:
     def least_peak(self, start: Sequence[float] | np.ndarray, **settings: Any) -> tuple[float, np.ndarray]:
         """Smallest peak cost near a start, with its numbers.
 
-        With a diffusion path, at 0.1 s an evaluation, it ends early far from a guarantee.
+        With a diffusion path, where an evaluation takes 0.1 s, the search ends early if it is far from a guarantee.
         """
         far = _FAR * _FAILED if self.template.diffusion else inf
         settings = self._effort | settings
@@ -387,7 +388,7 @@ class _Laws:
 
     @property
     def _effort(self) -> Json:
-        """Number of evaluations of a search, of 0.05 s each."""
+        """Number of evaluations (0.05 s each) with aperiodic sampling; empty, for the default, otherwise."""
         return {"evaluations": _FEWER} if self.template.longest_step else {}
 
     def quiet(self, x: np.ndarray, cost: float) -> float:
@@ -401,7 +402,7 @@ class _Laws:
 
 def _far_from_proof(cost: float) -> bool:
     """Whether the small gain at the end of a search is too large for a guarantee."""
-    return _HOPELESS * _FAILED < cost < 9 * _FAILED
+    return _TOO_FAR * _FAILED < cost < 9 * _FAILED
 
 
 def unpredictable(task: FaultPlant, step: Fraction) -> NoProof | None:
@@ -461,7 +462,7 @@ def _search(
 
 
 def _peak_cost(estimate: BoundsEstimate | None, period: Fraction) -> float:
-    """Decibels of the slip-rate error; without a bound, a penalty for the distance from one."""
+    """Peak cost [dB] of slip-rate error + 0.1·slip error/period; without bounds, a penalty by the small gain."""
     if estimate is None:
         return 10 * _FAILED
     if not estimate.bounds.available:
@@ -545,7 +546,7 @@ class LinearLawSearch(LawSearch):
         return best_guarantee(task, candidate.sampled_loop)
 
     def low_pressure_loop(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
-        """Loop with the smallest change of pressure near the smallest peak."""
+        """Loop of the law with the smallest pressure change, searched near the law with the smallest peak."""
         laws = _Laws.of(task, step, self.measured, setup)
         if isinstance(laws, NoProof):
             return None
@@ -588,7 +589,7 @@ def design_near_longer_step(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | None:
-    """Design at T_s, searched near a law for a longer T_s, after a search without it failed; None if unproved."""
+    """Design at T_s by a search near the law for a longer T_s; for a failed direct design. None without a proof."""
     if longest is None or longest.guarantee.sampled_loop.step < step:
         return None
     proof = nearby(task, step, longest.numbers, measured=measured, setup=setup)
@@ -644,10 +645,10 @@ def nearest_setup(
 ) -> tuple[str, TrackingProof] | None:
     """The quantity of the setup that prevents a guarantee, and a guarantee for nearly its largest possible value.
 
-    With `pressed` the pressure fails: it exceeds a pump limit or opens the fault. Then the quantity is the smallest
-    sufficient pump of a design without pump limits, or else the largest disturbance. Otherwise it is the first quantity
-    of `LIMITING` without which a design has a guarantee at T_s; None if there is none. For a pump rate the value is
-    nearly the lowest sufficient one, for the box a factor of all half-widths.
+    If `pressed`, the pressure condition failed (pump limit or opening of the fault). The quantity is then the pressure
+    range of the pump, with limits that suffice for a design, or else the largest admissible disturbance. Otherwise it
+    is the first quantity of `LIMITING` without which a design has a guarantee at T_s; None if there is none. For a pump
+    rate the value is nearly the lowest sufficient one, for the box a factor of all half-widths.
     """
     laws = kind or LinearLawSearch(measured)
     if pressed and (less := _less_pressed(laws, task, step, setup)) is not None:
@@ -867,7 +868,7 @@ def reached(
 
 
 def _nearer(now: Fraction | float | None, before: Fraction | float | None) -> bool:
-    """Whether twice the last decrease brings the small gain below 1; True if unknown."""
+    """Whether two more decreases like the last one would bring the small gain below 1; True if unknown."""
     return now is None or before is None or now - 2 * (before - now) < 1
 
 
@@ -896,7 +897,7 @@ def certified_peaks(
     ----------
     fault : Fault
     controller : ExtendedLQR
-        With either feedback.
+        With ``error`` or ``state`` feedback.
     disturbance_class : str
         ``"amplitude"``: any measurable disturbance within the fault's bound; ``"rate"``: within its rate bound too.
 

@@ -1,4 +1,4 @@
-"""LQG designs of sampled laws for a fault behind a lag or a diffusion path.
+"""LQG designs of sampled laws, with or without a lag or a diffusion path.
 
 Chapters: regulator by a discrete Riccati equation on fault and path; parametrised families of laws for
 searches; e-LQR with Kalman observer for slow sliding, in scaled variables; linearised fault in slow
@@ -36,13 +36,14 @@ from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_ra
 THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # parameters of good laws
 BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
 _MOST_STATES = 20  # of a loop
-_WITHOUT_PATH = 6  # states without a model of the path: e1, e2, π2, d, valve, its last step or the well
+# number of states without path model: e1, e2, π2, d, valve pressure, and its last step or the well pressure
+_WITHOUT_PATH = 6
 
 
 def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> int:
     """Largest number of diffusion modes in a law for which the loop stays within the state limit of a file.
 
-    Negative if even no mode fits. A law of the slip alone has one state more.
+    Negative if the loop exceeds the limit without any mode. A law of the slip alone has one additional state.
     """
     ages = -int(-setup.delay // step)
     layer, behind = MODES if setup.diffusion else 0, bool(setup.lag)
@@ -146,8 +147,8 @@ def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int)
 _STARTS = ((0.6, 1.0, 0.1), (0.55, 0.9, 0.6), (0.3, 0.8, 0.4))  # k1·β0b·T², k2·β0b·T, a of good laws
 _NOT_BY_DIFFERENCES = ("diffusion", "lag", "initial_slip", "initial_slip_rate", "jitter", "averaging")
 _GENTLE = ((0.15, 0.6, 0.1), (0.1, 0.4, 0.3))  # the same for a delayed slip rate
-_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # the same gains; decades to add to `_Kalman.decades`
-_DECADES = 4.0  # most decades of initial process noise over measurement noise
+_OBSERVERS = ((0.5, 0.9, -0.4, -4.0), (0.3, 0.8, -0.4, -2.0))  # gains as in _STARTS; offsets added to `_Kalman.decades`
+_DECADES = 4.0  # largest initial ratio of process noise to measurement noise, in decades
 _FEWEST_MODES = 2  # least number of diffusion modes in a law with a model of its path
 _WIDEST = 12.0  # largest decades or exponents of weights for which Riccati solutions are accurate
 _FAINT = 1e-12  # process noise of all states, so that the filter forgets its initial state
@@ -169,7 +170,7 @@ class LawFamily:
 
 
 def measured_by(law: LinearLaw) -> str:
-    """Entry of `MEASURED` that a law is for."""
+    """Entry of `MEASURED` for which a law is designed."""
     return MEASURED[2] if law.states[-ORDER:] == names_before() else MEASURED[law.of_slip_alone]
 
 
@@ -192,7 +193,9 @@ def why_no_law(step: Fraction, measured: str, setup: ExactSetup) -> str:
     if setup.longest_step and measured != MEASURED[0]:
         return "aperiodic sampling needs slip and slip rate measured"
     if measured == MEASURED[2] and any(getattr(setup, name) for name in _NOT_BY_DIFFERENCES):
-        return "a differentiator needs zero initial errors, and no jitter, averaging, lag or diffusion path"
+        return (
+            "a law with a differentiator requires zero initial errors, and no jitter, averaging, lag or diffusion path"
+        )
     if not setup.diffusion:
         return ""
     if SHORTEST * setup.diffusion < step:
@@ -262,7 +265,7 @@ class _Kalman:
         return cls(np.linalg.inv(units) @ expm(_flow(model) * period) @ units, units, period)
 
     def decades(self, amplitude: float, noise: Fraction) -> float:
-        """Initial noise ratio in decades: squared displacement by the disturbance [m/s²] over squared noise [m]."""
+        """Initial noise ratio in decades: 2·log10 of displacement per period by `amplitude` [m/s²] over `noise` [m]."""
         moved = amplitude * self.step**2
         return _DECADES if not noise or not moved else float(np.clip(2 * log10(moved / noise), 0, _DECADES))
 
@@ -356,7 +359,7 @@ class Weights:
 
 
 FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, state_noise=1.4e-4, level_noise=162.0)
-"""Found by minimising the worst-case peak of y under bounded stresses: a = 0.01, b = 0.015, ρL²/D = 1, ρT_s = 0.05."""
+"""Minimisers of the worst-case peak of ln(v/V) under bounded stresses; a = 0.01, b = 0.015, ρL²/D = 1, ρT_s = 0.05."""
 
 
 def sliding_law(

@@ -31,7 +31,7 @@ _ROOM = 1.002  # margin for a checker with other bounds of the same integrals
 
 
 def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPart:
-    """Uncertain plant in exact numbers; bounds belong to sectors with callable slopes."""
+    """Uncertain plant in exact numbers; `bounds`: largest argument of callable slopes by sector name, 1 by default."""
     sectors = plant.exact_sectors(lambda name: bounds.get(name, Fraction(1)))
     return LinearPart(
         A=plant.A,
@@ -116,7 +116,7 @@ def _claimed(
 
 
 def _numbers(plant: UncertainPlant, part: LinearPart, responses: ResponseBounds) -> Row | NoProof:
-    """W of the theorem, from floats; or the small gain and the sector that contributes most."""
+    """Sector inputs W of the theorem, from floats; or `NoProof` with the sector that contributes most by itself."""
     count, names = len(part.outputs), [*plant.sectors, *plant.gains]
     halves = np.array([float(s.slopes[1] - s.slopes[0]) / 2 for s in part.sectors])
     if not halves.any():
@@ -178,7 +178,9 @@ def _unstable(part: LinearPart, loop: PlantLoop) -> str:
         return ""
     states = np.real(mode[: len(part.A)] / mode[np.argmax(abs(mode[: len(part.A)]))])
     shape = ", ".join(f"{v:.2g}" for v in states)
-    return f"the nominal loop is not stable: the mode ({shape}) of the states is multiplied by {radius:.4g} a sample"
+    return (
+        f"the nominal loop is not stable: the mode ({shape}) of the states grows by a factor of {radius:.4g} per sample"
+    )
 
 
 def escaping(plant: UncertainPlant, law: MatrixLaw) -> tuple[float, np.ndarray]:

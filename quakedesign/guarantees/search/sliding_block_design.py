@@ -64,7 +64,7 @@ def sliding_block_guarantee(
                 "well reaches must decay within some 60 T_s. Run limits, which says whether wells are missing; "
                 "else lengthen T_s",
             )
-        reason = f"no bounds of slip rate and state close: small gain {small:.3g}. Reduce the stress"
+        reason = f"no self-consistent bounds of slip rate and state: small gain {small:.3g}. Reduce the stress"
         return NoProof(reason=reason, small_gain=UpperBound(rational(f"{small:.6g}")))
     for _ in range(3):
         claims = _grown(claims, _ROOM)
@@ -74,14 +74,15 @@ def sliding_block_guarantee(
         proof = plant_guarantee(plant, law, _PIECES)
         if proof.available and max(proof.claims.controls) * MPA < claims.push:
             return replace(proof, notes=(_slip_rates(blocks, rate),))
-    return NoProof(reason="the estimated bounds are not proved: reduce the stress")
+    return NoProof(reason="the proof failed for the estimated bounds: reduce the stress")
 
 
 def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Fraction, UpperBound, PlantProof]:
     """Lag [s], largest shear stress [Pa] and bound of |ln(v/V)| of a guarantee for blocks.
 
-    The last result is the guarantee with the names of these blocks. The claims Z and W follow from the sectors of its
-    plant, and Q from the bounds of its pressures; for a smaller Q its sectors and disturbances still cover the blocks.
+    The last result is the guarantee with the names of these blocks. The claims Z (log state) and W (pressure) follow
+    from the sectors of its plant, and Q (pressure change) from the bounds of its pressures; for a smaller Q its sectors
+    and disturbances still cover the blocks.
 
     Raises
     ------
@@ -115,7 +116,7 @@ def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Frac
 
 
 def _within(required: LinearPart, proved: LinearPart) -> bool:
-    """Whether a plant is another one, or has narrower sectors and smaller disturbances."""
+    """Whether the required plant equals the proved one up to narrower sectors and smaller disturbances."""
     same = all(getattr(required, name) == getattr(proved, name) for name in ("A", "B", "C", "loads", "noise", "start"))
     if not same or required.outputs != proved.outputs or len(required.sectors) != len(proved.sectors):
         return False
@@ -176,13 +177,13 @@ class _WeightSearch:
         )
 
     def log_rate(self, x: np.ndarray) -> float:
-        """Y of self-consistent claims, or a penalty without such claims."""
+        """Bound Y of |ln(v/V)| for self-consistent claims, or a penalty if there are none."""
         _, claims, small = self.closed(x)
         rate = None if claims is None else self.blocks.log_rate(claims)
         return 10 + small if rate is None else float(rate)
 
     def closed(self, x: np.ndarray) -> tuple[MatrixLaw | None, BlockClaims | None, float]:
-        """Law, claims that imply smaller bounds, and small gain."""
+        """Law, claims that imply bounds no larger than themselves, and small gain."""
         claims, law, small, N = self.small, None, _LOST, len(self.blocks.tasks)
         for _ in range(_TURNS):
             part = self._part(claims)
@@ -219,7 +220,7 @@ class _WeightSearch:
         return np.array(rows)
 
     def _decentralised(self, matrix: np.ndarray) -> np.ndarray:
-        """Entries between signals of the same well, if each well has its own measurements."""
+        """Matrix restricted to entries between signals of the same well, if the law is decentralised."""
         height, width = (size // self.count for size in matrix.shape)
         return np.asarray(matrix * np.kron(np.ones((height, width)), self.own))
 

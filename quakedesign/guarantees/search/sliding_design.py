@@ -1,6 +1,6 @@
 """Search for slow-sliding laws with a proof over a box of friction constants.
 
-The second chapter computes the largest distance of a well, or rate of sliding, by continuation from an easy case.
+The second chapter computes the longest diffusion path or lag, or the largest V, by continuation from a short path.
 """
 
 from collections.abc import Callable, Mapping
@@ -45,13 +45,14 @@ _STARTS = (
     (-1.02, -1.74, 6.76, 0.97, -5.19, 3.11, -0.06, 0.39, -0.12),
     (-6.0, -0.9, 4.6, 1.2, -5.9, 2.3, -0.17, 0.52, -0.05),
 )
-"""Logarithms of the weights and of what a, b and D of the law's model are over the fault's: ρL²/D = 1, ρT_s = 0.06."""
+"""Logarithms of the weights and of a, b and D_c of the model over the fault's, for ρL²/D = 1, ρT_s = 0.06."""
 _SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
 _EVALUATIONS = 120
 _HOPELESS = 60  # number of laws without bounds after which a search ends
-_POOR, _PATIENCE = 2.0, 40  # a search ends if the best of so many laws has a larger cost
+_POOR, _PATIENCE = 2.0, 40  # a search ends if the best cost of the first 40 laws exceeds 2
 _FORGETTING = 0.972  # largest eigenvalue of a period, to limit the periods of the proof
-_GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}  # first claims over Y; pressures in 2a times the normal stress
+# initial claims divided by Y; pressures in units of 2aσ'
+_GUESSES = {"log_state": 0.4, "push": 1.2, "asked": 3.6}
 _TURNS = 6
 _SHRINKING = 24
 _MEASURED = 2
@@ -61,7 +62,8 @@ _NEAR = 0.89  # largest estimate over its claim, as the sums of the proof are la
 _FAILED = 50.0
 _SMALL = Fraction(1, 10**4)  # share of the normal stress
 _DIGITS, _SHORT = 6, 3
-_ENDS = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}  # ends of the ranges at the worst corner
+# index of the end of each range at the worst corner (0: low, 1: high)
+_ENDS = {"direct_effect": 0, "evolution_effect": 1, "critical_slip": 0}
 _AXES = tuple(_ENDS)
 _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 
@@ -69,7 +71,7 @@ _NAMES = tuple(SlidingClaims.__dataclass_fields__)
 def proved_sliding(
     task: SlidingPlant, sampled_loop: SampledLoop, *, log_rate: Fraction = LOG_RATES[0]
 ) -> SlidingProof | NoProof:
-    """Cells and claims for a law, |ln(v/V)| at most `log_rate`, or the reason why there are none."""
+    """Proof of a law with |ln(v/V)| at most `log_rate`, by cells and claims, or the reason why there is none."""
     corner = worst_corner(task)
     claims = _claims(corner, sampled_loop, log_rate)
     if claims is None or (corner != task and _excess(corner, sampled_loop, claims) >= _NEAR):
@@ -104,7 +106,7 @@ def _smallest_claims(proof: SlidingProof) -> SlidingClaims:
 
 
 def _followed(proof: SlidingProof, claims: SlidingClaims, margins: Mapping[str, float]) -> SlidingClaims:
-    """Claims that follow by the estimate with a margin, iterated until they hardly change."""
+    """Claims iterated by the estimate times `margins` until they change by less than 1 %."""
     for _ in range(_SHRINKING):
         every = [_estimate(cell, proof.sampled_loop, claims) for cell in proof.cells]
         if any(one is None for one in every):
@@ -180,13 +182,13 @@ def searched_sliding(
     ----------
     task : SlidingPlant
     step, log_rate, setup
-        As of `designed_sliding`.
+        As in `designed_sliding`.
     near : array, optional
         Further start of the search.
     enough : float
-        Estimated bound of |ln(v/V)| over `log_rate` with which the search ends.
+        The search ends when the ratio of the estimated bound of |ln(v/V)| to `log_rate` is at most this [-].
     most : int
-        Number of laws that are estimated.
+        Largest number of laws to evaluate.
     """
     corner = worst_corner(task)
     claims = _guess(corner, log_rate)
@@ -381,10 +383,10 @@ _FARTHER = Fraction(13, 10), Fraction(9, 8), Fraction(17, 16)  # step factors, t
 _WELL_ROOM = Fraction(3, 4)
 _NEARER = 3  # number of halvings of the path
 _LAWS = 40  # number of laws tried for a share of the path
-_ENOUGH = 0.5  # sufficient estimate over the bound of |ln(v/V)|
+_ENOUGH = 0.5  # ratio of the estimate to the bound of |ln(v/V)| that suffices
 _SLOWER = 1.05  # margin, as damping does not scale with V
 _WELL_DIGITS = 2
-_SUITABLE = 2
+_ADMISSIBLE_FACTOR = 2
 _QUIETER = Fraction(1, 10), Fraction(1, 100), Fraction(0)  # shares of the slip noise
 
 
@@ -401,7 +403,7 @@ class FarthestWell:
     numbers : array or None
         Its parameters, near which a search may begin.
     log_rate : Fraction
-        Bound of |ln(v/V)| of its estimate.
+        Bound of |ln(v/V)| for which the law was estimated [-].
     """
 
     share: Fraction = Fraction(0)
@@ -413,7 +415,7 @@ class FarthestWell:
 def admissible_step(task: SlidingPlant, step: Fraction) -> Fraction:
     """T_s [s] if within a factor of 2 of D_c/(20 V), else D_c/(20 V) with two digits."""
     suits = task.ranges["critical_slip"][0] / task.rate / int(AGEINGS)
-    return step if suits / _SUITABLE <= step <= _SUITABLE * suits else two_digits(suits)
+    return step if suits / _ADMISSIBLE_FACTOR <= step <= _ADMISSIBLE_FACTOR * suits else two_digits(suits)
 
 
 def farthest(
@@ -479,7 +481,7 @@ def shortened(setup: ExactSetup, share: Fraction) -> ExactSetup:
 def possible_remedy(
     fault: Fault, task: SlidingPlant, well: FarthestWell, setup: ExactSetup, prove: Prove, *, spread: Fraction
 ) -> str:
-    """Remedies that have a proof, as text: a share of the path, or a smaller V.
+    """Remedies that are proved, as text: a shorter path or a smaller V.
 
     Parameters
     ----------
@@ -494,7 +496,7 @@ def possible_remedy(
         Of the task.
     """
     if well.sampled_loop is None or well.numbers is None:
-        return "no guarantee was found even with a much nearer well: a smaller spread, stress or noise may help"
+        return "no guarantee was found even with a much shorter path: a smaller spread, stress or noise may help"
     for noise in (setup.slip_noise, *quieter(setup)):
         loop = setup if noise == setup.slip_noise else replace(setup, slip_noise=noise)
         sampled_loop = replace(well.sampled_loop, slip_noise=noise)
@@ -530,7 +532,7 @@ def with_noise(noise: Fraction, setup: ExactSetup) -> str:
 def _slower(
     fault: Fault, task: SlidingPlant, well: FarthestWell, setup: ExactSetup, prove: Prove, spread: Fraction
 ) -> str:
-    """Task with the same slip and a smaller V that is proved through the path; else empty."""
+    """Text of a task with the same slip and a smaller V that is proved for the given path; empty without one."""
     time = float(short(_SLOWER * fault.reference.operation_time / float(well.share), _WELL_DIGITS))
     reference = replace(fault.reference, operation_time=time)
     slow = replace(fault, reference=reference, sampling_time=sliding_step(fault.friction, reference))

@@ -45,8 +45,8 @@ TUNINGS = {
     "tracking": ((0.95, 0.85, 0.165, 1.27), (0.5, 0.5, 0.3, 1.3), (0.7, 0.5, 0.3, 1.3), (0.5, 0.5, 0.5, 1.3)),
     "peak": ((0.3, 0.5, 0.1, 1.3), (0.5, 0.5, 0.1, 1.3), (0.5, 0.5, 0.3, 1.3)),
 }
-"""Shares of the slip-rate and of the slip innovation that the estimate takes, share of the slip error that a period
-corrects, and assumed input gain over its least value."""
+"""Estimator gains of the slip-rate and of the slip innovation [-], fraction of the slip error corrected per period, and
+ratio of the assumed input gain to its least value."""
 DEADBEAT = tuple(
     (*shares, 1.0, gain) for *shares, gain in ((0.3, 0.5, 1.4), (0.4, 0.6, 1.4), (0.5, 0.7, 1.4), (0.3, 0.5, 1.3))
 )
@@ -62,17 +62,21 @@ _PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)  # periods per policy; turns
 _TINY = 1e-12  # rounding, relative to a height
 _LITTLE = 1.01  # largest growth of a height in a step to the fixed point of a policy
 _NEARLY = (
-    0.93  # a factor of y above this share of the one that leaves a facet unchanged in slow sliding is set to that one
+    # the coefficient of y in a normal is raised to the neutral one (facet unchanged in slow sliding) above this share
+    # of it
+    0.93
 )
 _ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
-_ALIKE, _WIDER = 1 - 1e-8, 1e-5  # cosine of equal normals; margin of a facet that rest leaves unchanged
+# cosine above which two normals count as equal; relative margin of a facet that is unchanged at rest
+_ALIKE, _WIDER = 1 - 1e-8, 1e-5
 _KEPT, _FOLLOWED = 0.6, 14  # growth retained when facets are added; later turns until heights only grow
 _MARGINS = 2e-6, 2e-5  # margins of a polytope over its images; the second if the first gives no proof
-_FAR = 30  # times the first extents: a larger set counts as unbounded
+_FAR = 30  # a set larger than this factor times its first extents counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried, relative to a size and to present ones
 _NEGATIVE, _TIGHT = 1e-9, 40  # multipliers that count as negative; constraints that may meet at a vertex
 _LOWER, _GUESSES = Fraction(1, 50), 3  # margin of a guessed least pressure, over σ'; number of guesses
-_SHRUNK, _LITTLE_LESS = 60, 2e-5  # replacements of a set by its image; decrease of its extents that ends these
+# largest number of replacements of a set by its image; relative decrease of its extents below which they end
+_SHRUNK, _LITTLE_LESS = 60, 2e-5
 _SNAPPED = 1e-3  # largest factor of the slip that counts as 0, over that of e1
 _INSIDE = 1e-4  # least distance of an interior point from all facets, over the size
 _DIGITS = 7
@@ -285,7 +289,7 @@ class _ReachableStates:
         return moved, now, now <= 0
 
     def hull(self, tell: Tell) -> np.ndarray | None:
-        """Vertices of the hull of all states reached from rest; None if unbounded."""
+        """Vertices of the hull of all states reachable from rest at t = 0; None if it grows without bound."""
         points = _at_first(self.sampled_loop)
         directions = np.random.default_rng(0).standard_normal((1500, 3))
         first, before = None, np.zeros(6)
@@ -319,7 +323,7 @@ def _at_first(sampled_loop: SampledStickSlip) -> np.ndarray:
 
 
 def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarray:
-    """The points that are farthest in most directions, and the ends of the axes."""
+    """The `most` points that are extreme in the most directions, including the extremes along the axes."""
     size = np.abs(points).max(axis=0)
     white = np.linalg.inv(np.linalg.cholesky(np.cov((points / size).T) + 1e-9 * np.eye(3)))
     farthest = ((directions @ white) / size @ points.T).argmax(axis=1)
@@ -329,7 +333,7 @@ def _extreme(points: np.ndarray, directions: np.ndarray, most: int) -> np.ndarra
 
 
 # ----------------------------------------------------------------------
-# Polytope that contains these states.
+# Invariant polytope that contains the reachable states.
 
 
 def _rows(periods: list[Period], facets: np.ndarray, multipliers: np.ndarray) -> Iterator[Rows]:
@@ -410,7 +414,7 @@ def _basis(rows: np.ndarray, ends: np.ndarray, factors: np.ndarray) -> tuple[int
 
 
 def _dyadic(value: float) -> Fraction:
-    """Number with 40 binary digits: its ball has radius 0."""
+    """Number with 40 binary digits, which ball arithmetic represents with radius 0."""
     mantissa, exponent = np.frexp(value)
     return Fraction(int(np.round(mantissa * 2**40))) * Fraction(2) ** (int(exponent) - 40)
 
@@ -518,7 +522,7 @@ class _Growing:
         return np.array(tried)
 
     def _tops(self, periods: list[Period], corners: list[Any], tried: np.ndarray) -> np.ndarray:
-        """Largest value of each facet by choice of multipliers, in three maps: sliding, limited innovation, rest."""
+        """Largest values of the facets for each choice of multipliers, by map: sliding, limited innovation, rest."""
         choices, count = tried.shape[:2]
         largest = np.full((3, choices * count), -np.inf)
         for rows in _rows(periods, np.tile(self.normals, (choices, 1)), tried.reshape(-1, 5)):
@@ -771,7 +775,7 @@ def _searched(task: FaultPlant, sampled_loop: SampledStickSlip, tell: Tell) -> S
     except ParameterError as error:
         return NoProof(reason=str(error))
     except (ArithmeticError, ValueError, LinAlgError, QhullError):
-        return NoProof(reason="the loop is too badly scaled for a search in floats")
+        return NoProof(reason="the loop is too badly scaled for a search in floating point")
     return proof
 
 
@@ -786,7 +790,7 @@ def design_stick_slip(
     implicit: bool = False,
     tell: Tell = lambda what, done: None,
 ) -> StickSlipProof | NoProof:
-    """Gains with a guarantee on the stick–slip plant: the first tuning that has one.
+    """Gains with a guarantee on the stick–slip plant, from the first tuning with a proof.
 
     Parameters
     ----------
@@ -800,7 +804,7 @@ def design_stick_slip(
     longest_step : Fraction
         Longest interval of aperiodic sampling, as in `SampledStickSlip` [s].
     healing : Fraction
-        Δμ_h [-], proved as a larger disturbance, see `StickSlipProof.covered_healing`.
+        Healing Δμ_h [-], treated as an additional disturbance, see `StickSlipProof.covered_healing`.
     implicit : bool
         Whether the law is a deadbeat implicit step; it has the same tunings for both objectives.
     tell : callable
@@ -829,7 +833,7 @@ def design_stick_slip(
 def _healed(
     task: FaultPlant, sampled_loop: SampledStickSlip, healing: Fraction, tell: Tell
 ) -> StickSlipProof | NoProof:
-    """Proof with the disturbance enlarged by the healing under the least pressure."""
+    """Proof with a disturbance enlarged by the effect of healing at a guessed least pressure, which is then checked."""
     least = task.rest_pressure[0] - _LOWER * task.normal_stress
     for _ in range(_GUESSES):
         more = task.area_per_mass[1] * healing * (task.normal_stress - least)
@@ -837,7 +841,7 @@ def _healed(
         if not proof.available or proof.covered_healing(task.amplitude) >= healing:
             return replace(proof, healing=healing) if proof.available else proof
         least = Fraction(proof.claims.least_pressure) - _LOWER * task.normal_stress
-    return NoProof(reason="the pressure falls too far for this healing")
+    return NoProof(reason="no consistent least pressure was found for this healing")
 
 
 # ----------------------------------------------------------------------
@@ -845,17 +849,17 @@ def _healed(
 
 
 def worst_stick_slip(proof: StickSlipProof, *, periods: int = 60) -> WorstCase:
-    """Worst case found from rest, continued from the outermost states of each period.
+    """Worst case found from the initial condition at rest, continued from the extreme states of every period.
 
     For each facet of the invariant polytope the search continues from the farthest state in its direction. β is
     constant along a trajectory. In each period the slope of friction is at either end of its range, and the disturbance
-    changes its sign at most once. Friction at rest is that in slip, or higher by `healing` under the largest claimed
-    pressure, where healing has the least effect.
+    changes its sign at most once. Friction at rest equals that in slip, or exceeds it by `healing`, evaluated at the
+    largest claimed pressure, where its effect is least.
     """
     task, claims = proof.task, proof.claims
     excess = proof.healing * task.area_per_mass[0] * (task.normal_stress - Fraction(claims.largest_pressure))
     plain = _ReachableStates.of(replace(task, amplitude=proof.disturbance), proof.sampled_loop)
-    reaches, noises = [replace(plain, excess=e) for e in sorted({0.0, float(excess)})], _noises(proof.sampled_loop)
+    plants, noises = [replace(plain, excess=e) for e in sorted({0.0, float(excess)})], _noises(proof.sampled_loop)
     facets, extremes = np.array(proof.invariant_set.facets, dtype=float), np.zeros(3)
     for high in (False, True):  # which end of β
         first = _at_first(proof.sampled_loop)
@@ -864,8 +868,8 @@ def worst_stick_slip(proof: StickSlipProof, *, periods: int = 60) -> WorstCase:
             before = dict(states)
             for later in noises:
                 ends = [states[later]]
-                for invariant_set, (noise, starts) in product(reaches, before.items()):
-                    after = invariant_set.simulated(starts, noise, later)
+                for plant, (noise, starts) in product(plants, before.items()):
+                    after = plant.simulated(starts, noise, later)
                     half = after.shape[1] // 2  # the two halves of the choices differ in β
                     ends.append((after[:, half:] if high else after[:, :half]).reshape(-1, 3))
                 points = np.vstack(ends)

@@ -33,10 +33,11 @@ from quakedesign.plant.sliding_plant import SlidingPlant
 
 _PIECES = 6
 _SWEEPS = 8
-_MANY, _FEW = 512, 2  # trajectories with random switching times; sweeps of each, which stall at rest
+# trajectories with random switching times; sweeps of each (more do not help, as sweeps make no progress at rest)
+_MANY, _FEW = 512, 2
 _COURSES, _LEAST_COURSES = 24, 8  # trajectories for each of the two outputs; least number of long ones
 _CLIMBING, _CLIMBS = 48, 8  # trajectories improved from the best of those, and number of improvements
-_CHANGED = 0.15, 0.4, 1.0  # shares of the pieces whose inputs are replaced by those of the adjoint, in turn
+_CHANGED = 0.15, 0.4, 1.0  # probabilities of replacing the inputs of a piece by those of the adjoint, used in turn
 _BLOCK = 8  # pieces that change together, at most
 _RESTING, _ROUNDS = 96, 9  # trajectories of 128 periods that rest, then accelerate; rounds of variation
 _FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest start and longest duration of the first acceleration, in periods
@@ -56,15 +57,15 @@ class WorstCase:
     Attributes
     ----------
     slip_error : float
-        [m].
+        Largest |slip − reference| [m].
     slip_rate_error, peak_slip_rate : float or None
         [m/s]; the first from `worst_tracking`, the second from `worst_stick_slip` and `worst_sliding`.
     log_rate : float or None
-        Of ln(v/V) in slow sliding [-].
+        Largest |ln(v/V)| in slow sliding [-].
     slip_behind, slip_ahead : float or None
         Slip behind and ahead of the reference on the stick–slip plant [m].
     least_pressure, largest_pressure : float or None
-        At the valve [Pa]; computed only on the stick–slip plant with a law that has a limit at rest.
+        Pressure at the valve [Pa]; computed only for a law with an anti-windup limit at rest, on the stick–slip plant.
     """
 
     slip_error: float
@@ -87,15 +88,16 @@ def worst_tracking(claim: TrackingProof | ContinuousProof, *, sticks: bool = Fal
     """Worst case found with disturbance, slopes, damping and input gain at their extremes.
 
     The search makes forward and backward sweeps of the maximum principle, six steps per flow, from random costates. A
-    trajectory lasts 64 to 512 periods, depending on the decay of the loop. It maximises the error at the end of the
-    last period, or at a time between its samples, where the error is larger with a delay. In continuous time a period
-    is 1/|λ| of the fastest pole. In the class `rate` the disturbance is the optimal one for a costate (`_steepest`).
-    With `sticks` friction prevents backward slip, and the reference has its largest rate or 1/20 of it. Further
-    trajectories then switch after random times, or rest until the reference has caught up by the proved slip error,
-    then accelerate (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact
+    trajectory lasts 64 to 512 periods, depending on the decay of the loop; with initial errors the search also uses 1
+    to 16 periods, and after a rest up to 128 periods are added. It maximises the error at the end of the last period
+    or, in a second search, at a time within the last period. In continuous time a period is 1/|λ| of the fastest pole.
+    In the class `rate` the disturbance is the optimal one for a costate (`_steepest`). With `sticks` friction prevents
+    backward slip, and the reference has its largest rate or 1/20 of it. Further trajectories switch the inputs at
+    random times, or slip ahead of the reference by up to the proved slip error, rest until it catches up, then
+    accelerate (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact
     solution, also outside its sector. With jitter each event is earliest or latest; with aperiodic sampling each
-    interval is shortest or longest. Pressures step at once, and an averaged measurement is that at the midpoint of its
-    interval.
+    interval is shortest or longest. Pressures change without a ramp, and an averaged measurement is replaced by the
+    value at the midpoint of its interval.
     """
     slip, rate, *pressures = search_once(lambda: _searched(claim, sticks), "worst", claim, sticks)
     least, largest = pressures or (None, None)
@@ -141,7 +143,7 @@ def _resting(claim: TrackingProof, like: "_CourseSearch") -> "_CourseSearch":
 class _Event:
     """A jump and the time after it.
 
-    `soon`: the jump may wait for the next event; `late`: the jump occurs here unless it did at the event before.
+    `soon`: the jump may be postponed to the next event; `late`: it occurs here unless it occurred before.
     `samples`: the law measures at the jump. `free`: the duration is anything from 0 to `duration`.
     """
 
@@ -155,7 +157,7 @@ class _Event:
 
 @dataclass(frozen=True, slots=True)
 class _EventPieces:
-    """One event: its jump, e^{Ah} and contributions of constant inputs for every vertex, and h [s]."""
+    """Pieces of one event: its jump, e^{Ah} and responses to constant inputs at every vertex, and the length h [s]."""
 
     event: _Event
     jump: np.ndarray
@@ -174,8 +176,8 @@ _ON_TIME: dict[str, Any] = dict.fromkeys(("jitter", "delay_jitter", "averaging",
 def _on_time(sampled_loop: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction]:
     """Loop without jitter, largest shift of its samples, largest lead of its pressures.
 
-    A pressure that arrives at a sample shifts with it. Events keep their order. A first sample that must be at its
-    nominal instant counts as the earliest one.
+    A pressure that arrives at a sample shifts with it. Events keep their order. A first sample without jitter counts as
+    the earliest one.
     """
     off, late, delay = sampled_loop.jitter, sampled_loop.jitter + sampled_loop.delay_jitter, sampled_loop.delay
     if any(sampled_loop.initial_errors) or sampled_loop.law.first:
@@ -294,7 +296,7 @@ def _command_response(task: FaultPlant, sampled_loop: SampledLoop) -> list[float
 
 
 class _CourseSearch:
-    """Many trajectories in one array; `largest` is |e1| and |e2|."""
+    """Many trajectories in one array; `largest` holds the largest |e1| [m] and |e2| [m/s] so far."""
 
     def __init__(
         self,
@@ -326,7 +328,8 @@ class _CourseSearch:
         more = claim.sampled_loop.slack if isinstance(claim, TrackingProof) else Fraction(0)
         events = _events(loop, off, early, more) if loop.segments else [_flowing(flow)]
         self.parts = [_pieces(vertices, inputs, event, none=more > 0) for event in events]
-        self.punctual = bool(sampled_loop and (sampled_loop.law.first or any(sampled_loop.initial_errors)))  # at first
+        # the first sample has no jitter
+        self.punctual = bool(sampled_loop and (sampled_loop.law.first or any(sampled_loop.initial_errors)))
         if periods is None:
             periods = _periods_to_forget(self.parts, len(loop.states))
             courses = 2 * max(courses // 2 * PERIODS // periods, _LEAST_COURSES) if numbers is None else courses
@@ -358,7 +361,8 @@ class _CourseSearch:
         for left in reversed(range(sweeps)):
             chosen, fixed, jumped = self._forward(last := costates, slopes)
             costates = self._backward(chosen, fixed, jumped)
-            if self.limit is not None and left <= sweeps // 2:  # before: by the sign of its costate
+            # in earlier sweeps the slopes follow the sign of the costate
+            if self.limit is not None and left <= sweeps // 2:
                 slopes = self._slopes(costates, chosen, self.limit)
         return last
 
@@ -712,7 +716,7 @@ def courses(
         loop, maps = plant.linear(slope)
         aims = np.array([np.array(loop.outputs["log_rate"], dtype=float), np.eye(len(loop.states))[0]])
         count = len(maps)
-        signs = np.ones((2, _cached(maps) * count, 2 * count))
+        signs = np.ones((2, _periods_until_decay(maps) * count, 2 * count))
         for last in range(count):
             costates = aims
             for number in range(signs.shape[1] - count + last, -1, -1):
@@ -722,7 +726,8 @@ def courses(
         yield float(claim.task.stress) * signs[0], float(claim.task.swing) * signs[1]
 
 
-def _cached(maps: list[tuple[Any, Any, Any]]) -> int:
+def _periods_until_decay(maps: list[tuple[Any, Any, Any]]) -> int:
+    """Periods until the state of a linear loop has decayed, within limits."""
     whole = np.eye(len(maps[0][0]))
     for step, _, jump in maps:
         whole = step @ jump @ whole
@@ -732,7 +737,7 @@ def _cached(maps: list[tuple[Any, Any, Any]]) -> int:
 class SlidingPieces:
     """Plant at a corner in pieces of its periods: exact pressures, Runge–Kutta steps.
 
-    After a given slip of the reference [m] the normal stress is lower by p*.
+    The effective normal stress is lower by the equilibrium pressure p* after a given slip of the reference [m].
     """
 
     def __init__(
@@ -749,7 +754,7 @@ class SlidingPieces:
         self._friction = float(corner.ranges["direct_effect"][0]), float(corner.ranges["evolution_effect"][0])
 
     def linear(self, slope: float) -> tuple[PeriodicLoop, list[tuple[Any, Any, Any]]]:
-        """Linear loop by piece: e^{Ah}, responses to 1 Pa and to r′ = 2V, the jump before."""
+        """Linear loop and its pieces: e^{Ah}, responses to 1 Pa of stress and to r′ = 2V, and the preceding jump."""
         model: Any = model_of(self._corner, self._claim.claims)
         steep = Fraction(slope).limit_denominator(1000)
         strength = Fraction(self._strength) + self._corner.radiation * self._corner.rate * steep

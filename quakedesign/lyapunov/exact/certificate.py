@@ -1,4 +1,4 @@
-"""Lyapunov certificates and their exact check: proved, refuted or undecided."""
+"""Lyapunov certificates and their exact check, which returns proved or refuted, or raises an error."""
 
 import pickle
 from collections.abc import Iterable, Mapping
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def check(certificate: Evidence, law: "Subject | None" = None) -> Verdict:
-    """Decide a certificate in exact arithmetic; see `Certificate.check`."""
+    """Check a certificate in exact arithmetic; see `Certificate.check`."""
     with limited():
         return _decided(certificate, law)
 
@@ -47,8 +47,8 @@ def _same_field(loop: Loop, law: "Subject | None") -> None:
     """Require the field derived from the law's expressions, and the law's name unless the field is bare."""
     require(
         law is not None or is_law(loop.law),
-        f"the law {loop.law!r} is not one of the package, so its field cannot be derived again. "
-        "Give its class or its LoopField to check().",
+        f"the law {loop.law!r} is not in the package, so its field cannot be derived. "
+        "Pass its class or its LoopField to check().",
     )
     name, model = field_of(loop.law if law is None else law)
     bare = not isinstance(law, str | type | None)
@@ -57,7 +57,7 @@ def _same_field(loop: Loop, law: "Subject | None") -> None:
     given = (loop.gains, loop.constants, loop.uncertain)
     require(
         all(set(own) == set(values) for own, values in zip(names, given, strict=True)),
-        f"the gains, constants or uncertain parameters are not those of {loop.law}.",
+        f"the names of gains, constants or uncertain parameters differ from those of {loop.law}.",
     )
     derived = loop_of(loop.law, model, gains=loop.gains, uncertain=loop.uncertain, constants=loop.constants)
     require(
@@ -66,7 +66,7 @@ def _same_field(loop: Loop, law: "Subject | None") -> None:
         and {name: of for name, (of, _) in derived.roots.items()} == {name: of for name, (of, _) in loop.roots.items()}
         and _sorted(derived, derived.field) == _sorted(loop, loop.field)
         and _sorted(derived, derived.lifts) == _sorted(loop, loop.lifts),
-        f"the field is not that of {loop.law}.",
+        f"the field in the certificate differs from that of {loop.law}.",
     )
 
 
@@ -88,9 +88,9 @@ def _check_proof(certificate: Evidence) -> None:
     allowed |= {"decay"} if second == "decrease" else set()
     require(
         required <= set(claims) <= required | allowed,
-        f"the claims must include positive and {second}; any others must be bounds of states or, on cells, decay.",
+        f"the claims must be 'positive', '{second}', and optionally 'bound_<state>' or, on cells, 'decay'.",
     )
-    require(all(c > 0 for c in claims.values()), "a claim must be positive.")
+    require(all(c > 0 for c in claims.values()), "the value of every claim must be positive.")
     uncertain = {p for t in certificate.lyapunov for p in t.parameters} & set(loop.ranges)
     require(not uncertain, "V must not depend on an uncertain parameter.")
     _check_witnesses(certificate, claimed(loop, certificate.lyapunov, claims))
@@ -104,7 +104,7 @@ def _check_witnesses(certificate: Evidence, obligations: Iterable[Obligation]) -
         require(one.name in certificate.witnesses, f"the witness of {one.name!r} is missing.")
         holds = proves(one, certificate.witnesses[one.name], certificate.loop.domain)
         require(holds, f"the witness of {one.name!r} does not prove that its polynomial is non-negative.")
-    extra = "the witnesses are not those of the obligations in their order."
+    extra = "the witnesses must be those of the distinct obligations, in the same order, without further ones."
     require(expected == list(certificate.witnesses), extra)
 
 
@@ -115,12 +115,12 @@ def _check_roots(loop: Loop) -> None:
             number > 0 and 0 <= low <= high and low**2 <= number <= high**2,
             f"the range of {name} does not contain the root of {of}.",
         )
-    require(loop.domain == "cells" or not loop.lifts, "lifts are allowed only in the domain cells.")
+    require(loop.domain == "cells" or not loop.lifts, "lifts require the domain 'cells'.")
 
 
 def _check_equilibrium(loop: Loop, equilibrium: Equilibrium) -> None:
     plain = loop.domain == "cells" and not (loop.lifts or loop.roots)
-    require(plain, "an equilibrium needs the domain cells, without lifts and roots.")
+    require(plain, "an equilibrium requires the domain 'cells' and a loop without lifts and roots.")
     point, parameters = equilibrium.point, equilibrium.parameters
     require(set(point) == set(loop.states) and any(point.values()), "the point must be away from the origin.")
     require(
@@ -183,8 +183,8 @@ class Certificate(Evidence):
     lyapunov : tuple of Term
         Lyapunov function V; empty for a refutation.
     claims : mapping of str to Fraction
-        ``positive``, and ``decrease`` on `cells` or ``rate`` [1/s] on `reals`; optionally ``bound_`` and the name of a
-        state, and on `cells` ``decay``.
+        ``positive``, and ``decrease`` on `cells` or ``rate`` [1/s] on `reals`; optionally ``bound_<state>`` and, on
+        `cells`, ``decay``.
     witnesses : mapping of str to Witness
         One for every distinct obligation, by name.
     refutation : Equilibrium, optional
@@ -196,19 +196,24 @@ class Certificate(Evidence):
         return cls(**{part.name: getattr(evidence, part.name) for part in fields(Evidence)})
 
     def check(self, law: "str | type[Law] | LoopField | None" = None) -> Verdict:
-        """Check proof or counterexample in exact arithmetic, and the field against that of the law.
+        """Check the proof or counterexample, and compare the field with that of the law, in exact arithmetic.
 
         Parameters
         ----------
         law : str, type of Law or LoopField, optional
-            Law that the field must belong to; by default the law of the package that the certificate names.
+            Law to which the field must belong; by default the law of the package that the certificate names.
+
+        Returns
+        -------
+        Verdict
+            ``PROVED`` or ``REFUTED``, never ``UNDECIDED``.
 
         Raises
         ------
         CertificateError
             When the proof does not hold, or the field is not that of the law.
         WorkError
-            When the check exceeds its work budget (proofs/FORMAT.md) and is undecided.
+            If the check exceeds its work budget (proofs/FORMAT.md); the certificate is then undecided.
         """
         return check(self, law)
 
@@ -226,7 +231,7 @@ class _Problem:
     certificate: Certificate = field(compare=False)
 
 
-def decided_once(certificate: Certificate, law: "str | type[Law] | LoopField | None" = None) -> Verdict:
+def cached_verdict(certificate: Certificate, law: "str | type[Law] | LoopField | None" = None) -> Verdict:
     """Verdict of `Certificate.check`, cached per process by contents and law.
 
     The verdict on a bare loop is not cached.
@@ -266,5 +271,5 @@ def load_certificate(path: str | Path) -> Certificate:
 
 
 def parse_certificate(text: str) -> Certificate:
-    """Certificate from the text of a file. Raises CertificateError as `load_certificate`."""
+    """Parse the text of a certificate file; raises CertificateError as `load_certificate`."""
     return Certificate.of(evidence_of(parse(text)))

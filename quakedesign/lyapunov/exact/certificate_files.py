@@ -1,6 +1,6 @@
 """Certificate files (proofs/FORMAT.md): numbers, sums of terms, strict reading, writing.
 
-A further chapter reads the kind of claim of a file without loading the code that checks it.
+The module also determines the kind of claim of a file without loading the code that checks the claim.
 """
 
 import json
@@ -49,7 +49,7 @@ LIMITS = {
     "basis": 200,
     "witnesses": 4096,
 }
-"""Largest number of each in a file."""
+"""Largest number of entries of each kind in a file."""
 
 Numbers = dict[Name, Fraction]
 Exponents = tuple[Annotated[int, Meta(ge=0, le=999)], ...]
@@ -72,20 +72,20 @@ class LoopEntries(Entries):
     field: dict[Name, Terms]
 
     def loop(self) -> Loop:
-        """Loop; its names must differ, and its terms contain no other names."""
+        """Loop of the entries, after checks that its names are distinct and that its terms contain no other names."""
         names = [*self.gains, *self.constants, *self.states, *self.uncertain, *self.roots, *self.lifts]
         few = len(self.gains) + len(self.constants) <= LIMITS["parameters"]
-        need(len(set(names)) == len(names) and few, f"names must differ, at most {LIMITS['parameters']} parameters")
+        need(len(set(names)) == len(names) and few, f"names must differ, parameters at most {LIMITS['parameters']}")
         top = 12 if self.domain == "cells" else 1
         need(all(1 <= w <= top for w in self.states.values()), f"weights must be integers from 1 to {top}")
         for name, (low, high) in self.uncertain.items():
             need(low <= high, f"the range of {name} is not ordered")
         known = {*self.gains, *self.constants}
-        need(all(of in known for of, *_ in self.roots.values()), "a root must be that of a gain or constant")
+        need(all(of in known for of, *_ in self.roots.values()), "a root must be the square root of a gain or constant")
         roots = {name: (of, (low, high)) for name, (of, low, high) in self.roots.items()}
         bare = made(Loop, self, field={}, roots=roots, lifts={})
         powers = (*self.states, *self.lifts)
-        need(self.domain == "cells" or not self.lifts, "lifts are allowed only in the domain cells")
+        need(self.domain == "cells" or not self.lifts, "lifts require the domain 'cells'")
         lifts = {
             lift: terms_of(self.lifts[lift], bare, powers[: len(self.states) + i]) for i, lift in enumerate(self.lifts)
         }
@@ -137,7 +137,8 @@ class WitnessEntries(Entries):
         most = LIMITS["basis"]
         need(self.multiplier != {} and len(self.multiplier) <= most, f"a multiplier must have 1 to {most} terms")
         n, states = len(next(iter(self.multiplier))), len(loop.states)
-        need(states <= n <= states + len(loop.lifts) + 1, f"a multiplier has {n} variables, not as many as its loop")
+        most_variables = states + len(loop.lifts) + 1
+        need(states <= n <= most_variables, f"a multiplier must have {states} to {most_variables} variables, got {n}")
         for cofactor in self.equalities:
             require_polynomial(cofactor, "a cofactor", n, 20_000)
         squares = _squares(self.squares, n, loop, ())
@@ -154,15 +155,15 @@ class WitnessEntries(Entries):
 def _squares(
     entries: tuple[SquareEntries, ...], variables: int, loop: Loop, condition: tuple[int, ...]
 ) -> tuple[Square, ...]:
-    need(len(entries) <= 1 << variables, f"{len(entries)} squares are more than {1 << variables}")
+    need(len(entries) <= 1 << variables, f"a witness must have at most {1 << variables} squares, got {len(entries)}")
     top = 1 if loop.domain == "cells" else 0
     for entry in entries:
         need(len(entry.times) == variables and max(entry.times) <= top, f"times must be integers from 0 to {top}")
         common_grid(entry.gram)
         size = len(entry.basis)
         fit = all(len(b) == variables for b in entry.basis) and 0 < size == len(set(entry.basis))
-        need(fit, "a basis must be a list of different exponents")
-        need(len(entry.gram) == size * (size + 1) // 2, "gram must have an entry for each pair of the basis")
+        need(fit, f"a basis must be a nonempty list of distinct exponents of {variables} variables")
+        need(len(entry.gram) == size * (size + 1) // 2, "gram must have one entry per pair of basis monomials")
     return tuple(
         Square(product=(*(i for i, x in enumerate(e.times) if x), *condition), basis=e.basis, gram=e.gram)
         for e in entries
@@ -201,26 +202,26 @@ def read_json(path: str | Path) -> Any:
     Raises
     ------
     CertificateError
-        When the file is not readable, or is no strict JSON.
+        If the file is not readable, or is not strict JSON.
     """
     text = read_text(path, "certificate", largest=LARGEST_FILE, refusal=CertificateError, marked=False)
     return parse(text)
 
 
 def evidence_of(raw: object) -> Evidence:
-    """Evidence of a parsed file, which is not checked.
+    """Evidence from a parsed file, without a check of the proof.
 
     Raises
     ------
     CertificateError
         When the file breaks a rule of FORMAT.md.
     UnsupportedError
-        For the obsolete bounds of outputs under inputs, now replaced by files of the kind ``guarantee``.
+        For the obsolete file kind with bounds of outputs under inputs, which the kind ``guarantee`` replaces.
     """
     if isinstance(raw, dict) and {"inputs", "outputs"} <= raw.keys():
         raise UnsupportedError(
-            "a file must be a proof, a refutation or of the kind guarantee. Received a bound under inputs, which is no "
-            "longer read. Make the new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
+            "a file must contain a proof, a refutation or a guarantee. Received an obsolete bound under inputs. "
+            "Write a new file with certify elqr FAULT --gains K1 K2 K3 K4 --peaks CLASS --out FILE."
         )
     entries = headed(raw)
     if "refutation" in entries:
@@ -278,7 +279,7 @@ def save_certificate(certificate: Evidence, path: str | Path) -> None:
     OutputError
         When the folder is not writable.
     CertificateError
-        When the certificate exceeds the limits of the format, such as 400 digits per number.
+        If the certificate exceeds a limit of the format, such as 400 digits per number.
     """
     write_readable(path, certificate_text(certificate), lambda text: evidence_of(parse(text)))
 

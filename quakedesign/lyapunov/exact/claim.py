@@ -29,9 +29,9 @@ Range = tuple[Fraction, Fraction]
 class Verdict(Enum):
     """Outcome of a proof about a closed loop: proved, refuted or undecided."""
 
-    PROVED = "the witness checks in exact arithmetic"
-    REFUTED = "a counterexample, checked in exact arithmetic"
-    UNDECIDED = "neither was found"
+    PROVED = "all witnesses are valid in exact arithmetic"
+    REFUTED = "the counterexample is valid in exact arithmetic"
+    UNDECIDED = "neither a proof nor a counterexample was found"
 
     def __str__(self) -> str:
         return self.name.lower()
@@ -44,18 +44,21 @@ class Loop:
     Attributes
     ----------
     law : str
+        Name of the law.
     gains, constants : mapping of str to Fraction
+        Exact values by name.
     states : mapping of str to int
-        Weight of every state.
+        Weight r_i of every state.
     domain : str
-        ``"cells"`` or ``"reals"``.
+        ``"cells"`` (signed powers, one polynomial per sign cell) or ``"reals"`` (polynomials).
     uncertain : mapping of str to (Fraction, Fraction)
+        Range of every uncertain parameter.
     field : mapping of str to tuple of Term
-        Powers of states and of lifts.
+        Rate of every state, a sum of terms in powers of states and lifts.
     roots : mapping of str to (str, (Fraction, Fraction))
         For every name, the gain or constant whose positive square root it denotes, and an enclosure of the root.
     lifts : mapping of str to tuple of Term
-        Argument of every nested power.
+        For every lift, a variable that replaces the argument of a nested power, this argument.
     """
 
     law: str
@@ -86,7 +89,7 @@ class Loop:
 
     @property
     def ranges(self) -> dict[str, Range]:
-        """Ends of all inexact values: uncertain parameters, then roots."""
+        """Range of every parameter that is not a single exact value: uncertain parameters, then roots."""
         return {**self.uncertain, **{name: ends for name, (_, ends) in self.roots.items()}}
 
     @property
@@ -102,11 +105,12 @@ class Witness:
     Attributes
     ----------
     multiplier : mapping of exponents to Fraction
-        Positive coefficients.
+        Polynomial with positive coefficients.
     squares : tuple of Square
-        Products of variables (their indices) and of sign conditions (indices after those of the variables).
+        Sums of squares, each times a product of variables (their indices) and of sign conditions (indices after
+        those of the variables).
     cofactors : tuple of Polynomial
-        One for every equality of the cell.
+        Cofactor of every equality h_k = 0 of the cell.
     conditions : int
         Number of sign conditions of the cell.
     """
@@ -127,8 +131,9 @@ class Equilibrium:
     Attributes
     ----------
     parameters : mapping of str to Fraction
+        Value of every uncertain parameter.
     point : mapping of str to Fraction
-        v_i with x_i = sign(v_i)|v_i|^{r_i}.
+        Coordinates v_i with x_i = sign(v_i)|v_i|^{r_i}.
     weights : mapping of str to Fraction
         Convex weight of every sign cell that touches the point.
     """
@@ -165,10 +170,22 @@ def loop_of(
 ) -> Loop:
     """Closed loop with exact numbers for the symbols of its model.
 
+    Parameters
+    ----------
+    law : str
+        Name of the law.
+    model : LoopField or FieldTerms
+        Vector field in symbols.
+    gains, constants : mapping of str to Fraction
+        Exact values by name.
+    uncertain : mapping of str to (Fraction, Fraction)
+        Range of every uncertain parameter.
+
+
     Raises
     ------
     CertificateError
-        When the format cannot express a part of the law, such as nested powers.
+        If the format cannot express a part of the law, such as a factor that is not a signed power.
     """
     terms = model if isinstance(model, FieldTerms) else model.terms
     values = {**gains, **(constants or {})}
@@ -194,7 +211,7 @@ def root_enclosure(number: Fraction) -> Range:
         When the number is negative.
     """
     if number < 0:
-        raise ParameterError(f"a root needs a number that is not negative. Received {number}.")
+        raise ParameterError(f"the argument of a square root must not be negative. Received {number}.")
     top, bottom = isqrt(number.numerator), isqrt(number.denominator)
     if Fraction(top, bottom) ** 2 == number:
         return Fraction(top, bottom), Fraction(top, bottom)

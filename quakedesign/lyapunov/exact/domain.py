@@ -44,29 +44,29 @@ _PIECES = 40
 class Domain:
     """Largest level set found on which the premises of a certificate are proved."""
 
-    level: float  # Of V for the base gains; 0 when there is none
+    level: float  # Level of V for the base gains; 0 if the set is empty
     # slip_error, slip_rate_error: Bounds on |e1| [m] and |e2| [m/s] on it; not every such pair lies in it
     slip_error: UpperBound
     slip_rate_error: UpperBound
-    # start_slip_error, start_slip_rate_error, start_perturbation: Initial |e1| [m], |e2| [m/s] or |e3| [m/s²] that it
-    # admits, each while the other two are zero. For x = 0 and ξ = 0 the initial e3 is h(0).
+    # start_slip_error, start_slip_rate_error, start_perturbation: Largest initial |e1| [m], |e2| [m/s] and |e3| [m/s²]
+    # in the level set, each with all other errors zero. For x = 0 and ξ = 0 the initial e3 is h(0).
     start_slip_error: LowerBound
     start_slip_rate_error: LowerBound
     start_perturbation: LowerBound
-    method: str  # ``"whole"`` or ``"split"``, which part of h is in e3
+    method: str  # ``"whole"`` or ``"split"`` (part of h in e3); empty for an empty set
     # Cause that limits the level set: the largest part of h' that grows with the errors; for an empty set, the largest
     # part at zero errors
     limited_by: str
     feedforward: str  # Name of the feed-forward of the law
 
     def to_dict(self) -> Json:
-        """Plain values, SI."""
+        """Plain numbers and texts, in SI units."""
         return {name: float(v) if isinstance(v, Fraction) else v for name, v in asdict(self).items()}
 
 
 @dataclass(frozen=True)
 class DomainProblem:
-    """Problem of the level sets of a certificate that are valid for a fault under a law."""
+    """Problem of finding the level sets of V on which a certificate applies to a fault under a control law."""
 
     fault: Fault
     controller: SlidingMode
@@ -80,11 +80,11 @@ class DomainProblem:
 
     @property
     def allowed(self) -> Fraction:
-        """L̄ for the scaled gains [unit of ν per s]."""
+        """Certified bound L̄ on |h'| for the scaled gains [m/s³]."""
         return certified_lipschitz(self.certificate) * self.controller.scale
 
     def along_reference(self) -> Fraction:
-        """Bound on |h'| with zero errors [unit of ν per s]."""
+        """Bound on |h'| for zero errors [m/s³]."""
         return self._rate(Errors())
 
     def whole(self, level: Fraction, pieces: int = _PIECES) -> Fraction:
@@ -98,8 +98,8 @@ class DomainProblem:
     def split(self, level: Fraction, errors: Errors | None = None) -> dict[str, Fraction] | None:
         """Shares of the decrease of V that the error-dependent part of h can cancel on {V ≤ level}, by error.
 
-        The certificate applies if their sum is below 1. None if they have no bound. The sensitivities of h are
-        evaluated for the errors of the level, or for given errors.
+        The certificate applies if the sum of the shares is below 1. The sensitivities of h are evaluated for the errors
+        of the level, or for given errors. None without `robustness`, or if |h'| along the reference may exceed L̄.
         """
         robustness = self.robustness
         if robustness is None or self.along_reference() > self.allowed:
@@ -121,20 +121,21 @@ class DomainProblem:
 
 
 def certified_lipschitz(certificate: Certificate) -> Fraction:
-    """L̄ of the base gains: the smaller end of the range of d = h'."""
+    """L̄ of the base gains [m/s³]: the largest L̄ with [−L̄, L̄] in the certified range of d = h'."""
     low, high = certificate.loop.uncertain["d"]
     return min(-low, high)
 
 
 def certified_domain(problem: DomainProblem) -> Domain:
-    """Largest level set on which one of the two methods is proved; rigorous, but only to steps of an eighth.
+    """Largest level set on which one of the two methods proves the premises.
 
-    It is empty if β leaves its certified range, or h' its bound at zero errors.
+    The result is rigorous; V^{1/m} is searched in steps of an eighth of each power of two. The set is empty if β leaves
+    its certified range, or h' exceeds L̄ at zero errors.
     """
     low_beta, high_beta = coefficient_range(problem.fault, problem.controller.divisor)
     certified = problem.certificate.loop.uncertain["beta"]
     if low_beta < certified[0] or high_beta > certified[1]:
-        return _domain(problem, Fraction(0), "", "the input gain β, which leaves its certified range")
+        return _domain(problem, Fraction(0), "", "the input gain β, whose range exceeds the certified one")
 
     def whole(step: int) -> bool:
         return problem.holds_whole(_level(step, problem.sets.degree))
@@ -152,7 +153,7 @@ def certified_domain(problem: DomainProblem) -> Domain:
 
 
 def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
-    """Largest step that holds by bisection, provided that the low one holds."""
+    """Largest step for which `holds` is true, by bisection; it must be true for `low`."""
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (middle, high) if holds(middle) else (low, middle)
@@ -160,7 +161,7 @@ def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
 
 
 def _largest_split(problem: DomainProblem) -> int | None:
-    """Largest step for which `split` is proved: from a guess with the sensitivities at zero errors, downwards."""
+    """Largest step for which `split` is proved, searched downwards from the step for sensitivities at zero errors."""
     degree = problem.sets.degree
 
     def holds(step: int, errors: Errors | None = None) -> bool:
@@ -178,7 +179,7 @@ def _largest_split(problem: DomainProblem) -> int | None:
 
 
 def _level(step: int, degree: Fraction) -> Fraction:
-    """((1 + (n mod 8)/8)·2^{n div 8})^m, m rounded to a whole number."""
+    """Level ((1 + (n mod 8)/8)·2^{n div 8})^m of V for the step n, with m rounded to an integer."""
     whole, part = divmod(step, 8)
     return ((1 + Fraction(part, 8)) * Fraction(2) ** whole) ** round(degree)
 

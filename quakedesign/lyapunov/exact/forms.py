@@ -1,4 +1,4 @@
-"""Rigorous bounds on ratios of forms over the orthant, by bisection of the simplex (Bernstein coefficients).
+"""Rigorous bounds on products of powers of forms over the simplex, by bisection (Bernstein coefficients).
 
 A form of degree m on the simplex spanned by s_1 … s_n lies between its smallest and its largest Bernstein coefficient,
 and equals the corner coefficients at the corners (Farin, *Curves and Surfaces for CAGD*, ch. 17). Bisection of an edge
@@ -156,7 +156,7 @@ def largest_ratio(
     Returns
     -------
     Fraction or None
-        None when a form with a negative exponent was not proved to be positive.
+        None if a form with a negative exponent was not proved positive.
     """
     return _largest(tuple((tuple(forms), tuple(exponents)) for forms, exponents in problems), tolerance, pieces)
 

@@ -29,9 +29,9 @@ def full_field(loop: Loop) -> dict[sp.Symbol, sp.Expr]:
 
 
 def error_units(loop: Loop, model: LoopField | None = None) -> dict[str, Range]:
-    """Enclosure of the error that equals one unit of each state; 1 unless the law specifies it.
+    """Enclosure, for each state, of the error that equals one unit of this state; 1 unless the law defines a unit.
 
-    The units are those of a model, or of the law of the package that the loop names.
+    The units are those of `model`; by default, those of the package's law with the name of the loop's law.
     """
     if model is None and loop.law in laws():
         model = laws()[loop.law].loop_field()

@@ -60,12 +60,12 @@ class Obligations:
     def derivative(self) -> tuple[Term, ...]:
         """Terms of V̇; raises unless V is C¹ and V̇ affine in all parameters with ranges."""
         kinks = [t for t in self.lyapunov for _, a, kind in t.factors if a < 1 or (kind == "a" and a == 1)]
-        require(not kinks, "V is not continuously differentiable term by term.")
+        require(not kinks, "a term of V is not continuously differentiable.")
         rates = (rate for t in self.lyapunov for rate in lie_terms(t, self.loop.field))
         terms = collected(rates, (*self.loop.states, *self.loop.lifts))
         ranges = self.loop.ranges
         twice = {p for t in terms for p in t.parameters if p in ranges and t.parameters.count(p) > 1}
-        require(not twice, f"V̇ is not affine in {', '.join(sorted(twice))}: the ends of its range are not sufficient.")
+        require(not twice, f"V̇ is not affine in {', '.join(sorted(twice))}, so the ends of a range do not suffice.")
         return terms
 
     def sign_cells(self) -> Iterator[Cell]:
@@ -86,7 +86,7 @@ class Obligations:
 
     @cached_property
     def with_variable(self) -> tuple[str, ...]:
-        """Lifts that occur with a positive exponent, in order; raises if a lift does not occur."""
+        """Lifts that need a cell variable, as they occur with a positive exponent; raises if a lift does not occur."""
         everything = [t for terms in (*self.loop.field.values(), *self.loop.lifts.values()) for t in terms]
         exponents: dict[str, list[Fraction]] = {lift: [] for lift in self.loop.lifts}
         for term in everything:
@@ -110,7 +110,7 @@ class Obligations:
         return degrees
 
     def _require_null_zeros(self, arguments: Mapping[str, Polynomial]) -> None:
-        """Reject a lift whose argument could vanish on more than a null set, on one cell.
+        """Reject a lift whose argument on a cell could vanish on a set of positive measure.
 
         Collect the argument by powers of the states on which no lift inside it depends: one of the coefficients must
         contain no lift, and so is a nonzero polynomial in the other states. Otherwise the variable of the lift could be
@@ -131,7 +131,7 @@ class Obligations:
             depends[lift] = inside | own
 
     def _cell(self, signs: Mapping[str, int]) -> Cell | None:
-        """Cell with its conditions; None if a condition excludes an interior."""
+        """Cell with its conditions; None if a condition implies that the interior is empty."""
         weights = {**self.loop.states, **self.lift_degrees}
         equalities, inequalities = [], []
         whole = {lift: self._argument(lift, weights, signs) for lift in self.loop.lifts}
@@ -241,12 +241,12 @@ class Obligations:
 
 
 def _require_different(inequalities: Sequence[Polynomial], lifts: Sequence[str]) -> None:
-    """Reject sign conditions that are proportional to each other or to a variable: engines accept no duplicates."""
+    """Reject sign conditions proportional to each other or to a variable, as the solvers accept no duplicates."""
     largest = [max(map(abs, p.values())) for p in inequalities]
     scaled = {tuple(sorted((e, c / m) for e, c in p.items())) for p, m in zip(inequalities, largest, strict=True)}
     require(
         len(scaled) == len(inequalities) and not any(len(p) == 1 and sum(p[0][0]) == 1 for p in scaled),
-        f"the signs {', '.join(lifts)} are equal, or equal to that of a state. Use one lift, or ⌈x⌋⁰.",
+        f"the signs of {', '.join(lifts)} coincide, or one is that of a state. Use one lift, or ⌈x⌋⁰ of the state x.",
     )
 
 
@@ -260,7 +260,7 @@ def _word(signs: Mapping[str, int]) -> str:
 
 
 def different(obligations: Iterable[Obligation]) -> Iterator[Obligation]:
-    """First obligation of every key, so that each needs its own witness."""
+    """Obligations without duplicates: the first one of every key."""
     seen = set[tuple[object, ...]]()
     for one in obligations:
         key = one.key
@@ -294,7 +294,7 @@ def claimed(loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fractio
     states = len(loop.states)
     function = list(obligations.function())
     m = obligation_degree([p for _, p in function], "V")
-    require(loop.domain == "cells" or m % 2 == 0, "V has odd degree on the reals.")
+    require(loop.domain == "cells" or m % 2 == 0, "the degree of V on the reals must be even.")
     for name, polynomial in function:
         yield Obligation(name, less(polynomial, claims["positive"], power_sum(states, m, states)))
     for i, state in enumerate(loop.states):
@@ -304,7 +304,7 @@ def claimed(loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fractio
     second = "decrease" if loop.domain == "cells" else "rate"
     decrease = list(obligations.decrease(second))
     n = obligation_degree([o.polynomial for _, o in decrease], "V̇")
-    require(second == "decrease" or m == n, "a rate needs V and V̇ of the same degree.")
+    require(second == "decrease" or m == n, "the claim 'rate' requires V and V̇ of the same degree.")
     doubled = {e: 2 * c for e, c in function[0][1].items()}
     margin = power_sum(states, n, obligations.variables) if second == "decrease" else doubled
     for _, one in decrease:
@@ -316,7 +316,7 @@ def claimed(loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fractio
 
 
 def with_decay(obligations: Obligations, cell: Cell, one: Obligation, rate: Fraction, m: int, n: int) -> Obligation:
-    """−V̇ − κv^n with v^m = V, from −V̇ on a cell."""
+    """Obligation −V̇ − κv^n ≥ 0 with v^m = V on a cell, from that of −V̇; κ is `rate`."""
     states, width = len(obligations.loop.states), len(next(iter(one.polynomial))) + 1
     potential = {(*e, *(0,) * (width - states)): c for e, c in obligations.potential(cell.signs).items()}
     last = {(*(0,) * (width - 1), m): Fraction(1)}
@@ -384,7 +384,7 @@ def proves(one: Obligation, witness: Witness, domain: str) -> bool:
     """Whether a witness proves an obligation, in exact arithmetic; False for a malformed witness.
 
     The multiplier has positive coefficients, so it is positive where all variables are positive, which suffices
-    (FORMAT.md). On the reals, and for P = 0, it must be one, so that every number of a file has an effect.
+    (FORMAT.md). On the reals, and for P = 0, the multiplier must be 1, so that every number of a file matters.
     """
     factor = witness.multiplier
     if not factor or any(c <= 0 for c in factor.values()):

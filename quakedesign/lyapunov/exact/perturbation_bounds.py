@@ -70,7 +70,7 @@ def coefficient_range(fault: Fault, divisor: Fraction) -> Range:
 
 @lru_cache(maxsize=16)
 def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> sp.Expr:
-    """h' along a solution [unit of ν per s], in symbols with bounds from `parameter_ranges` and the errors."""
+    """Rate h' [m/s³] along a solution, in symbols whose ranges are those of `parameter_ranges` and of the errors."""
     bending, flat = plant.matched_rate_in_parts()
     moved = (plant.r3, plant.r2, plant.r1, plant.phi_t, plant.acceleration_error, plant.e2)
     x1, x2, push = sp.symbols("x1 x2 push", real=True)
@@ -82,7 +82,7 @@ def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -
 
 @lru_cache(maxsize=16)
 def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> tuple[sp.Expr, sp.Expr]:
-    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time; slopes of chords where friction has no derivative.
+    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time; chord slopes where friction has no derivative.
 
     They bound the error-dependent part of h: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest
     absolute values g1, g2 between 0 and e.
@@ -107,7 +107,7 @@ def _with_values(expression: sp.Expr, fault: Fault, divisor: Fraction) -> sp.Exp
 
 @lru_cache(maxsize=16)
 def _reference_values(fault: Fault) -> dict[sp.Symbol, sp.Expr]:
-    """r and its three derivatives [m, m/s, …] as polynomials of the stage t/t_op."""
+    """r and its three derivatives [m, m/s, …] as polynomials of the normalised time t/t_op."""
     t_op = sp.Rational(str(rational(fault.reference.operation_time)))
     r = fault.reference.slip(stage * t_op)
     names = (plant.r0, plant.r1, plant.r2, plant.r3)
@@ -141,7 +141,7 @@ def largest_matched_rate(
     feedforward: FeedForward = NONE,
     limit: Fraction | None = None,
 ) -> Fraction:
-    """Rigorous bound on |h'| [unit of ν per s] over the uncertainty box, the reference and the disturbance class.
+    """Rigorous bound on |h'| [m/s³] over the uncertainty box, the reference and the disturbance class.
 
     Friction may be any function within its bounds and slope bounds, and weakens with slip if its law does. The
     disturbance may be any function within the fault's bounds on value and rate of change.
@@ -151,13 +151,13 @@ def largest_matched_rate(
     divisor : Fraction
         Divisor μ0N̂0 [m²/kg] of the control law p = ν/(μ0N̂0).
     errors : Errors
-        Ranges of e1 [m], e2 [m/s], e2' [m/s²].
+        Bounds on |e1| [m], |e2| [m/s] and |e2'| [m/s²].
     pieces : int
         Largest number of subdivisions; fewer yield a larger bound.
     feedforward : FeedForward
         Term that the law adds to ν, and thus to h.
     limit : Fraction, optional
-        As in `upper_bound`, if only the comparison of the bound with this limit is needed [unit of ν per s].
+        Limit [m/s³] as in `upper_bound`, if only the comparison of the bound with this limit is needed.
     """
     expression = rate_expression(fault, divisor, feedforward)
     return upper_bound(expression, parameter_ranges(fault) | errors.ranges(), pieces=pieces, limit=limit)
@@ -174,7 +174,7 @@ def largest_sensitivities(
 
 
 def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
-    """Bound on |h| at t = 0, x = 0: disturbance over β, with static friction and without feed-forward."""
+    """Bound on |h| [m/s²] at t = 0, x = 0: disturbance divided by β, with static friction, without feed-forward."""
     static, least = static_friction(fault), plant_ranges(fault)[plant.N_hat][0]
     return fault.disturbance_bounds[0] * divisor / (static * least)
 
@@ -185,7 +185,7 @@ def initial_perturbation(fault: Fault, divisor: Fraction) -> Fraction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sectors:
-    """Ranges of the chords of all state-dependent terms, about the equilibrium of any constant reference.
+    """Ranges of the chord slopes of all state-dependent terms, about the equilibrium of any constant reference.
 
     x2' = s·x1 − w·x2 + β·b·p, where s, w and β take any values in their ranges at every time.
     """
@@ -196,8 +196,8 @@ class Sectors:
     # disturbance
     slip: Range
     rate: Range  # Range of w [1/s]: damping, friction's slope in slip rate (ERRATA 10), growth of the disturbance
-    # g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| (ERRATA 6, 7), h [Pa] the share of the chords beyond nominal
-    # spring and dashpot, divided by b
+    # g1 [Pa/m] and g2 [Pa·s/m] with |h| ≤ g1|x1| + g2|x2| (ERRATA 6, 7), where h [Pa] is the state-dependent force per
+    # mass beyond that of the nominal spring and dashpot, divided by b
     row_bounds: Range
     # max |σ' − p*| [Pa] over the constant references up to the target slip (ERRATA 8)
     largest_effective_stress: Fraction
@@ -246,7 +246,7 @@ def rest_pressure(
     nominal : bool
         Use the friction law and parameters of the fault, instead of any friction and parameters in the box.
     drift : Fraction
-        Largest k̂v∞t [m/s²].
+        Largest drift term k̂v∞t of the loading [m/s²].
     pieces : int
         Number of subdivisions of the range.
 
@@ -265,7 +265,7 @@ def rest_pressure(
         at_rest = max(friction.least, start - most), min(friction.most, start + most)
         pressures = enclose(expression, box | {_r: part, _mu: at_rest})
         if not pressures.is_finite():
-            raise ParameterError("no finite pressure at rest was found. Positive friction is expected. Narrow the box.")
+            raise ParameterError("the pressure at rest has no finite enclosure: friction may vanish. Narrow the box.")
         ends += [end_of(pressures.lower()), end_of(pressures.upper())]
     return min(ends), max(ends)
 

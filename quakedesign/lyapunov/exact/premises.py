@@ -2,7 +2,7 @@
 
 Chapters: premise as a value; premises of sliding modes, in ball arithmetic; sector premises of linear
 feedback (ERRATA 6 to 12); recognition of the plant of a loop, independently of the names of its states;
-check whether constants and ranges of a certificate cover those of a fault.
+check that the constants and ranges of a certificate cover those of a fault.
 """
 
 import math
@@ -87,7 +87,7 @@ class Premise:
         return f"{self.required:.4g}{unit}", "at least as large"
 
     def to_dict(self) -> Json:
-        """Keys of ``--json`` and the unit; None for what is infinite."""
+        """Dictionary with the keys of ``--json`` and the unit; infinite values are None."""
         return {
             "name": self.name,
             "required": _finite(self.required),
@@ -101,7 +101,7 @@ class Premise:
 
 
 def _bound(kind: type[UpperBound] | type[LowerBound], value: Fraction | float) -> Fraction | float:
-    """Bound on a number; a number that is not finite, as from a divergent run, is returned unchanged."""
+    """Rigorous bound on a number; a number that is not finite, as after divergence, is returned unchanged."""
     return value if isinstance(value, float) and not math.isfinite(value) else kind(value)
 
 
@@ -153,15 +153,16 @@ class Variant:
 def sliding_mode_premises(
     fault: Fault, controller: SlidingMode, certificate: Certificate | None
 ) -> tuple[list[Premise], Domain | None]:
-    """Premises that are decided without a simulation, and the certified domain.
+    """Premises of a sliding mode that are decided without simulation, and the certified domain.
 
-    `along_reference` assumes zero errors. `level_set` is about the level set of V that contains the initial state x =
-    0, ξ = 0 for every disturbance of the class. It uses the better of the methods *whole* and *split* of `domain`.
+    The premise `along_reference` assumes zero errors. The premise `level_set` bounds h' on the level set of V that
+    contains the initial state x = 0, ξ = 0 for every disturbance of the class, by the method *whole* or *split* of
+    `domain`, whichever has the smaller ratio.
 
     Raises
     ------
     CertificateError
-        When the certificate is about other gains.
+        If the certificate belongs to other gains.
     """
     (only,) = _variants(fault, controller, certificate, [controller.feedforward])
     return list(only.premises), only.domain
@@ -173,7 +174,7 @@ def feedforward_variants(fault: Fault, controller: SlidingMode, certificate: Cer
     Raises
     ------
     CertificateError
-        When the certificate is about other gains.
+        If the certificate belongs to other gains.
     """
     laws = [feed_forward(name, fault, controller.divisor) for name in FEED_FORWARDS]
     return _variants(fault, controller, certificate, dict.fromkeys([controller.feedforward, *laws]))
@@ -219,7 +220,7 @@ def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Pr
         required=worst * certified[1],
         certified=certified[1],
         unit="-",
-        note=f"β from {Enclosure.of(low, high):.6g}; certified from {UpperBound(certified[0]):.6g}",
+        note=f"β in {Enclosure.of(low, high):.6g}; certified for β >= {UpperBound(certified[0]):.6g}",
     )
 
 
@@ -250,7 +251,7 @@ def _level_set(problem: DomainProblem) -> Premise:
     fault, law = problem.fault, problem.controller
     level = problem.sets.level(initial_perturbation(fault, law.divisor))
     errors = problem.sets.errors(level)
-    start = f"rigorous on the level set of V that contains the start: |e1| <= {UpperBound(errors.slip):.2g} m, "
+    start = f"rigorous on the level set of V that contains the initial state: |e1| <= {UpperBound(errors.slip):.2g} m, "
     start += f"|e2| <= {UpperBound(errors.rate):.2g} m/s"
     parts, rate = problem.split(level), problem.whole(level)
     share = sum(parts.values(), Fraction(0)) if parts else None
@@ -286,7 +287,7 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
     Raises
     ------
     CertificateError
-        When the certificate is about other gains.
+        If the certificate belongs to other gains.
     """
     needed = sectors(fault)
     proved = certificate is not None
@@ -322,14 +323,14 @@ def linear_premises(fault: Fault, controller: Controller, certificate: Certifica
             required=peak_rate,
             certified=0.0,
             unit="m/s",
-            note="certified for constant references; for a moving reference, see the bounds of the errors (--peaks)",
+            note="certified for constant references; for a moving reference, see the error bounds (--peaks)",
         ),
         Premise(
             name="vanishing_disturbance",
             required=float_above(fault.disturbance_bounds[0]),
             certified=0.0,
             unit="m/s^2",
-            note="certified for vanishing disturbances; for others, see the bounds of the errors (--peaks)",
+            note="certified for disturbances vanishing in equilibrium; for others, see the error bounds (--peaks)",
         ),
         *_limits_premise(fault, controller),
     ]
@@ -348,7 +349,7 @@ def _limits_premise(fault: Fault, controller: Controller) -> list[Premise]:
             required=abs(worst[0]),
             certified=abs(worst[1]),
             unit="Pa",
-            note="must lie inside the limits of the law; the proof is for deviations within these limits",
+            note="the equilibrium pressure must be within the limits of the law; the proof assumes no saturation",
         )
     ]
 
@@ -372,8 +373,8 @@ def require_degree_of_slip(loop: Loop) -> None:
     degree = relative_degree(loop.symbols[first], sympy_field(loop), control)
     if degree != slip_degree():
         raise CertificateError(
-            f"{loop.law} acts on derivative {degree} of its first state, the pressure on derivative {slip_degree()} of "
-            "the slip: the plant of the certificate is not a fault"
+            f"the plant of the certificate is not a fault: the first state of {loop.law} has relative degree {degree}, "
+            f"the slip has relative degree {slip_degree()} with respect to pressure"
         )
 
 
@@ -382,22 +383,29 @@ def require_degree_of_slip(loop: Loop) -> None:
 
 
 def covers(certificate: Certificate, fault: Fault) -> list[str]:
-    """Reject a certificate that does not cover a fault with designed gains, whose divisor is μ_res·N̂_min.
+    """Check that the constants and ranges of a certificate cover those of a fault, and report the coverage.
 
-    The certificate of a sliding mode is about its unscaled (base) gains; the returned lines state the least scale λ of
-    the gains on this fault.
+    The divisor of the control law is μ_res·N̂_min, that of designed gains.
+
+    The certificate of a sliding mode is for the base gains (λ = 1); the returned lines state the least gain scale λ for
+    this fault.
 
     Returns
     -------
     list of str
-        Lines about the coverage.
+        Lines of text about the coverage.
+
+    Raises
+    ------
+    CertificateError
+        If the certificate does not cover the fault, or its plant is not a fault.
     """
     require_degree_of_slip(certificate.loop)
     loop, lines = certificate.loop, [f'covers {certificate.loop.law} on "{fault.name}", box {fault.box.name}']
     if loop.domain == "reals":
         needed = sectors(fault)
         if loop.constants != {"b": needed.authority}:
-            raise CertificateError(f"the control authority of the certificate is not that of {fault.name}")
+            raise CertificateError(f"the control authority of the certificate differs from that of {fault.name}")
         ranges = needed.ranges()
     else:
         divisor = least_authority(fault)

@@ -1,4 +1,4 @@
-"""Robustness of a proved decrease, and level sets of V in metres and seconds.
+"""Robustness of a proved decrease of V to perturbations of the acceleration, and level sets of V in SI units.
 
 The robustness constants depend only on the certificate. They bound the perturbations |w| ≤ g1|e1| + g2|e2|
 of the acceleration for which V' stays negative, for every fault and every gain scale λ.
@@ -38,7 +38,7 @@ _INPUT = 1
 class Robustness:
     """Constants that bound the perturbations of the acceleration for which V' stays negative."""
 
-    # slip, rate: Upper bounds on a1 [inverse of 1/s² of the scaled loop] and a2; see the comment above
+    # slip, rate: Upper bounds on a1 [s²] and a2 [s], for a V without unit; see the comment above
     slip: Fraction
     rate: Fraction
     # slip_power, rate_power: p1 and p2 [-]
@@ -48,7 +48,7 @@ class Robustness:
 
 
 class _Cells:
-    """Forms of a certificate on the sign cells, in coordinates in which {V ≤ 1} is about the unit box."""
+    """Forms of a certificate on the sign cells, in coordinates in which {V ≤ 1} is approximately the unit box."""
 
     def __init__(self, certificate: Certificate, model: LoopField | None = None) -> None:
         self.model = model
@@ -71,7 +71,7 @@ class _Cells:
 
     def decreases(self, signs: dict[str, int]) -> Iterator[tuple[dict[str, Fraction], Form]]:
         """Uncertain values at every vertex, and −V' there on a cell."""
-        require(not self.loop.lifts, "V' is no polynomial in the states where powers are nested.")
+        require(not self.loop.lifts, "V' is not polynomial in the states, as the field has nested powers.")
         for _, values in self.obligations.vertices():
             parameters = {**self.loop.parameters, **values}
             rate = cell_polynomial(self.obligations.derivative, self.loop.states, signs, parameters)
@@ -89,7 +89,7 @@ class _Cells:
         return to_terms(derivative, [symbols[s] for s in self.loop.states])
 
     def disturbance_term(self, slope: tuple[Term, ...], index: int, signs: dict[str, int], beta: Fraction) -> Form:
-        """Bound of β·∂V/∂e2·|e_i| on a cell, with enclosures of the units of the states that belong to e_i and e2."""
+        """Bound on β·∂V/∂e2·|e_i| on a cell, with the enclosures of the units of e_i and e2."""
         weight = self.weights[index]
         bare = cell_polynomial(slope, self.loop.states, signs, {})
         units = list(error_units(self.loop, self.model).values())
@@ -106,10 +106,13 @@ def _size(gamma: Fraction | None, m: int) -> Fraction:
 def robustness(certificate: Certificate, model: LoopField | None = None) -> Robustness | None:
     """Robustness constants of V', for all uncertain values of the certificate.
 
-    On polynomial cells the quotients contain V' itself; elsewhere −κV^{(m+d)/m} with the claimed κ.
+    Where V' is polynomial on the cells, the quotients contain V' itself; otherwise its bound −κV^{(m+d)/m} with the
+    claimed κ.
 
     Parameters
     ----------
+    certificate : Certificate
+        Certificate that was already checked.
     model : LoopField, optional
         Loop of the law, see `LevelSets`.
 
@@ -217,7 +220,7 @@ class LevelSets:
         )
 
     def starts(self, level: Fraction) -> tuple[Fraction, ...]:
-        """Largest |e_i|, rounded down, for which {V ≤ level} contains the state whose other errors are zero."""
+        """Largest |e_i| [SI units], rounded down, such that {V ≤ level} contains the state with zero other errors."""
         loop = self.certificate.loop
         function, sizes = from_terms(self.certificate.lyapunov, loop.symbols), []
         for state, weight in loop.states.items():

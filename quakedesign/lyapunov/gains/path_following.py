@@ -1,9 +1,9 @@
 """Joint improvement of gains and Lyapunov function by path-following.
 
 Bilinear inequalities are linearised about the current gains and V (Hassibi, How and Boyd, American
-Control Conference 1999). Chapters: linearised programme, decay rate as a convex programme, scaling
-exponents of the gains, state and objective of the search, trust region. All numbers are floating point,
-without proof.
+Control Conference 1999). The module contains the linearised programme, the decay rate as a convex programme,
+the scaling exponents of the gains, state and objective of the search, and the trust region. All results are
+in floating point, without proof.
 """
 
 import math
@@ -67,13 +67,13 @@ class RequiredRate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Neighbourhood:
-    """Demands on the coefficients a_j of V and on shares of given changes of the gains."""
+    """Constraints on the coefficients a_j of V and on the fractions x_k of given changes of the gains."""
 
     # monomials, sizes: V = Σ a_j·monomial_j/size_j
     monomials: tuple[Term, ...]
     sizes: tuple[Fraction, ...]
     program: JointProgram  # For the demands
-    demands: tuple[Demand, ...]  # Parts of the a_j, then of the changes with the current V
+    demands: tuple[Demand, ...]  # Constraints, with one part per a_j, then one per change, for the current V
     fixed: tuple[Form, ...]  # Constant parts
 
     def function(self, decision: Sequence[float]) -> tuple[Term, ...]:
@@ -90,14 +90,18 @@ def neighbourhood(
     lyapunov: tuple[Term, ...] = (),
     changed: Sequence[Loop] = (),
 ) -> Neighbourhood:
-    """Demands V > 0 and V̇ < 0 (or the required rate of decrease) near one set of gains.
+    """Constraints V > 0 and V̇ < 0 (or the required rate of decrease), linearised about one set of gains.
 
     Parameters
     ----------
+    loop : Loop
+        Loop with the current gains.
     degree : int
         Degree of V.
     scale : tuple of Fraction
         Scale of the variables.
+    required : RequiredRate, optional
+        Required rate of decrease.
     lyapunov : tuple of Term
         Current V, with which the changes of the gains are linearised.
     changed : sequence of Loop
@@ -276,7 +280,7 @@ def _at(exponents: Sequence[int], sizes: Sequence[float]) -> float:
 
 
 def rounded(lyapunov: Sequence[Term], bits: int, divisor: float = 1.0) -> tuple[Term, ...]:
-    """V divided by a number, with coefficients rounded to a number of binary digits."""
+    """V divided by `divisor`, with coefficients rounded to `bits` significant binary digits."""
     terms = []
     for term in lyapunov:
         value = float(term.coefficient) / divisor
@@ -303,7 +307,7 @@ def required_rate(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: i
 
 
 def least_margins(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> tuple[float, float]:
-    """Largest t found with V ≥ tΣu_i^m, and largest t found with −V̇ ≥ tΣu_i^n, both by the conic solver."""
+    """Largest t with V ≥ tΣu_i^m, and largest t with −V̇ ≥ tΣu_i^n, as computed by the conic solver without proof."""
     obligations = Obligations(loop, lyapunov)
     function = [Obligation(name, p) for name, p in obligations.function()]
     decrease = [one for _, one in obligations.decrease("")]
@@ -329,7 +333,7 @@ def _margin(one: Obligation, loop: Loop, scale: Sequence[Fraction]) -> float:
 
 
 def fastest(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
-    """Smallest −V̇/V^{n/m} over sampled points, which estimates κ from above."""
+    """Smallest −V̇/V^{n/m} over sampled points, an upper estimate of the largest κ."""
     obligations = Obligations(loop, lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")
     least = [np.inf]
@@ -426,7 +430,7 @@ def scaling_exponents(loop: Loop, sizes: Mapping[str, int]) -> dict[str, Fractio
     if not solution or not all(v.is_Rational for v in solution):
         raise ParameterError(
             f"the terms of {loop.law} must determine how its gains scale. Received {solution or 'a contradiction'}. "
-            "Omit gains without effect on the loop."
+            "Remove gains that have no effect on the loop."
         )
     exponents = {name: fraction_of(v) for name, v in zip(unknown, solution, strict=True)}
     return {name: exponents[name] for name in (*loop.gains, *loop.states)}
@@ -447,7 +451,7 @@ _ROOM = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathSetting:
-    """Constants of a search."""
+    """Settings of a search, which stay constant during it."""
 
     objective: "Objective"
     exponents: Mapping[str, Fraction]  # Exponents of gains and states, see `scaling_exponents`
@@ -466,6 +470,10 @@ class State:
         Closed loop with the ranges that the level requires.
     level : float
         Level of the objective.
+    lyapunov : tuple of Term
+        V.
+    margin : float
+        Margin of V in the scaled programme.
     """
 
     loop: Loop
@@ -480,10 +488,10 @@ class Objective(ABC):
 
     name: ClassVar[str]
     unit: ClassVar[str]
-    meaning: ClassVar[str]
-    larger: ClassVar[bool] = True
-    bounded: ClassVar[bool] = True
-    has_rate: ClassVar[bool] = False
+    meaning: ClassVar[str]  # The objective in words
+    larger: ClassVar[bool] = True  # Whether a larger level is better
+    bounded: ClassVar[bool] = True  # Whether the norm of the gains is bounded
+    has_rate: ClassVar[bool] = False  # Whether a level requires a rate of decrease
 
     bound: float | None = None  # Largest ‖k_i/L̄^{p_i}‖₂ allowed
 
@@ -515,7 +523,7 @@ class Objective(ABC):
         return {name: k * factor for name, k in gains.items()}
 
     def reached(self, level: float, loop: Loop, exponents: Mapping[str, Fraction]) -> float:
-        """Level of the gains that result from a step towards a level."""
+        """Level attained by the gains of `loop` after a step with the target `level`."""
         return level
 
     @abstractmethod
@@ -527,7 +535,7 @@ class Objective(ABC):
         return find_certificate(state.loop, setting.degree, subject=subject)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate of given gains without a climb, or None; with a rate, the better one of this and of a climb."""
+        """Certificate for fixed gains without a climb, or None; for an objective with a rate, a climb is tried, too."""
         return None
 
     @abstractmethod
@@ -547,12 +555,12 @@ _ROUNDS = 100  # largest number of steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrustRegion:
-    """Step sizes for which the linearisation is trusted; a step is the share by which the level improves."""
+    """Step sizes for which the linearisation is trusted; a step size is the relative improvement of the level."""
 
-    # First share. The omitted terms are of second order, about (`gains` times the share)²: 0.3 of the linear terms
+    # First share. The omitted terms are of second order, about (`gains`·share)², which is 0.3 of the linear terms here
     initial: float = 0.1
     largest: float = 0.35  # Share at which the omitted terms are as large as the linear terms
-    # Share below which the search centres instead: ten units of the fourth digit, to which gains are rounded
+    # Share below which a centring step is made: ten units of the fourth digit, to which gains are rounded
     least: float = 1e-3
     # grow, shrink: Factor of the share after a successful step, and its divisor after a failed one; increases are slow
     # and decreases fast, since a failed programme takes as long as a successful one
@@ -560,7 +568,7 @@ class TrustRegion:
     shrink: float = 3.0
     # Largest relative change of a gain per share, as several gains must change more than the level
     gains: float = 3.0
-    again: float = 0.03  # Share after centring, below the initial share, which failed
+    again: float = 0.03  # Share after centring; smaller than `initial`, since larger shares have failed
     # Improvement of the level since the last centring that justifies another one: three least shares
     worthwhile: float = 3e-3
     # Factor by which centring must increase the margin; otherwise no step is possible and the search ends
@@ -593,10 +601,14 @@ def _digits(number: float) -> Fraction:
 
 
 def climb(setting: PathSetting, state: State, *, free: bool = True, until: float | None = None) -> list[State]:
-    """States of increasing quality, beginning with the given one.
+    """States of improving level, beginning with the given one.
 
     Parameters
     ----------
+    setting : PathSetting
+        Settings of the search.
+    state : State
+        Initial state.
     free : bool
         Whether the gains may change.
     until : float, optional
@@ -632,7 +644,7 @@ def _level(setting: PathSetting, state: State, share: float) -> State | None:
 
 
 def _step(setting: PathSetting, state: State, share: float) -> State | None:
-    """State improved by a share; for a zero share, a state of similar level with the largest margin."""
+    """State with a level better by a relative share; for share 0, the state of largest margin at a similar level."""
     objective = setting.objective
     level = objective.improved(state.level, share)
     loop = objective.at(state.loop, level)

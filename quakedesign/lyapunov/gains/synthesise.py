@@ -40,12 +40,12 @@ from quakedesign.lyapunov.gains.path_following import (
 )
 from quakedesign.lyapunov.search.certify import Number, closed_loop, largest_gain_range
 from quakedesign.lyapunov.search.lyapunov_search import (
-    GIVE_AWAY,
+    MARGIN_SHARE,
     balance,
     below,
     bounds_of,
     candidate_degrees,
-    finish,
+    certificate_of,
     with_largest_decay,
 )
 from quakedesign.lyapunov.search.settling_time import fastest_settling
@@ -104,7 +104,7 @@ class LargestDecay(Objective):
         return level
 
     def start(self, setting: PathSetting, loop: Loop) -> State | None:
-        """State at half the estimated speed of a V that was computed without a rate, or a smaller speed."""
+        """State at half the settling speed estimated for a V without a rate condition, or at a smaller speed."""
         first = state_at(replace(setting, objective=SmallestNorm()), loop, scaled_norm(loop, setting.exponents))
         if first is None:
             return None
@@ -124,18 +124,18 @@ class LargestDecay(Objective):
         scale = balance(state.loop)
         for bits in _BITS:
             function = rounded(state.lyapunov, bits)
-            positive, decrease = (GIVE_AWAY * below(t) for t in least_margins(state.loop, function, scale))
+            positive, decrease = (MARGIN_SHARE * below(t) for t in least_margins(state.loop, function, scale))
             if not (positive > 0 and decrease > 0):
                 continue
             claims = {"positive": positive, "decrease": decrease, **bounds_of(state.loop, function, scale)}
-            plain = finish(state.loop, function, claims, subject)
+            plain = certificate_of(state.loop, function, claims, subject)
             certificate = plain and with_largest_decay(plain, scale, subject)
             if certificate:
                 return certificate
         return None
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate with the V of the largest margins, which is better if the linear forms w ≈ V^{1/m} fit poorly."""
+        """Certificate with the V of largest margins, which may be better where the forms w ≈ V^{1/m} fit poorly."""
         bound, beta = loop.uncertain["d"][1], loop.uncertain.get("beta", (Fraction(1), Fraction(1)))
         gains = tuple(loop.gains.values())
         settling = fastest_settling(subject, gains, lipschitz=bound, gain_range=beta, start=bound, degrees=degrees)
@@ -195,13 +195,14 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
     Raises
     ------
     UnknownNameError
+        If the objective is unknown.
     ParameterError
-        When the bound is missing or not positive, or the loop lacks the uncertain parameter of the objective.
+        If the bound is missing or not positive, or the loop lacks the uncertain parameter of the objective.
     """
     require_known(name, _OBJECTIVES, "objective", UnknownNameError)
     chosen = _OBJECTIVES[name]
     if chosen.bounded and not (bound is not None and bound > 0):
-        raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}. Give bound.")
+        raise ParameterError(f"the objective {name} needs a positive bound on the norm. Received {bound}.")
     make = partial(chosen, bound=bound if chosen.bounded else None)
     if chosen is not LargestRange:
         return make()
@@ -223,7 +224,7 @@ _HIGHEST = 12  # for higher degrees, one programme takes minutes
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SynthesisProblem:
-    """Problem of a synthesis with checked arguments."""
+    """Synthesis problem with checked arguments."""
 
     subject: Subject
     loop: Loop  # Loop with all gains 1
@@ -291,7 +292,7 @@ def _scaled(
     return short(loop, moved)
 
 
-def begin_with(problem: SynthesisProblem, seed: int) -> Iterator[Loop]:
+def initial_loops(problem: SynthesisProblem, seed: int) -> Iterator[Loop]:
     """Loops with gains from the literature, nearest to the norm bound first, then with random gains near them.
 
     Without gains in the literature, random gains of any size.
@@ -345,8 +346,8 @@ class Synthesis:
     unit: str
     gains: Mapping[str, Fraction]
     certificate: Certificate  # Checked in exact arithmetic
-    # Value of the objective that the certificate proves, rounded down if larger is better; for the objective
-    # ``sampled`` of the command the measured value
+    # Value of the objective that the certificate proves, rounded down if larger is better. The objective ``sampled`` of
+    # the command line has no proved value; for it, this is the measured value
     value: float
     norm: float  # ‖k_i/L̄^{p_i}‖₂ of the gains
     # Gains from the literature, if any are known for the law
@@ -368,9 +369,9 @@ def synthesise(
     executor: Executor | None = None,
     compare: bool = True,
 ) -> Synthesis | None:
-    """Find gains with a proof that optimise one objective.
+    """Find gains that optimise an objective, together with a proof of stability.
 
-    Several climbs start with a V of the lowest degree; the best climb continues with higher degrees.
+    Several local searches (climbs) begin with a V of the lowest degree; the best one continues with higher degrees.
 
     Parameters
     ----------
@@ -378,27 +379,30 @@ def synthesise(
         As for `certify`.
     objective : str
         ``"norm"``: smallest norm of the gains. ``"decay"``: fastest certified decay. ``"beta"``: widest certified range
-        of β around the middle of `gain_range`. See `quakedesign.lyapunov.gains.synthesise`.
+        of β about the geometric mean of `gain_range`. See `SmallestNorm`, `LargestDecay`, `LargestRange`.
     lipschitz : number or text
-        L̄ > 0.
-    gain_range : tuple of two
+        Bound L̄ > 0 on |ḣ| [unit of ν per s].
+    gain_range : tuple of two numbers or texts
+        Range [b_m, b_M] of β [-] that the proof must cover.
     bound : float, optional
         Largest ‖k_i/L̄^{p_i}‖₂ for all objectives except ``"norm"``; by default the smallest norm of the gains from the
         literature.
     degrees : iterable of int, optional
         Degrees of V; by default the two lowest of `candidate_degrees`. Higher degrees yield better gains, more slowly.
     starts : int
-        Number of initial gains: first those from the literature, then random ones.
+        Number of climbs. Candidates are the gains from the literature, then random gains; up to 12 candidates per climb
+        are tried, since a climb needs feasible initial gains.
     seed : int
         Seed of the random gains; the result does not depend on the number of workers.
     workers : int
         Number of processes; 1 computes in the calling process.
     scheduler : str, optional
-        Address of a dask.distributed scheduler that is used instead.
+        Address of a dask.distributed scheduler, used instead of local processes.
     executor : Executor, optional
-        Any other executor of `concurrent.futures` that is used instead.
+        Executor of `concurrent.futures`, used instead of local processes.
     compare : bool
-        Whether to compute the objective for the gains from the literature, too.
+        Whether to compute the objective also for the gains from the literature, which replace the result if they are
+        better.
 
     Returns
     -------
@@ -412,12 +416,12 @@ def synthesise(
     UnknownNameError
         For an unknown law or objective.
     SimulationError
-        When the workers are not reachable, or die.
+        If the workers are not reachable, or terminate.
     """
     problem = problem_of(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
     require_count(_MOST_STARTS, starts=starts)
     require_count(MOST_WORKERS, workers=workers)
-    first = list(islice(begin_with(problem, seed), starts * _DRAWS))
+    first = list(islice(initial_loops(problem, seed), starts * _DRAWS))
     with InProcess() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         best = _best(problem, _climbed(problem.setting, first, starts, crew))
     mine = _synthesis(problem, *best) if best else None
@@ -474,7 +478,7 @@ def _climbed(setting: PathSetting, first: Sequence[Loop], wanted: int, crew: Cre
 
 
 def attempt(setting: PathSetting, loop: Loop) -> list[State]:
-    """States of a climb from given gains, or from these scaled up; empty without an initial state.
+    """States of a climb from given gains, or from these gains scaled up; empty if no initial state is found.
 
     The level is improved first with fixed gains, then with free gains.
     """
@@ -549,12 +553,14 @@ def _proved(
 
 
 def compared_gains(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
-    """Objective for given gains of any norm, with V of every degree; without the ratio.
+    """Best proved value of the objective for given gains of any norm, over all degrees of V; `ratio` is None.
 
     Parameters
     ----------
+    problem : SynthesisProblem
+        Objective and degrees.
     loop : Loop
-        Loop with the gains.
+        Loop with the given gains.
     """
     objective = replace(problem.setting.objective, bound=None)
     setting = replace(problem.setting, objective=objective, least=FAINT)

@@ -36,7 +36,7 @@ _FAST = 1e-8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sheet:
+class MapDefinition:
     """Definition of a map: law, gains, axes, levels and degree."""
 
     subject: Subject
@@ -55,7 +55,7 @@ class Sheet:
 
     @property
     def rows(self) -> list[list[Place]]:
-        """All points in rows along a gain that does not change the structure of the loop, if there is one."""
+        """All points in rows; if possible, the gain that varies along a row does not change the loop's structure."""
         nested = {name for terms in self.loop.lifts.values() for term in terms for name in term.parameters}
         first, second = (range(len(axis)) for axis in self.axes)
         if self.over[0] in nested:
@@ -66,7 +66,7 @@ class Sheet:
 class Screener:
     """Compiled sweeps of one sheet, one per structure of its points."""
 
-    def __init__(self, sheet: Sheet) -> None:
+    def __init__(self, sheet: MapDefinition) -> None:
         self.sheet = sheet
         self._sweeps: list[Sweep] = []
         self._paths: dict[tuple[Sweep, tuple[Fraction, ...]], Path] = {}
@@ -74,7 +74,10 @@ class Screener:
         self._answered = 0
 
     def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
-        """Limit and number of feasible levels of every point, from that of the previous one; number of solves."""
+        """Limit and number of feasible levels of every point, and number of solves.
+
+        The search at a point begins at the level of the previous point.
+        """
         limits, start, before = [], len(self.sheet.levels), self._solves()
         self._followed.clear()
         for place in places:
@@ -122,7 +125,7 @@ class Screener:
         return self._paths[key].begin(frame)
 
     def proof(self, place: Place, level: int) -> tuple[Place, int, str | None, int]:
-        """Point, level, text of a certificate for both (None without one), and number of solves."""
+        """Point, level, text of the certificate for this point and level (None without proof), and number of solves."""
         before, loop = self._solves(), self.sheet.at(place, level)
         sweep = self._sweep(loop)
         answer = None if sweep is None else sweep.solve(loop, anew=True)
@@ -155,7 +158,7 @@ def _solved(sweep: Sweep, loop: Loop) -> bool:
 class Screeners:
     """Screeners of a sheet on the workers of a crew."""
 
-    def __init__(self, sheet: Sheet, crew: Crew) -> None:
+    def __init__(self, sheet: MapDefinition, crew: Crew) -> None:
         self._sheet, self._crew = sheet, crew
 
     def answers(self, method: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
@@ -179,7 +182,7 @@ class _Cached(threading.local):
 _cached = _Cached()
 
 
-def _answer(sheet: Sheet, method: str, arguments: tuple[object, ...]) -> Any:
+def _answer(sheet: MapDefinition, method: str, arguments: tuple[object, ...]) -> Any:
     if _cached.screener is None or _cached.screener.sheet != sheet:
         _cached.screener = Screener(sheet)
     return getattr(_cached.screener, method)(*arguments)
@@ -197,7 +200,7 @@ _NEIGHBOURS = ((1, 0), (-1, 0), (0, 1), (0, -1))
 class GainMap:
     """Largest level of L̄ at every point of a grid of two gains, as screened and as proved."""
 
-    sheet: Sheet  # Law, gains, axes, levels
+    sheet: MapDefinition  # Law, gains, axes, levels
     limits: Mapping[Place, Fraction | None]  # Necessary limit of L̄
     # Number of levels at which the floating-point search finds a Lyapunov function, without proof
     screened: Mapping[Place, int]
@@ -205,11 +208,11 @@ class GainMap:
     proved: Mapping[Place, int]
     edges: frozenset[Place]  # Points with a neighbour of a lower level, all with an attempted proof
     certificates: Mapping[Place, str]  # Text of the certificate for the highest proved level
-    solves: int
+    solves: int  # Number of conic programmes solved
     seconds: Mapping[str, float] = field(default_factory=dict)  # Wall time of ``"screening"`` and ``"proving"``
 
     def role(self, place: Place) -> str:
-        """``"edge"``, ``"interior"`` (drawn at random), or an empty text for a point that was only screened."""
+        """``"edge"``, ``"interior"`` (drawn at random), or an empty string for a point that was only screened."""
         if place in self.edges:
             return "edge"
         return "interior" if place in self.proved else ""
@@ -253,14 +256,14 @@ def gain_map(
     over : tuple of two str
         Names of the gains that vary.
     ranges : sequence of two pairs, optional
-        Ends of both axes; by default a quarter to four times the base gain. Positive ranges are divided in equal
-        ratios.
+        Ends of both axes; by default from one quarter of the base gain to four times the base gain. The points of a
+        positive range are spaced geometrically.
     points : int
         Number of points along each axis.
     levels : sequence of number or text, optional
         Values of L̄; by default the shares `SHARES` of the necessary limit of the base gains.
     gain_range : tuple of two
-        b_m and b_M [-].
+        Range [b_m, b_M] of β [-].
     degree : int, optional
         Degree of V; by default the lowest with a clear margin for the base gains at the lowest level.
     interior : int
@@ -268,20 +271,24 @@ def gain_map(
     seed : int
         Seed of the choice of interior points.
     workers : int
-        Number of processes; 1 computes in the calling process. Results are bitwise independent of it.
+        Number of processes; 1 computes in the calling process. Results do not depend on this number (bitwise).
     scheduler : str, optional
-        Address of a dask.distributed scheduler that is used instead.
+        Address of a dask.distributed scheduler, used instead of local processes.
     executor : Executor, optional
-        Any other executor of `concurrent.futures` that is used instead.
+        Executor of `concurrent.futures`, used instead of local processes.
     tell : callable
-        Called with a text and the share done, to report progress.
+        Function that reports progress, called with a text and the completed fraction.
+
+    Returns
+    -------
+    GainMap
 
     Raises
     ------
     ParameterError, UnknownNameError, CertificateError
         For unknown gains, empty ranges or levels, and as in `certify`.
     SimulationError
-        When the workers are not reachable, or die.
+        If the workers are not reachable, or terminate.
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
@@ -312,33 +319,45 @@ def _sheet(
     levels: Sequence[Number] | None,
     gain_range: tuple[Number, Number],
     degree: int | None,
-) -> Sheet:
+) -> MapDefinition:
     loop = closed_loop(subject, gains, lipschitz=1, gain_range=gain_range)
     if "d" not in loop.uncertain or len(set(over)) != 2 or not set(over) <= set(loop.gains):
         raise ParameterError(
-            f"a map needs two different gains among {', '.join(loop.gains)}. Received {' '.join(over) or 'none'}. "
-            "Give for example k1 k2."
+            "a map needs a law with an uncertain parameter d, and two different gains among "
+            f"{', '.join(loop.gains)}. Received {' '.join(over) or 'none'}."
         )
     if points < 2:
         raise ParameterError(f"a map needs at least two points along each axis. Received {points}.")
     ends = ranges or [(loop.gains[name] / 4, loop.gains[name] * 4) for name in over]
     first, second = (axis(low, high, points, f"range of {name}") for name, (low, high) in zip(over, ends, strict=True))
     chosen = _levels(subject, loop, levels)
-    sheet = Sheet(subject=subject, loop=loop, over=over, axes=(first, second), levels=chosen, degree=degree or 0)
+    sheet = MapDefinition(
+        subject=subject, loop=loop, over=over, axes=(first, second), levels=chosen, degree=degree or 0
+    )
     return sheet if degree else replace(sheet, degree=_lowest_degree(loop, chosen[0]))
 
 
 def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[Fraction, ...]:
-    """Values from low to high: decimals of four or more digits, in equal ratios if both ends are positive.
+    """Values from low to high, decimals of four or more digits; spaced geometrically if both ends are positive.
+
+    Parameters
+    ----------
+    low, high : number or text
+        Ends of the axis.
+    points : int
+        Number of values.
+    what : str
+        Name of the range in error messages.
+
 
     Raises
     ------
     ParameterError
-        When the range is empty.
+        If the range is empty, or too narrow for the number of points.
     """
     first, last = rational(low, what), rational(high, what)
     if not first < last:
-        raise ParameterError(f"{what} must ascend. Received {low} to {high}.")
+        raise ParameterError(f"the lower end of the {what} must be below the upper end. Received {low} to {high}.")
     shares = [i / (points - 1) for i in range(1, points - 1)]
     a, b = float(first), float(last)
     inner = [a * (b / a) ** s if first > 0 else a + (b - a) * s for s in shares]
@@ -353,11 +372,12 @@ def _levels(subject: Subject, loop: Loop, levels: Sequence[Number] | None) -> tu
     if levels is not None:
         ordered = tuple(sorted({rational(v, "lipschitz") for v in levels}))
         if not ordered or ordered[0] < 0:
-            raise ParameterError(f"lipschitz must not be negative. Received {', '.join(map(str, levels)) or 'none'}.")
+            values = ", ".join(map(str, levels)) or "none"
+            raise ParameterError(f"lipschitz must not be negative, and one level is required. Received {values}.")
         return ordered
     limit = necessary_limit(loop, subject)
     if not limit:
-        raise ParameterError("levels of L̄ are required, since the base gains give no limit. Give --lipschitz.")
+        raise ParameterError("levels of L̄ are required (--lipschitz): no limit is known for the base gains.")
     return tuple(share * limit for share in SHARES)
 
 
@@ -372,7 +392,7 @@ def _lowest_degree(loop: Loop, bound: Fraction) -> int:
 
 
 def _screen(
-    sheet: Sheet, screeners: Screeners, tell: Callable[[str, float], None]
+    sheet: MapDefinition, screeners: Screeners, tell: Callable[[str, float], None]
 ) -> tuple[dict[Place, Fraction | None], dict[Place, int], int]:
     """Limit and screened level of every point, and number of solves."""
     limits: dict[Place, Fraction | None] = {}
@@ -388,7 +408,7 @@ def _screen(
 
 
 def _prove(
-    sheet: Sheet,
+    sheet: MapDefinition,
     screeners: Screeners,
     reached: dict[Place, int],
     interior: int,
@@ -424,7 +444,7 @@ def _prove(
             if not open_places:
                 break
             run(open_places, f"the edge at L̄ = {float(sheet.levels[level - 1]):.4g}")
-    run(_drawn(reached, proved, interior, seed), "points inside")
+    run(_drawn(reached, proved, interior, seed), "interior points")
     return proved, texts, frozenset(edges), solves
 
 
@@ -435,7 +455,7 @@ def _drawn(reached: Mapping[Place, int], proved: Mapping[Place, int], count: int
     return [(inside[i], reached[inside[i]]) for i in sorted(chosen.tolist())]
 
 
-def _at_edge(place: Place, inside: set[Place], sheet: Sheet) -> bool:
+def _at_edge(place: Place, inside: set[Place], sheet: MapDefinition) -> bool:
     """Whether a neighbour on the grid is outside."""
     sizes = tuple(len(axis) for axis in sheet.axes)
     around = ((place[0] + a, place[1] + b) for a, b in _NEIGHBOURS)

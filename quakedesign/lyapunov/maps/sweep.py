@@ -1,7 +1,7 @@
 """Sweeps of one law over many gains: one compiled conic programme with parameters.
 
-Chapters: the programme in cvxpy; V and −V̇ as functions of gains and ranges; a central path that follows
-the margin from point to point with two-sided bounds. A sweep screens in floating point; `prove` makes
+The module contains the programme in cvxpy; V and −V̇ as functions of gains and ranges; and a central-path
+method that bounds the margin from both sides at successive points. A sweep screens in floating point; `prove` makes
 the result at a point exact.
 """
 
@@ -20,7 +20,14 @@ from quakedesign.laws import Subject
 from quakedesign.lyapunov.exact.certificate import Certificate
 from quakedesign.lyapunov.exact.claim import Loop
 from quakedesign.lyapunov.exact.obligations import Obligation, statement_of
-from quakedesign.lyapunov.search.lyapunov_search import Family, balance, exponents_of, finished, lifted_scale, normal
+from quakedesign.lyapunov.search.lyapunov_search import (
+    Family,
+    balance,
+    certificate_from_proposal,
+    exponents_of,
+    lifted_scale,
+    normal,
+)
 from quakedesign.lyapunov.search.parametric_forms import FormRow, ends_of, rows_of, values_of
 from quakedesign.sos.exact.polynomial import monomial
 from quakedesign.sos.exact.polynomial_statement import Statement
@@ -42,6 +49,10 @@ class Cones:
 
     Parameters
     ----------
+    rows : sequence of FormRow
+        Rows of the programme.
+    loop : Loop
+        Any point of the sweep.
     monomials : sequence of Term
         Monomials V_j.
     scale : tuple of Fraction
@@ -120,17 +131,17 @@ def _template(row: FormRow, loop: Loop, scale: Sequence[Fraction]) -> Statement:
 ACCURACY = 1e-10
 """Default tolerance of the solver."""
 SURE = 5e-10
-"""Margins above this are taken as positive; it is about the accuracy of the solver."""
+"""Margins above this value count as positive; it is close to the accuracy of the solver."""
 CLEAR = 1e-6
-"""Choices for many points, such as a degree, follow margins above this, so that they are the same on every processor:
-kernels of linear algebra change margins near zero by up to 2e-9."""
+"""Margin above which a choice for many points, such as a degree, may depend on its sign. The linear-algebra kernels of
+different processors change margins near zero by up to 2e-9; above this value all processors choose alike."""
 _TOO_FAR = "the magnitudes of the gains differ too much for a search in floating point."
 _MOST_SCALES = 64  # number of scales with cached coefficients
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """Units in which the numbers of a point are about one."""
+    """Units in which the numbers of a point are of order one."""
 
     scale: tuple[Fraction, ...]  # Powers of two, u_i = scale_i·ũ_i
     rate_scale: float  # Divisor of −V̇
@@ -158,8 +169,8 @@ class Sweep:
     Parameters
     ----------
     loop : Loop
-        Any point of the sweep. All points have ranges of the same kinds (point, symmetric or general), and equal
-        parameters inside nested powers.
+        Any point of the sweep. All points must have ranges of the same kinds (single value, symmetric or general), and
+        the same parameters inside nested powers.
     degree : int
         Degree of V.
 
@@ -206,12 +217,14 @@ class Sweep:
 
         Parameters
         ----------
+        loop : Loop
+            Point of the sweep.
         frame : Frame, optional
             Units; by default those of the point. Margins in different units are comparable only in sign.
         accuracy : float
             Tolerance of the solver.
         anew : bool
-            Whether the result must be bitwise independent of earlier solutions.
+            Whether to solve anew, so that the result does not depend on earlier solutions (bitwise).
 
         Raises
         ------
@@ -221,7 +234,7 @@ class Sweep:
             When the magnitudes of its numbers differ too much for floating point.
         """
         if not self.covers(loop):
-            raise ValueError("the loop differs in structure from that of the sweep. Compile a sweep for it.")
+            raise ValueError("the loop must have the structure of the sweep. Create another Sweep for this loop.")
         values, units = values_of(loop), frame or self.frame(loop)
         solution = self._in_units(units.scale).solve(self._features(values), units.rate_scale, accuracy, anew=anew)
         self.solves += 1
@@ -280,7 +293,7 @@ class Sweep:
 def prove(sweep: Sweep, loop: Loop, answer: Screened, subject: Subject | None = None) -> Certificate | None:
     """Certificate of a screened point, checked in exact arithmetic; None without an exact proof."""
     family, proposal = sweep.family(answer.frame), Proposal(answer.decision, answer.margin)
-    return finished(loop, family, proposal, answer.frame.scale, subject)
+    return certificate_from_proposal(loop, family, proposal, answer.frame.scale, subject)
 
 
 class _Numbers:
@@ -408,6 +421,8 @@ class Path:
 
     Parameters
     ----------
+    sweep : Sweep
+        Sweep of the points.
     frame : Frame
         Units of all points.
     """

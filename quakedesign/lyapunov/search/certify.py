@@ -14,7 +14,7 @@ import sympy as sp
 from quakedesign.errors import CertificateError, ParameterError
 from quakedesign.exact import rational, to_sympy
 from quakedesign.laws import LoopField, Subject, law, model_of
-from quakedesign.lyapunov.exact.certificate import Certificate, decided_once
+from quakedesign.lyapunov.exact.certificate import Certificate, cached_verdict
 from quakedesign.lyapunov.exact.claim import Loop, Verdict, loop_of
 from quakedesign.lyapunov.maps.sweep import SURE, Screened, Sweep, prove
 from quakedesign.lyapunov.search.falsification import escape
@@ -38,14 +38,14 @@ def certify(
     Parameters
     ----------
     subject : str, type of Law or LoopField
-        Name of a law of the package, a user-defined class, or a bare closed loop; uncertain in ``beta`` or ``d`` = ḣ
-        or both. A certificate for a law from outside the package is re-checked with ``check(subject)``.
+        Name of a law of the package, a user-defined class, or a bare closed loop; its uncertain parameters
+        are ``beta``, ``d`` = ḣ, or both. The certificate of a user-defined law is checked with ``check(subject)``.
     gains : tuple of number or text
-        Exact numbers (decimals, exponents or p/q) in the order of the law.
+        Exact numbers (decimal, scientific notation or p/q) in the order of the law.
     lipschitz : number or text
-        L̄ [unit of ν per s], not negative.
-    gain_range : tuple of two
-        b_m and b_M [-], positive.
+        Bound L̄ on |ḣ| [unit of ν per s], not negative.
+    gain_range : tuple of two numbers or texts
+        Range [b_m, b_M] of β [-], positive.
 
     Returns
     -------
@@ -56,25 +56,25 @@ def certify(
     Raises
     ------
     ParameterError
-        For gains or ranges that are not numbers, a range that is empty or not positive, a law with other uncertain
-        parameters, or a law that is not homogeneous in its weights.
+        If a gain or range is not a number, a range is empty or not positive, or the law has other uncertain
+        parameters or is not homogeneous in its weights.
     CertificateError
         When certificates do not support a part of the law, such as a squared uncertain parameter.
     UnknownNameError
-        For the name of an unknown law.
+        If the name of the law is unknown.
     """
     loop = closed_loop(subject, gains, lipschitz=lipschitz, gain_range=gain_range)
     certificate = refute(loop, subject) or proof(loop, subject)
-    return (decided_once(certificate, subject), certificate) if certificate else (Verdict.UNDECIDED, None)
+    return (cached_verdict(certificate, subject), certificate) if certificate else (Verdict.UNDECIDED, None)
 
 
 def proof(loop: Loop, subject: Subject) -> Certificate | None:
-    """Proof of a loop that has no known counterexample; None if none is found."""
+    """Certificate of stability of a loop that has no known counterexample; None if no proof is found."""
     return find_certificate(loop, subject=subject) or _swept(loop, subject)
 
 
 def _swept(loop: Loop, subject: Subject) -> Certificate | None:
-    """Proof by the programme of `Sweep`: it normalises the mean of V, and so is more accurate near the limits."""
+    """Certificate by the programme of `Sweep`, which normalises the mean of V and is more accurate near the limits."""
     for degree in candidate_degrees(loop):
         try:
             sweep = Sweep(loop, degree)
@@ -128,7 +128,7 @@ def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fra
             wrong = [v for v in values if getattr(v, f"is_{kind}") != declared]
             if wrong:
                 raise ParameterError(
-                    f"{symbol} is declared {'' if declared else 'not '}{kind} in the loop. Received {wrong[0]}. "
+                    f"{symbol} is declared {'' if declared else 'not '}{kind} in the loop, but equals {wrong[0]}. "
                     "Declare it with real=True only."
                 )
 
@@ -163,7 +163,7 @@ def _require_one(degrees: Mapping[Fraction, str], loop: Loop) -> None:
     if len(degrees) > 1:
         (m, first), (n, second), *_ = degrees.items()
         raise ParameterError(
-            f"a certificate needs a loop of one degree in the weights {dict(loop.states)}. Received degree {m} of "
+            f"the loop must be homogeneous in the weights {dict(loop.states)}. Received degree {m} of "
             f"{first} and {n} of {second}. Use weights of quakedesign.symbolic.homogeneity.weights_for."
         )
 
@@ -198,7 +198,7 @@ def _ranges(
     unknown = [*(str(u) for u in model.uncertain if str(u) not in ranges), *map(str, model.constants)]
     if unknown or model.domain != "cells":
         raise ParameterError(
-            "a Lipschitz bound applies to sliding-mode laws, uncertain in beta and d. "
+            "a Lipschitz bound requires a sliding-mode law whose uncertain parameters are beta or d. "
             f"Received {name!r} with {', '.join(unknown) or 'a polynomial loop'}."
         )
     return {str(u): ranges[str(u)] for u in model.uncertain}
@@ -251,14 +251,14 @@ def last_success(
 
     Parameters
     ----------
-    ask : callable
-        Solution at a number, and the slope of its margin there.
+    evaluate : callable
+        Function of a number; returns the solution at this number, and the slope of its margin.
     first : Fraction
         Initial number; the floor if no better guess is known.
     floor : Fraction
         Smallest admissible number.
     limit : Fraction, optional
-        Number from which on no search can succeed, so none is tried.
+        Smallest number at which no search can succeed; the search stays below it.
     most : Fraction, optional
         Number at which success ends the search.
     only_above : bool
@@ -318,7 +318,7 @@ def _middle(
 
 
 def first_below(limit: Fraction) -> Fraction:
-    """Number so close to a limit that success there ends the search."""
+    """Number below a limit, but so close to it that success there ends the search."""
     return limit * (1 - _BELOW - _ABOVE)
 
 
@@ -337,8 +337,8 @@ class CertifiedLimit:
 
     quantity: str  # ``"lipschitz"``, ``"beta"`` (upper end b_M) or ``"beta-factor"`` (range [b/f, b·f])
     value: Fraction | None  # Proved exactly; None if the search finds no proof
-    # Smallest number at which the search failed, at most value·(1 + 1e-4) unless an exact proof failed; None if `limit`
-    # is as close, or no upper end was found
+    # Largest over all degrees of the smallest number at which the search failed; at most value·(1 + 1e-4) unless an
+    # exact proof failed. None if `limit` is as close, or no search failed
     beyond: Fraction | None
     limit: Fraction | None  # Value at which no Lyapunov function of any kind exists; None if unknown
     degrees: tuple[int, ...]  # Degrees of V that were tried, all with sums of squares on cells without multiplier
@@ -346,8 +346,8 @@ class CertifiedLimit:
     # Proof for the value; without a proof, the exact counterexample, if one is known
     certificate: Certificate | None
     counterexample: str  # Kind of counterexample if nothing is proved, see `counterexample_kind`; else ``"none"``
-    solves: int
-    seconds: float
+    solves: int  # Number of conic programmes solved
+    seconds: float  # Wall time [s]
 
     @property
     def sharp(self) -> bool:
@@ -356,7 +356,7 @@ class CertifiedLimit:
         return self.value is not None and any(end <= self.value * (1 + TOLERANCE) for end in ends)
 
     def smallest_scale(self, lipschitz: Number) -> Fraction | None:
-        """Smallest λ for which the scaled gains are proved for a required L̄, equal to L̄/value; None without a proof.
+        """Smallest gain scale λ = L̄/value with which the gains are proved for a required L̄; None without a proof.
 
         Raises
         ------
@@ -394,10 +394,11 @@ def largest_lipschitz(
     Parameters
     ----------
     subject : str, type of Law or LoopField
-        See `certify`.
+        As in `certify`.
     gains : tuple of number or text
-    gain_range : tuple of two
-        b_m and b_M [-].
+        As in `certify`.
+    gain_range : tuple of two numbers or texts
+        Range [b_m, b_M] of β [-].
     degrees : int or iterable of int, optional
         Degrees of V to try; by default those of `certify`.
 
@@ -437,6 +438,7 @@ def largest_gain_range(
     subject, gains, degrees
         See `largest_lipschitz`.
     lipschitz : number or text
+        Bound L̄ on |d| [unit of ν per s].
     nominal : number or text
         Lower end b of the range, or its geometric middle if symmetric.
     symmetric : bool
@@ -475,7 +477,7 @@ def largest_gain_range(
 
 
 def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
-    """Bound on |d| from which on the gains have no proof, known from the law or a refuting equilibrium."""
+    """Smallest known bound on |d| without a proof, from the law or a refuting equilibrium; None if unknown."""
     chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
     limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
     limits = [] if limit is None else [max(Fraction(0), limit)]
@@ -489,7 +491,7 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
 def counterexample_kind(loop: Loop, refuted: Certificate | None) -> str:
     """Kind of counterexample to a loop without a proof.
 
-    ``"exact"`` for a given equilibrium away from the origin, ``"simulated"`` for a growing run, else ``"none"``.
+    ``"exact"`` for a refuting equilibrium, ``"simulated"`` for a simulation whose state grows, else ``"none"``.
     """
     if refuted is not None:
         return "exact"

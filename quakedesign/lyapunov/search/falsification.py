@@ -1,4 +1,4 @@
-"""Falsification of a homogeneous loop without a proof, by simulated disturbances under which its state grows."""
+"""Falsification of a homogeneous loop by simulation: disturbances under which the state grows."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,17 +17,17 @@ _UNCOUNTED = 0.25  # initial share of a run whose growth is not counted
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Escape:
-    """A growing run in floating point, whose growth never ends since the loop is homogeneous."""
+    """Simulation in floating point whose state grows; as the loop is homogeneous, the growth is unbounded."""
 
     growth: float  # e-foldings of Σ|x_i|^{1/r_i} over the run
-    strategy: str  # Signs that the uncertain parameters follow
+    strategy: str  # Sign that determines the end of the range, for each uncertain parameter
 
 
 def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
-    """Run that grows at two step sizes, for parameters that switch between their ends; None if none is found.
+    """Simulation that grows at two step sizes, with parameters that switch between their ends; None if none is found.
 
-    Every uncertain parameter follows a sign: of a state or a rate if its terms are even in the states, of a product of
-    two if they are odd.
+    Every uncertain parameter takes the end of its range given by a sign: that of a state or a rate, or of a product of
+    two such quantities if all its terms are odd in the states.
 
     Parameters
     ----------

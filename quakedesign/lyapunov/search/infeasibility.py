@@ -25,10 +25,10 @@ _SURE = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Atom:
-    """One point of one obligation."""
+    """Weighted point at which the polynomial of one obligation is evaluated."""
 
     obligation: str  # Name as in a certificate
-    point: tuple[Fraction, ...]  # u ≥ 0 in the variables of the states, not all zero
+    point: tuple[Fraction, ...]  # Coordinates u_i ≥ 0 of the states, not all zero
     weight: Fraction  # Positive
 
 
@@ -64,8 +64,9 @@ class Dual:
 def dual(loop: Loop, degree: int) -> Dual | None:
     """Exact proof that no V of a degree proves the stability of a loop; None if no such proof is found.
 
-    None implies nothing. It is also returned for nested powers with positive exponents, whose cells contain few
-    rational points, and for irrational roots of gains, as the ends of their enclosures are no values of the loop.
+    None does not imply that a V exists. None is also returned for nested powers with positive exponents, whose cells
+    contain few rational points, and for irrational roots of gains, since the loop does not attain the ends of their
+    enclosures.
 
     Parameters
     ----------
@@ -90,7 +91,7 @@ def _sharp(loop: Loop) -> bool:
 
 
 def _rows(loop: Loop, monomials: Sequence[Term]) -> Iterator[tuple[Obligation, ...]]:
-    """Rows of all V_j, then of all −V̇_j, on every different cell and vertex."""
+    """Rows of all V_j, then of all −V̇_j, on every distinct cell and vertex."""
     columns = [Obligations(loop, (term,)) for term in monomials]
     functions = zip(*([Obligation(n, p) for n, p in c.function()] for c in columns), strict=True)
     rates = zip(*([one for _, one in c.decrease("decrease")] for c in columns), strict=True)

@@ -1,8 +1,8 @@
 """Search for a Lyapunov function of given gains, completed by an exact certificate.
 
 One pipeline for every law: candidates, scaling by powers of two, conic programme, claims with a margin,
-and rounding to exact witnesses. Further chapters: quadratic functions in floating point, and cached
-results of the presets; a cached certificate is used only after its exact check.
+and rounding to exact witnesses. The module also contains quadratic functions in floating point, and the
+stored results of the presets; a stored certificate is used only after its exact check.
 """
 
 import math
@@ -25,7 +25,7 @@ from quakedesign.exact import nearest
 from quakedesign.files import write_whole
 from quakedesign.laws import LoopField, Subject, law
 from quakedesign.laws.loop_field import lowest_degree
-from quakedesign.lyapunov.exact.certificate import Certificate, decided_once, parse_certificate
+from quakedesign.lyapunov.exact.certificate import Certificate, cached_verdict, parse_certificate
 from quakedesign.lyapunov.exact.certificate_files import certificate_text
 from quakedesign.lyapunov.exact.claim import Equilibrium, Loop, Verdict, Witness
 from quakedesign.lyapunov.exact.obligations import (
@@ -54,7 +54,7 @@ _LEVELS = (0, 1, 2)
 DECAY_LEVEL = 2
 
 
-def finish(
+def certificate_of(
     loop: Loop, lyapunov: tuple[Term, ...], claims: Mapping[str, Fraction], subject: Subject | None = None
 ) -> Certificate | None:
     """Certificate with exact witnesses for every obligation of a given V; None if one is not found."""
@@ -67,13 +67,13 @@ def finish(
             witnesses[one.name] = witness
         certificate = Certificate(loop=loop, lyapunov=lyapunov, claims=dict(claims), witnesses=witnesses)
         readable = parse_certificate(certificate_text(certificate)) == certificate
-        return certificate if readable and decided_once(certificate, subject) is Verdict.PROVED else None
+        return certificate if readable and cached_verdict(certificate, subject) is Verdict.PROVED else None
     except (CertificateError, WorkError):
         return None
 
 
 def witness_of(one: Obligation, domain: str) -> Witness | None:
-    """Exact witness of one obligation; the multiplier is the lowest sufficient power of the sum of all variables."""
+    """Exact witness of an obligation with the lowest sufficient power of the sum of all variables; None without one."""
     size = width(one)
     if not one.polynomial:
         empty: tuple[dict[Any, Any], ...] = tuple({} for _ in one.equalities)
@@ -99,13 +99,14 @@ def power_of_sum(size: int, power: int) -> dict[tuple[int, ...], Fraction]:
 
 
 # ----------------------------------------------------------------------
-# Scaling by powers of two, which makes the numbers of a loop about one for a solver.
+# Scaling by powers of two, after which the numbers of a loop are of order one for a solver.
 
 
 def balance(loop: Loop) -> tuple[Fraction, ...]:
-    """Powers of two 2^n_i that make the terms of every state's rate about equally large, for u_i = 2^n_i·ũ_i.
+    """Scales 2^n_i of the variables, u_i = 2^n_i·ũ_i, for which the terms of every state's rate are similar in size.
 
-    They solve a least-squares problem in logarithms; the first state keeps its scale. A nested power is replaced by the
+    The scales solve a least-squares problem in the logarithms; the scale of the first state is 1.
+    A nested power is replaced by the
     powers of the terms of its argument.
     """
     states = tuple(loop.states)
@@ -124,7 +125,7 @@ def balance(loop: Loop) -> tuple[Fraction, ...]:
 
 
 def _without_lifts(term: Term, loop: Loop) -> Iterator[Term]:
-    """Copies of a term, one for each term of the argument of its nested power, whose power (times 1) replaces it."""
+    """Copies of a term in which a power of a lift is replaced by that power of one term of the lift's argument."""
     lift = next((f for f in term.factors if f[0] in loop.lifts), None)
     if lift is None:
         yield term
@@ -168,7 +169,7 @@ def lifted_scale(equalities: Sequence[Polynomial], scale: Sequence[Fraction]) ->
 
 
 def below(number: float) -> Fraction:
-    """Short rational: a positive number rounded down to about three digits; zero for any other number."""
+    """Positive number rounded down to a rational of about three digits; 0 for a number ≤ 0 or not finite."""
     if not number > 0 or not math.isfinite(number):
         return Fraction(0)
     shift = Fraction(2) ** (9 - math.floor(math.log2(number)))
@@ -231,7 +232,7 @@ def quadratic_margin(loop: Loop, lyapunov: tuple[Term, ...]) -> Fraction:
 
 
 def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
-    """Largest a with V' ≤ −2aV at every vertex, for a quadratic V; floating point, may be negative."""
+    """Largest a [1/s] with V' ≤ −2aV at every vertex for a quadratic V, in floating point; −1 if V is not definite."""
     obligations = Obligations(loop, lyapunov)
     size = len(loop.states)
     V = quadratic_matrix(loop, lyapunov)
@@ -251,15 +252,15 @@ def quadratic_rate(loop: Loop, lyapunov: tuple[Term, ...]) -> float:
 # ----------------------------------------------------------------------
 # Claims of a Lyapunov function: margins, decay rate and bounds, reduced so that exact proofs succeed.
 
-GIVE_AWAY = Fraction(1, 2)
+MARGIN_SHARE = Fraction(1, 2)
 _DECAY_SHARE = 0.99
 
 
 def claims_of(loop: Loop, lyapunov: tuple[Term, ...], margins: tuple[Fraction, Fraction]) -> dict[str, Fraction]:
     """Reduced claims: half of the margins, and on the reals 99 % of the decay rate of V."""
     if loop.domain == "cells":
-        return {"positive": margins[0] * GIVE_AWAY, "decrease": margins[1] * GIVE_AWAY}
-    return {"positive": margins[0] * GIVE_AWAY, "rate": below(0.99 * quadratic_rate(loop, lyapunov))}
+        return {"positive": margins[0] * MARGIN_SHARE, "decrease": margins[1] * MARGIN_SHARE}
+    return {"positive": margins[0] * MARGIN_SHARE, "rate": below(0.99 * quadratic_rate(loop, lyapunov))}
 
 
 def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction]) -> dict[str, Fraction]:
@@ -280,7 +281,7 @@ def bounds_of(loop: Loop, lyapunov: tuple[Term, ...], scale: Sequence[Fraction])
 def with_largest_decay(
     certificate: Certificate, scale: Sequence[Fraction], subject: Subject | None = None
 ) -> Certificate | None:
-    """Certificate that also claims V̇ ≤ −κV^{n/m}, with κ 1 % below the largest of the solver; None without one."""
+    """Certificate that also claims V̇ ≤ −κV^{n/m}, with κ 1 % below the solver's maximum; None without proof."""
     loop, lyapunov = certificate.loop, certificate.lyapunov
     obligations = Obligations(loop, lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")
@@ -293,7 +294,7 @@ def with_largest_decay(
     kappa = below(_DECAY_SHARE * largest)
     if kappa <= 0:
         return None
-    return finish(loop, lyapunov, {**certificate.claims, "decay": kappa}, subject)
+    return certificate_of(loop, lyapunov, {**certificate.claims, "decay": kappa}, subject)
 
 
 def _largest(one: Obligation, direction: Polynomial, domain: str, scale: Sequence[Fraction], level: int) -> float:
@@ -317,7 +318,7 @@ def _largest(one: Obligation, direction: Polynomial, domain: str, scale: Sequenc
 
 
 # ----------------------------------------------------------------------
-# Stored results of the searches that every comparison of the presets repeats; they are re-checked when used.
+# Stored results of the searches that every comparison of the presets needs; a stored result is re-checked when used.
 #
 # The folder `stored` has one file per search, named by a digest of the problem: a certificate, or ``null`` if none was
 # found. The results of all other searches on this machine are in `quakedesign.cache`. A certificate is used only after
@@ -350,7 +351,7 @@ def cached(search: Search) -> Search:
             return certificates[0] if certificates else None
         with suppress(CertificateError, WorkError):
             certificate = parse_certificate(text)
-            if certificate.loop == loop and decided_once(certificate, subject) is Verdict.PROVED:
+            if certificate.loop == loop and cached_verdict(certificate, subject) is Verdict.PROVED:
                 return certificate
         return search(loop, degree, subject)
 
@@ -358,7 +359,7 @@ def cached(search: Search) -> Search:
 
 
 def path_of(loop: Loop, degree: int) -> Path:
-    """File of the search for a loop with all its numbers and a degree of V."""
+    """Path of the file with the stored result of the search for a loop and a degree of V."""
     key = repr([degree, *((field.name, getattr(loop, field.name)) for field in fields(loop))])
     return FOLDER / f"{loop.law}_{sha256(key.encode()).hexdigest()[:16]}.json"
 
@@ -378,7 +379,10 @@ _HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # higher degrees gain less than 
 
 
 def candidate_degrees(loop: Loop) -> tuple[int, ...]:
-    """Degrees of V to try: the lowest that couples the heaviest states, then even ones up to 8 (10 in 2-D)."""
+    """Degrees of V to try: the lowest that couples the states of largest weight; on cells then even ones up to 8 or 10.
+
+    The largest degree is 10 for at most two states, else 8.
+    """
     lowest = lowest_degree(loop.states.values(), loop.domain)
     if loop.domain == "reals":
         return (lowest,)
@@ -393,15 +397,17 @@ def find_certificate(
 
     Parameters
     ----------
+    loop : Loop
+        Closed loop with its gains and ranges.
     degrees : int or iterable of int, optional
         Degrees of V in the weights of the loop, tried in order; by default `candidate_degrees`.
     subject : str, type of Law or LoopField, optional
-        Law of the loop; required for a law from outside the package.
+        Law of the loop; required for a user-defined law.
 
     Returns
     -------
     Certificate or None
-        Certificate that was checked in exact arithmetic. None implies nothing about the loop.
+        Certificate that was checked in exact arithmetic. None does not imply that the loop is unstable.
     """
     if degrees is None:
         degrees = candidate_degrees(loop)
@@ -418,10 +424,10 @@ def _of_degree(loop: Loop, degree: int, subject: Subject | None) -> Certificate 
     proposal = joint_program(family.demands).solve(family.demands)
     if proposal is None or not proposal.margin > _WORTH_A_PROOF:
         return None
-    return finished(loop, family, proposal, scale, subject)
+    return certificate_from_proposal(loop, family, proposal, scale, subject)
 
 
-def finished(
+def certificate_from_proposal(
     loop: Loop, family: "Family", proposal: Proposal, scale: Sequence[Fraction], subject: Subject | None = None
 ) -> Certificate | None:
     """Certificate from a proposal of a family in scaled variables, with the coarsest rounding that has a proof.
@@ -436,7 +442,7 @@ def finished(
             below(proposal.margin * float(family.rate_scale * min(1 / r**family.decrease_degree for r in scale))),
         )
         claims = claims_of(loop, lyapunov, margins) | bounds_of(loop, lyapunov, scale)
-        certificate = finish(loop, lyapunov, claims, subject)
+        certificate = certificate_of(loop, lyapunov, claims, subject)
         if certificate is not None:
             return certificate
     return None
@@ -444,11 +450,11 @@ def finished(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Family:
-    """Lyapunov functions Σ a_j V_j with the monomials of one degree, as demands on the a_j."""
+    """Lyapunov functions Σ a_j V_j with the monomials V_j of one degree, as constraints on the a_j."""
 
     monomials: tuple[Term, ...]  # V_j·size_j
-    sizes: tuple[Fraction, ...]  # Divisors that make the monomials about one in the scaled variables
-    demands: tuple[Demand, ...]  # V and −V̇ on every different cell and vertex, scaled
+    sizes: tuple[Fraction, ...]  # Divisors after which the monomials are of order one in the scaled variables
+    demands: tuple[Demand, ...]  # V and −V̇ on every distinct cell and vertex, scaled
     rate_scale: Fraction  # Divisor of −V̇
     decrease_degree: int  # Degree of V̇
 
@@ -490,7 +496,7 @@ def family_of(loop: Loop, degree: int, scale: Sequence[Fraction]) -> Family | No
 
 
 def _rows(columns: list[list[Obligation]]) -> list[list[Obligation]]:
-    """Different obligations (rows), each with one entry per candidate."""
+    """Distinct obligations (rows), each with one entry per candidate V_j."""
     rows = {tuple(one.key for one in row): list(row) for row in zip(*columns, strict=True)}
     return list(rows.values())
 
@@ -519,7 +525,7 @@ def _demand(row: Sequence[Obligation], loop: Loop, power: int) -> Demand:
 
 
 def refute(loop: Loop, subject: Subject) -> Certificate | None:
-    """Counterexample proposed by the law and checked in exact arithmetic; None without one, as for a bare loop."""
+    """Refutation by an equilibrium that the law proposes, checked exactly; None without one, as for a `LoopField`."""
     if isinstance(subject, LoopField):
         return None
     chosen = law(subject) if isinstance(subject, str) else subject

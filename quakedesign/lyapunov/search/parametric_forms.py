@@ -1,6 +1,6 @@
 """Forms V and −V̇ on cells and vertices, with gains and ranges as parameters.
 
-The second chapter evaluates them in floating point and caches them for all loops of one structure.
+The forms are also evaluated in floating point and cached for all loops of one structure.
 """
 
 import math
@@ -21,7 +21,7 @@ from quakedesign.symbolic.terms import Term, cell_polynomial
 # V_j and −V̇_j on every cell and vertex, each distinct form once, with symbolic gains and ranges.
 
 Part = tuple[int, tuple[int, ...], tuple[str, ...], Fraction | float]
-"""j, exponents, names multiplied, coefficient."""
+"""Term of V_j or −V̇_j: index j, exponents, names of its parameters, coefficient."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,7 @@ class FormRow:
 
 
 def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
-    """Symbolic ends of every range: ±name for [−x, x], name for a point, otherwise name- and name+."""
+    """Symbolic ends of every range: −name and name for [−x, x], name for one value, else ``name-`` and ``name+``."""
     ends: dict[str, tuple[tuple[str, int], ...]] = {}
     for name, (low, high) in loop.uncertain.items():
         if low == -high:
@@ -65,7 +65,7 @@ def ends_of(loop: Loop) -> dict[str, tuple[tuple[str, int], ...]]:
 
 
 def values_of(loop: Loop) -> dict[str, float]:
-    """Values of all names, including roots (whose enclosures are narrow)."""
+    """Floating-point values of all parameters, of roots, and of the ends of the ranges, by name."""
     values = {name: float(v) for name, v in loop.parameters.items()}
     for name, (of, _) in loop.roots.items():
         values[name] = values[of] ** 0.5
@@ -153,7 +153,7 @@ class Structure:
 
 
 class StructureKey:
-    """A loop that equals every other loop of its structure."""
+    """Cache key of a loop, equal for all loops of one structure."""
 
     def __init__(self, loop: Loop, degree: int) -> None:
         self.loop, self.structure = loop, Structure.of(loop, degree)

@@ -27,8 +27,10 @@ class Settling:
     ----------
     decay : Fraction
         Proved κ for this V.
+    factor, power : Fraction
+        Constants of the bound.
     start : Fraction
-        Bound on every initial error |e_i|.
+        Bound on every initial error |e_i|, in the unit of e_i.
     seconds : float
         Bound on the settling time from all these initial errors [s], rounded up.
     """
@@ -41,14 +43,14 @@ class Settling:
 
 
 def settling(certificate: Certificate, start: Number = 1, model: LoopField | None = None) -> Settling | None:
-    """Bound on the settling time from all |e_i| ≤ start; None without a claimed decay or finite time.
+    """Bound on the settling time from all |e_i| ≤ start; None without a claimed decay or finite-time convergence.
 
     Parameters
     ----------
     certificate : Certificate
         Certificate that was already checked.
     start : number or text
-        Bound on the size of every error, in units that do not depend on the states (`LoopField.units`).
+        Bound on every initial |e_i|, in the unit of e_i; `LoopField.units` converts errors to states.
     model : LoopField, optional
         Loop of the law, for the units of its states; by default that of the law that the certificate names.
     """
@@ -80,18 +82,19 @@ def fastest_settling(
     start: Number = 1,
     degrees: int | Iterable[int] | None = None,
 ) -> tuple[Certificate, Settling] | None:
-    """Certificate with the largest κ found for its V, for the degree of V that settles fastest; None if none.
+    """Certificate with the smallest bound on the settling time over the degrees of V tried; None without a proof.
 
-    κ is 1 % below the largest for this V, which has the largest margins but not the fastest decay of its degree.
+    κ is 1 % below the largest value that the solver finds for its V. This V has the largest margins of its degree, so
+    another V of this degree may decay faster.
 
     Parameters
     ----------
     subject, gains, lipschitz, gain_range
         See `certify`.
     start : number or text
-        Initial bound on every |e_i| for which the settling times are compared.
+        Bound on every initial |e_i| for which the settling times are compared.
     degrees : int or iterable of int, optional
-        Degrees of V; by default those of `certify`, up to two successful ones.
+        Degrees of V to try; by default those of `certify`, until two of them succeed.
 
     Raises
     ------

@@ -8,4 +8,4 @@ from .running import campaign_problem as campaign_problem
 from .running import run_campaign as run_campaign
 from .space import Sample as Sample
 from .space import Space as Space
-from .space import Worst as Worst
+from .space import WorstSample as WorstSample

@@ -15,7 +15,7 @@ from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError, require_known
 from quakedesign.files import Json, write_whole
 from quakedesign.simulation.campaign.problem import CampaignProblem, SampleResult
-from quakedesign.simulation.campaign.space import UNITS, Worst
+from quakedesign.simulation.campaign.space import UNITS, WorstSample
 from quakedesign.simulation.recorder import EVENTS, Metrics
 from quakedesign.simulation.trajectory import KINDS, Outcome, Trajectory
 
@@ -35,7 +35,7 @@ def figure(title: str, caption: str, shown: Mapping[str, tuple[np.ndarray, Mappi
     Parameters
     ----------
     shown : mapping of str to tuple
-        By metric with its unit: values of the samples, nan where there is none, and quantiles to mark.
+        For each metric with its unit: values of the samples, nan if missing, and the quantiles to mark.
     """
     from matplotlib.figure import Figure
 
@@ -98,7 +98,7 @@ class Failure:
     Attributes
     ----------
     samples : tuple of str
-        Indices of its samples; samples of the search are called ``search-0`` and so on.
+        Indices of the samples in the batch; samples of the search are named ``search-0``, ``search-1``, ….
     reason : str
     """
 
@@ -114,20 +114,20 @@ class Campaign:
     ----------
     problem : CampaignProblem
     results : tuple of SampleResult or None
-        By index; None for a sample of a batch that failed.
+        Results in the order of the sample index; None if the batch of the sample failed.
     failures : tuple of Failure
     resumed : int
         Number of samples whose result was read from the folder.
-    search : Worst or None
+    search : WorstSample or None
     seconds : float
-        Wall-clock time of this call [s].
+        Wall-clock time of the call of `run_campaign` [s].
     """
 
     problem: CampaignProblem = field(repr=False)
     results: tuple[SampleResult | None, ...] = field(repr=False)
     failures: tuple[Failure, ...] = ()
     resumed: int = 0
-    search: Worst | None = None
+    search: WorstSample | None = None
     seconds: float = 0.0
 
     @cached_property
@@ -136,7 +136,7 @@ class Campaign:
         return metric_names([result for result in self.results if result])
 
     def values(self, metric: str) -> "np.ndarray":
-        """One metric of all samples, shape (samples,): infinite for a diverged one, nan for one that failed.
+        """One metric of all samples, shape (samples,): nan if the batch failed, ±∞ if the run diverged or has no value.
 
         Raises
         ------
@@ -144,15 +144,15 @@ class Campaign:
             When the samples have no such metric.
         """
         require_metric(metric, self.metrics)
-        return np.array([math.nan if result is None else badness(result, metric) for result in self.results]) * (
+        return np.array([math.nan if result is None else severity(result, metric) for result in self.results]) * (
             -1 if metric in _LESS_IS_WORSE else 1
         )
 
     def quantiles(self, levels: Sequence[float] = LEVELS) -> dict[str, dict[str, float | None]]:
-        """Quantiles of every metric over the samples that did not fail, by level; None where they diverge.
+        """Quantiles of every metric, by level, over the samples that did not fail; None if the quantile is infinite.
 
-        A quantile is the value of a sample (inverse of the distribution function). For `min_pressure`, where less is
-        worse, it is counted from above, so that high levels are bad for every metric.
+        A quantile is the value of one sample (inverse of the empirical distribution function). For `min_pressure`,
+        where smaller is worse, samples are ordered from the largest down, so that high levels are bad for every metric.
 
         Raises
         ------
@@ -170,9 +170,9 @@ class Campaign:
         return {f"{level:g}": _finite(way * ordered[place]) for level, place in places.items()}
 
     def worst(self, metric: str, count: int = SHOWN) -> list[int]:
-        """Indices of the worst samples by one metric, the worst first, diverged ones before all others."""
+        """Indices of the samples that are worst in one metric, worst first; diverged samples precede all others."""
         require_metric(metric, self.metrics)
-        known = [(-badness(result, metric), i) for i, result in enumerate(self.results) if result]
+        known = [(-severity(result, metric), i) for i, result in enumerate(self.results) if result]
         return [i for _, i in sorted(known)[:count]]
 
     @cached_property
@@ -193,7 +193,7 @@ class Campaign:
         return {kind: [i for i, own in pairs if own == kind] for kind in KINDS}
 
     def trajectory(self, index: int | str, samples: int = 2000) -> Trajectory:
-        """Run one sample again with about `samples` instants; the results equal those of the campaign bitwise.
+        """Rerun one sample and store about `samples` instants; the results equal those of the campaign bitwise.
 
         Parameters
         ----------
@@ -203,7 +203,7 @@ class Campaign:
         Raises
         ------
         ParameterError
-            If there is no such sample.
+            If the index is not 0 to 2^20 − 1, or is not the name of a sample of the search.
         """
         if not isinstance(index, str):
             return self.problem.trajectory(self.problem.sample(index), samples)
@@ -243,7 +243,7 @@ class Campaign:
         }
 
     def to_pandas(self) -> "pd.DataFrame":
-        """Return a pandas DataFrame by index: varied numbers and metrics with units, nan where unknown."""
+        """Return a pandas DataFrame, one row per sample: varied numbers, outcome, and metrics as in `values`."""
         import pandas as pd
 
         numbers = [self.problem.sample(i).numbers for i in range(len(self.results))]
@@ -309,11 +309,11 @@ def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
 def require_metric(metric: str, known: Sequence[str]) -> None:
     """Raise if a metric is unknown."""
     if not known:
-        raise ParameterError(f"metric must be one of a run without divergence, but all diverge. Received {metric!r}.")
+        raise ParameterError(f"metric {metric!r} has no value, since all runs diverged")
     require_known(metric, known, "metric")
 
 
-def badness(result: SampleResult, metric: str) -> float:
+def severity(result: SampleResult, metric: str) -> float:
     """Value of a metric, negated where less is worse; infinite for a diverged sample or a missing value."""
     if result.diverged or metric not in result.figures:
         return math.inf

@@ -54,14 +54,14 @@ def differences(one: Any, other: Any, name: str = "") -> list[str]:
 
 
 def _listed(names: list[str]) -> str:
-    """The first few names as text, without the digest that follows from the other entries."""
+    """The first few names as text, without `arithmetic`, which is a digest of other entries."""
     chosen = [name or "everything" for name in names if name != "arithmetic"] or names
     return ", ".join(chosen[:_NAMED]) + " and more" * (len(chosen) > _NAMED)
 
 
 @dataclass(frozen=True)
 class Ledger:
-    """Results of a campaign on disk: the final vector of a sample, by its initial vector."""
+    """Results of a campaign on disk: final vectors of the samples, indexed by their initial vectors."""
 
     folder: Path
     fingerprint: str  # Digest of all inputs of the campaign
@@ -95,8 +95,8 @@ class Ledger:
             ledger._clear()
         elif changed:
             raise SimulationError(
-                f"the campaign in {folder} must have the same settings to be resumed. Received changes of "
-                f"{_listed(changed)}. Choose a new folder, or replace the campaign by force."
+                f"the campaign in {folder} can be resumed only with the same settings. These differ: "
+                f"{_listed(changed)}. Choose a new folder, or replace the campaign: renew=True, --force."
             )
         ledger._create()
         write_whole(folder / MANIFEST, text + "\n")
@@ -135,7 +135,7 @@ class Ledger:
         return differences(held, inputs)
 
     def read(self) -> "dict[bytes, np.ndarray]":
-        """Final vectors by the bytes of the initial vectors; damaged files are skipped.
+        """Final vectors, indexed by the bytes of the initial vectors; damaged files are skipped.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class Ledger:
         return list(zip(starts, ends, strict=True))
 
     def add(self, starts: "np.ndarray", ends: "np.ndarray") -> None:
-        """Write a batch, one sample a row.
+        """Write a batch, one sample per row.
 
         Raises
         ------

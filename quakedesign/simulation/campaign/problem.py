@@ -1,6 +1,6 @@
 """Campaign problems: one closed loop, the variation of its samples, and the program that computes them.
 
-Chapters: interface; rate-and-state faults in slow sliding; compiled call for many samples; new seeds for the noise;
+Chapters: interface; rate-and-state faults in slow sliding; compiled steps of many samples; seeds of the noise;
 loops with a fixed step.
 """
 
@@ -64,7 +64,7 @@ NOT_COMPARED = ("settled_from", "steps", "seconds")
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SampleResult:
-    """Result of a sample's run; a diverged sample has events, and of the metrics at most its peak slip rate.
+    """Result of the run of one sample; for a diverged sample, the events and at most the peak slip rate.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class SampleResult:
 
     @property
     def diverged(self) -> bool:
-        """Whether the run has ended early."""
+        """Whether the run diverged."""
         return "diverged" in self.events
 
 
@@ -89,9 +89,9 @@ class CampaignProgram(Protocol):
     Attributes
     ----------
     lanes : int
-        Samples that are stepped at once.
+        Number of samples that are advanced simultaneously.
     batch_steps : int
-        Steps of all samples of a batch together, about half a minute: the loss when a worker dies.
+        Largest total number of steps of a batch, about half a minute of work, which is lost if a worker dies.
     """
 
     lanes: ClassVar[int]
@@ -99,13 +99,13 @@ class CampaignProgram(Protocol):
 
     @property
     def fingerprint(self) -> str:
-        """Digest of the arithmetic."""
+        """Digest of everything in the program that determines the numerical results and is not in `inputs`."""
 
     def compiled(self, folder: Any) -> "CampaignProgram":
         """The same program, compiled for this machine if possible, with files in a private folder."""
 
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
-        """Final vectors of samples from their initial vectors, one a row."""
+        """Final vectors of samples from their initial vectors, one per row."""
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -129,7 +129,7 @@ class CampaignProblem(ABC):
         Raises
         ------
         ParameterError
-            If `index` is not a whole number, or too large.
+            If `index` is negative, or 2^20 or larger.
         """
         if not 0 <= index < MOST_SAMPLES:
             raise ParameterError(f"index must be a whole number, 0 to {MOST_SAMPLES - 1}. Received {index!r}.")
@@ -141,7 +141,7 @@ class CampaignProblem(ABC):
         Raises
         ------
         ParameterError
-            If `index` is not a whole number, or too large.
+            If `index` is negative, or 2^20 or larger.
         """
         return self.space.sample(self.point(index), noise_seed(self.seed, index))
 
@@ -150,13 +150,13 @@ class CampaignProblem(ABC):
         """Initial vector of a sample."""
 
     def starts(self, samples: Sequence[Sample]) -> "np.ndarray":
-        """Initial vectors of samples, one a row."""
+        """Initial vectors of samples, one per row."""
         return np.array([self.start(sample) for sample in samples])
 
     @property
     @abstractmethod
     def program(self) -> CampaignProgram:
-        """Program from the initial to the final vectors of samples."""
+        """Program that computes the final vectors of samples from the initial vectors."""
 
     @abstractmethod
     def results(self, ends: "Sequence[np.ndarray]") -> list[SampleResult]:
@@ -215,7 +215,7 @@ _FACTORS = tuple(field.name for field in fields(SlidingVariation))
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingProgram:
-    """A run of `simulate_sliding` for every sample, from its numbers to its metrics and event times."""
+    """Run of `simulate_sliding` for each sample: maps the varied numbers to metrics and event times."""
 
     lanes: ClassVar[int] = 1
     batch_steps: ClassVar[int] = 10_000
@@ -224,7 +224,7 @@ class SlidingProgram:
     law: LinearLaw
     step: Fraction  # T_s [s]
     path: PressurePath
-    # stress, period: Amplitude [Pa] and period [s] of the stress of a sample with the relative amplitude 1
+    # stress, period: Largest amplitude [Pa], and period [s], of the stress; a sample scales it by `amplitude`
     stress: float
     period: float
     plant: str
@@ -261,7 +261,7 @@ class SlidingProgram:
         )
 
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
-        """Metrics, then times of events, one sample a row; nan for missing ones."""
+        """Metrics and then event times, one sample per row; nan for missing values."""
         duration = steps * float(self.step)
         return np.array([_sample_row(self.run([float(v) for v in row], duration, 1)) for row in np.atleast_2d(starts)])
 
@@ -280,7 +280,7 @@ class SlidingProblem(CampaignProblem):
     ----------
     method : str
     stress, stress_period : float
-        Bound [Pa] and period [s] of the stress.
+        Largest amplitude [Pa] and period [s] of the sinusoidal stress.
     """
 
     method: str
@@ -300,7 +300,7 @@ class SlidingProblem(CampaignProblem):
         if self.scheme != simulation_scheme("explicit", actuator=getattr(self.scheme, "actuator", DIRECT)):
             entries = {"scheme": self.scheme.name} | {k: v for k, v in self.scheme.settings.items() if k != "actuator"}
             raise ParameterError(
-                "scheme of a campaign of slow sliding must be explicit, with exact slip and one substep. Received "
+                "a campaign of slow sliding needs the scheme explicit, exact measurement and one substep. Received "
                 f"{', '.join(f'{k} {v}' for k, v in entries.items())}. Omit scheme, measurement and substeps."
             )
 
@@ -354,7 +354,7 @@ class SlidingProblem(CampaignProblem):
 
 
 def sliding_space(fault: Fault, spread: Fraction) -> Space:
-    """Space of relative errors of a, b and D_c [-], the fault's box, and amplitude and phase of a sine of stress.
+    """Space of the factors of a, b, D_c, σ', k and η [-], and of amplitude [-] and phase [rad] of a sinusoidal stress.
 
     Raises
     ------
@@ -374,7 +374,7 @@ def sliding_space(fault: Fault, spread: Fraction) -> Space:
 # One step of a loop as source text, and the compiled call that repeats it for many samples.
 
 Mover = Callable[["np.ndarray", int], None]
-SLICE = 200_000  # steps of all samples in one call of compiled code, which cannot be interrupted: below one second
+SLICE = 200_000  # steps, summed over all samples, per call of compiled code, which cannot be interrupted: less than 1 s
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -414,11 +414,11 @@ class CompiledProgram:
     lanes: ClassVar[int] = LANES
     batch_steps: ClassVar[int] = 80_000_000
 
-    source: str  # C text with ``advance_samples``, which steps several of them at once
+    source: str  # C source with ``advance_samples``, which advances several samples simultaneously
     # The step with all elementary functions written out, serialised by CasADi, for workers without a C compiler
     function: str
     size: int  # Length of the vector of one sample
-    diverged: int  # Index of the time of divergence in it
+    diverged: int  # Index of the time of divergence in this vector
     library: Library | None = None  # None before the source is compiled
 
     @classmethod
@@ -433,7 +433,7 @@ class CompiledProgram:
         return hashlib.sha256(self.function.encode()).hexdigest()
 
     def compiled(self, folder: Path) -> "CompiledProgram":
-        """Program with a library in a folder, which must be private; the same program if no compiler works."""
+        """Program with a library compiled into a private folder; the program itself if no compiler works."""
         try:
             command = compiler()
             built = shared_library(self.source, folder, command, (*LANE_FLAGS, *processor_flags(command)))
@@ -442,7 +442,7 @@ class CompiledProgram:
             return self
 
     def ends(self, starts: "np.ndarray", steps: int) -> "np.ndarray":
-        """Vectors after a number of steps, one a row, in interruptible slices; a diverged sample stops.
+        """Vectors after a number of steps, one per row, computed in interruptible slices; a diverged sample stops.
 
         Parameters
         ----------
@@ -459,7 +459,7 @@ class CompiledProgram:
 
 @lru_cache(maxsize=8)
 def mover(program: CompiledProgram) -> Mover:
-    """Callable (vectors, steps) that advances vectors, one a row, in place: in machine code if available.
+    """Callable (vectors, steps) that advances vectors in place, one per row; in machine code if available.
 
     A library that is missing or was changed, as on another machine, is built again.
     """
@@ -522,7 +522,7 @@ Value = TypeVar("Value")
 def reseeded(value: Value, seed: int) -> Value:
     """Copy of a frozen dataclass or tuple in which every field ``seed`` is derived from a given seed.
 
-    Nested fields are included. All derived seeds differ, so that noises stay independent.
+    Nested fields are included. All derived seeds differ, so that the noise signals are independent.
     """
     walked: Value = _walk(value, seed, [0])
     return walked
@@ -568,7 +568,7 @@ class SteppedProblem(CampaignProblem):
     load: Load
 
     def recorder(self, sample: Sample) -> Recorder:
-        """Loop of a sample with all recorded quantities."""
+        """Recorder of the loop of a sample."""
         numbers = dict(sample.numbers)
         varied = Variation(**{name: numbers.pop(name) for name in names()})
         initial = numbers["initial_slip"], numbers["initial_slip_rate"]

@@ -20,7 +20,7 @@ from quakedesign.laws import Controller
 from quakedesign.loop import Scheme
 from quakedesign.loop.schemes import scheme_of_run
 from quakedesign.parallel import Crew, crew_of
-from quakedesign.simulation.campaign.campaign_result import Campaign, Failure, badness, metric_names, require_metric
+from quakedesign.simulation.campaign.campaign_result import Campaign, Failure, metric_names, require_metric, severity
 from quakedesign.simulation.campaign.ledger import Ledger
 from quakedesign.simulation.campaign.problem import (
     CampaignProblem,
@@ -30,7 +30,7 @@ from quakedesign.simulation.campaign.problem import (
     SteppedProblem,
     sliding_space,
 )
-from quakedesign.simulation.campaign.space import Sample, Space, Worst, require_count, search
+from quakedesign.simulation.campaign.space import Sample, Space, WorstSample, require_count, search
 from quakedesign.simulation.closed_loop import Load
 from quakedesign.simulation.integrators import DormandPrince, integrator
 from quakedesign.simulation.run_settings import STICK_SLIP, RunSetting, designed_path, sampled_scheme
@@ -41,7 +41,7 @@ from quakedesign.simulation.state_plant import TIDE
 # Dispatch of batches to workers until each has a result or has failed a bounded number of times.
 
 ATTEMPTS = 3
-_MOST_DEATHS = 2 * ATTEMPTS  # consecutive deaths from which it follows that the workers cannot run at all
+_MOST_DEATHS = 2 * ATTEMPTS  # after more consecutive deaths than this, the workers are assumed unable to run at all
 _DEATH = (
     "a worker died each time that this batch was computed: out of memory, killed, or started by a script without "
     "if __name__ == '__main__':"
@@ -51,10 +51,10 @@ _DEATH = (
 def dispatch(
     task: Callable[..., Any], batches: Mapping[int, tuple[Any, ...]], crew: Crew, keep: Callable[[int, Any], None]
 ) -> dict[int, str]:
-    """Reasons why batches failed, by their key; a successful batch has no entry.
+    """Run all batches, and return the reason of each failure by the key of its batch.
 
-    A worker that dies stops the whole pool, so that the batch that caused it is not known: all running batches are
-    suspects, and are computed again one at a time. Only a batch that ran alone is charged with a death.
+    A worker that dies stops the whole pool, and it is unknown which batch caused the death. All running batches are
+    therefore repeated one at a time; a death counts as a failure of a batch only if that batch ran alone.
 
     Parameters
     ----------
@@ -62,6 +62,8 @@ def dispatch(
         Computes one batch from its arguments.
     batches : mapping of int to tuple
         Arguments, by key.
+    crew : Crew
+        Workers.
     keep : callable
         Called with the key and result of each finished batch, in any order.
     """
@@ -90,7 +92,7 @@ class _Dispatch:
         return self._failed
 
     def _fill(self) -> list[int]:
-        """Start as many batches as the crew takes at once; return one that a broken executor rejects."""
+        """Submit batches until all workers are busy; return the batch that a broken executor rejects, if any."""
         queue, most = (self._suspects, 1) if self._suspects else (self._waiting, self._crew.width)
         while queue and len(self._running) < most:
             key = queue.popleft()
@@ -170,24 +172,24 @@ def campaign_problem(
     stress_period: float = TIDE,
     seed: int = 0,
 ) -> CampaignProblem:
-    """Closed loop and the space of its samples.
+    """Campaign problem: one closed loop and the ranges of its varied parameters.
 
     Parameters
     ----------
     fault : Fault
     controller : Controller, optional
-        None: the pressure stays zero. For friction with a state an e-LQR of `design`, which keeps the sliding slow.
+        None: the pressure is 0. Friction with a state requires an e-LQR from `design`, under which sliding stays slow.
     scheme, step, method, duration, settled_from, plant, load
-        As in `simulate`; step [s], duration [s], settled_from [s].
+        As in `simulate`, but the default scheme is ``"explicit"``; step, duration, settled_from [s].
     initial_slip : float
         Largest initial slip of a sample [m].
     initial_slip_rate : float
         Largest initial slip rate of a sample [m/s].
     spread : float or Fraction
-        For friction with a state: largest relative error of a, b and D_c [-]. σ', k and η vary within the fault's box;
-        the authority of this box is the relative error of σ'.
+        For friction with a state: largest relative error of a, b and D_c [-]. σ', k and η vary within the fault's box,
+        where `authority` is the relative error of σ'.
     stress, stress_period : float
-        For friction with a state: bound [Pa] and period [s] of a sinusoidal shear stress of varied amplitude and phase.
+        For friction with a state: largest amplitude [Pa] and period [s] of a sinusoidal stress of varied phase.
     seed : int
         Seed of the Sobol' sequence and of all other random numbers.
 
@@ -206,7 +208,7 @@ def campaign_problem(
         entries["scheme"] = sampled_scheme(way, substeps, actuator, **own)
         if spread or stress:
             raise ParameterError(
-                f"spread and stress need friction with a state. Received {fault.friction.name}. Omit both."
+                f"spread and stress apply only to friction with a state. Received {fault.friction.name}. Omit both."
             )
         space = Space.of(fault, initial_slip=initial_slip, initial_slip_rate=initial_slip_rate)
         entries.update(space=space, plant=plant or STICK_SLIP, load=load or Load())
@@ -216,8 +218,8 @@ def campaign_problem(
         entries["scheme"] = sampled_scheme(way, **own)
         if load not in (None, Load()) or initial_slip or initial_slip_rate:
             raise ParameterError(
-                "friction with a state needs steady sliding as initial condition and a stress as disturbance. Received "
-                f"a load, an initial slip or an initial slip rate with {fault.friction.name}. Omit these."
+                "load, initial_slip and initial_slip_rate do not apply to friction with a state. Received one of "
+                f"these with {fault.friction.name}. Omit these; use stress for a disturbance."
             )
         space = sliding_space(fault, rational(spread, "spread"))
         solver = "cvodes" if method == DormandPrince.name else method
@@ -245,8 +247,8 @@ def run_campaign(
 
     After an interruption at any moment the same call resumes from the files. Its result equals that of an
     uninterrupted call bitwise, for any kind and number of workers. A call with more samples computes only the new ones.
-    Results depend neither on the processor nor on the C compiler and its library, except for loads with tan, inverse
-    functions or hyperbolic functions other than tanh.
+    Results do not depend on the processor, the C compiler or the C library, unless a load contains tan, an inverse
+    function, or a hyperbolic function other than tanh.
 
     Parameters
     ----------
@@ -257,17 +259,17 @@ def run_campaign(
     folder : str or Path
         New, empty, or that of this campaign. It contains one file for each finished batch.
     metric : str, optional
-        Search for the worst value of this metric, starting from the worst sample and the corners of the box.
+        Metric whose worst value is searched for, from the worst sample and the corners of the box; no search if None.
     rounds : int
-        Number of rounds of that search.
+        Number of rounds of this search.
     workers : int, optional
         Number of processes; one per core unless given.
     scheduler : str, optional
-        Address of a dask.distributed scheduler that is used instead.
+        Address of a dask.distributed scheduler to use in place of local processes.
     executor : Executor, optional
-        Any other executor of `concurrent.futures` that is used instead.
+        Executor in the sense of `concurrent.futures` to use in place of local processes.
     batch : int, optional
-        Samples in a batch; unless given, as many as take about half a minute.
+        Number of samples in a batch; by default such that a batch takes at most about half a minute.
     renew : bool
         Delete another campaign in the folder; the same campaign is resumed.
     tell : callable
@@ -279,8 +281,11 @@ def run_campaign(
 
     Raises
     ------
-    ParameterError, OutputError
-    SimulationError
+    ParameterError
+        If the number of samples or the metric is not valid.
+        OutputError
+        If the folder contains other files, or cannot be written.
+        SimulationError
         If the folder contains another campaign, or the workers cannot be reached.
     """
     require_count(samples)
@@ -365,16 +370,16 @@ class _Runner:
             require_count(self._batch)
             return self._batch
         width, steps, lanes = self._crew.width, self._problem.setting.steps, self._program.lanes
-        wished = min(LARGEST_BATCH, -(-count // (BATCHES_PER_WORKER * width)), self._program.batch_steps // steps)
-        return max(1, min(-(-count // width), max(lanes, wished // lanes * lanes)))
+        preferred = min(LARGEST_BATCH, -(-count // (BATCHES_PER_WORKER * width)), self._program.batch_steps // steps)
+        return max(1, min(-(-count // width), max(lanes, preferred // lanes * lanes)))
 
-    def search(self, results: Sequence[SampleResult | None], metric: str, rounds: int) -> Worst | None:
+    def search(self, results: Sequence[SampleResult | None], metric: str, rounds: int) -> WorstSample | None:
         """Worst sample by a metric, searched from the worst result and the corners; None if all failed."""
         known = [(i, result) for i, result in enumerate(results) if result]
         if not known:
             return None
         require_metric(metric, metric_names([result for _, result in known]))
-        first = max(known, key=lambda pair: badness(pair[1], metric))[0]
+        first = max(known, key=lambda pair: severity(pair[1], metric))[0]
         counter = 0
 
         def evaluate(samples: Sequence[Sample]) -> list[float]:
@@ -382,7 +387,7 @@ class _Runner:
             names = [f"search-{counter + i}" for i in range(len(samples))]
             counter += len(samples)
             found = self.results(samples, names, f"search, {counter} samples")
-            return [-math.inf if result is None else badness(result, metric) for result in found]
+            return [-math.inf if result is None else severity(result, metric) for result in found]
 
         start, seed = self._problem.point(first), self._problem.sample(first).noise_seed
         return search(self._problem.space, metric, evaluate, [start], noise_seed=seed, rounds=rounds)

@@ -1,7 +1,7 @@
 """Sample space of a campaign, and pattern search for the worst sample.
 
-Samples are points of a scrambled Sobol' sequence, a function of seed and index alone. The search starts
-from the corners of the box (Hooke and Jeeves 1961); the worst case found is a lower bound.
+Samples are points of a scrambled Sobol' sequence, a function of seed and index alone. The pattern search (Hooke and
+Jeeves 1961) starts from given points and all corners of the box. The worst value found is a lower bound.
 """
 
 import math
@@ -32,8 +32,8 @@ class Sample:
     Attributes
     ----------
     numbers : mapping of str to float
-        Varied numbers by the names of the space; the initial x1 [m] and x2 [m/s] are ``initial_slip`` and
-        ``initial_slip_rate``.
+        Values of the varied parameters, by the names in `Space.ranges`; ``initial_slip`` [m] and ``initial_slip_rate``
+        [m/s] are the initial x1 and x2.
     noise_seed : int
         Seed of the measurement noise.
     """
@@ -44,7 +44,7 @@ class Sample:
 
 @checked_dataclass(frozen=True)
 class Space:
-    """Interval of every number that varies between samples, with a uniform distribution.
+    """Intervals of the parameters that vary between samples, each with a uniform distribution.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Space:
 
     @classmethod
     def of(cls, fault: Fault, *, initial_slip: float = 0.0, initial_slip_rate: float = 0.0) -> "Space":
-        """Space of a fault's uncertainty box and disturbance, and of initial states from rest up to given bounds.
+        """Space of a fault's uncertainty box, its disturbance, and initial states between 0 and given bounds.
 
         Parameters
         ----------
@@ -72,7 +72,7 @@ class Space:
 
     @property
     def active(self) -> tuple[int, ...]:
-        """Indices of the coordinates whose interval is more than a point."""
+        """Indices of the coordinates whose interval has positive length."""
         return tuple(i for i, (low, high) in enumerate(self.ranges.values()) if high > low)
 
     @property
@@ -118,7 +118,7 @@ def noise_seed(seed: int, index: int) -> int:
 
 
 def require_count(samples: int) -> None:
-    """Raise if a number of samples is out of range."""
+    """Raise if the number of samples is not a whole number in 1 … 2^20."""
     if not is_whole(samples, 1, MOST_SAMPLES):
         raise ParameterError(f"samples must be a whole number, 1 to {MOST_SAMPLES}. Received {samples!r}.")
 
@@ -133,14 +133,14 @@ Evaluate = Callable[[Sequence[Sample]], "Sequence[float]"]
 
 
 @checked_dataclass(frozen=True, kw_only=True)
-class Worst:
-    """Worst sample of a search: a lower bound of the worst case.
+class WorstSample:
+    """Worst sample of a search; its value is a lower bound of the worst case.
 
     Attributes
     ----------
     metric : str
     value : float
-        Infinite for a run that diverges.
+        Value to be maximised: the metric, negated if smaller is worse; infinite for a run that diverges.
     sample : Sample
     index : int
         Index in `looked_at`, the samples of the search in order.
@@ -179,18 +179,18 @@ def search(
     *,
     noise_seed: int,
     rounds: int,
-) -> Worst:
-    """Worst sample from given starts and all corners, by pattern search (Hooke and Jeeves 1961) in whole batches.
+) -> WorstSample:
+    """Worst sample by pattern search (Hooke and Jeeves 1961) from given points and all corners, evaluated in batches.
 
-    Every round computes all neighbours of the worst point so far; if none is worse, the span is halved. The noise
-    is the same in all samples, so that they differ by their point alone.
+    Every round evaluates all neighbours of the worst point so far; if none of these is worse, the span is halved. All
+    samples have the same noise, so that they differ in their point alone.
 
     Parameters
     ----------
     metric : str
         Name of the metric, passed to the result.
     evaluate : callable
-        Badness of samples: larger is worse; an infinite value ends the search.
+        Returns one value per sample; larger is worse, and an infinite value ends the search.
     starts : sequence of sequence of float
         Points of the unit cube.
     """
@@ -214,4 +214,4 @@ def search(
             value, centre, index = found
         else:
             span /= 2
-    return Worst(metric=metric, value=value, sample=looked_at[index], index=index, looked_at=tuple(looked_at))
+    return WorstSample(metric=metric, value=value, sample=looked_at[index], index=index, looked_at=tuple(looked_at))

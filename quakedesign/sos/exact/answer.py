@@ -37,12 +37,13 @@ class Answer:
     statement : Statement
         The decided statement, with the multiplier and the degree that were used.
     proof : SumOfSquares, Functional, Point or None
+        Proof or refutation; None if the statement is undecided.
     blocks : mapping of str to list of int
         Sizes of the Gram matrices before and after reduction.
     seconds : float
-        Wall time [s].
+        Wall time of the search [s].
     versions : mapping of str to str
-        Solver and arithmetic used.
+        Versions of this package, the solver and the arithmetic, by package name.
     remark : str
         Note that is reported with the verdict, such as whether a given Gram matrix was used; may be empty.
     """
@@ -63,8 +64,8 @@ class Answer:
     def set_is_empty(self) -> bool:
         """Whether the set is evidently empty, so that a proof of positivity on it is vacuous.
 
-        It is if a negative constant is proved to be non-negative on it, or if a constraint has only even exponents and
-        a constant term, and all coefficients are negative (inequality) or of one sign (equality).
+        This is so if a negative constant is proved to be non-negative on it, or if a constraint has only even exponents
+        and a constant term, and all coefficients are negative (inequality) or of one sign (equality).
         """
         statement = self.statement
         below = [

@@ -1,7 +1,8 @@
 """Regions of attraction of polynomial fields by Lyapunov functions: claim, proof, files.
 
-The claim holds if V is a sum of squares and μ·(−V̇) = σ_0 + (level − V)·σ_1, with positive definite Gram matrices; see
-the first chapter. Further chapters: files of regions (proofs/FORMAT.md) and of fields (TOML).
+The claim holds if V is a sum of squares, μ·(−V̇) = σ_0 + (level − V)·σ_1, all Gram matrices are positive definite,
+and the bases contain a pure power of every state; see the first chapter. Further chapters: files of regions
+(proofs/FORMAT.md) and of fields (TOML).
 """
 
 import json
@@ -62,7 +63,7 @@ class Attraction:
     ----------
     variables : tuple of str
     field : tuple of Polynomial
-        One for every variable.
+        Time derivatives of the variables, in their order.
     lyapunov : Polynomial
         V.
     level : Fraction or None
@@ -204,7 +205,7 @@ class Region:
 
     @property
     def level(self) -> Fraction | None:
-        """Proved level; None if no level or the whole space is proved."""
+        """Proved level; None if nothing is proved, and also if the whole space is proved (see `verdict`)."""
         return None if self.proved is None else self.proved.level
 
     @property
@@ -371,7 +372,7 @@ _LARGEST = 1 << 16  # bytes
 
 
 def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
-    """Rates of the states by name, from the table ``field``, and V if given; all as text.
+    """Time derivatives of the states by name, from the table ``field``, and V or None; all as text.
 
     Raises
     ------

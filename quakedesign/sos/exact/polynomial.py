@@ -30,7 +30,7 @@ def ring(variables: int) -> fmpq_mpoly_ctx:
 
 def element(polynomial: Polynomial, variables: int) -> fmpq_mpoly:
     """Element of the ring."""
-    spend(len(polynomial), longest(polynomial.values()))  # converts to a common denominator
+    spend(len(polynomial), longest(polynomial.values()))  # the conversion computes a common denominator
     entries = {e: fmpq(c.numerator, c.denominator) for e, c in polynomial.items() if c}
     return ring(variables).from_dict(entries)
 
@@ -207,7 +207,8 @@ def positive_definite_integers(rows: Sequence[Sequence[int]]) -> bool:
     are nonzero and alternate in sign.
     """
     bits = max((abs(v).bit_length() for row in rows for v in row), default=0)
-    spend(1 + len(rows) ** 4 * (bits + 10) // 100_000)  # modulo one prime after another, some nanoseconds each
+    # the algorithm works modulo many primes; an operation takes a few nanoseconds
+    spend(1 + len(rows) ** 4 * (bits + 10) // 100_000)
     coefficients = reversed(fmpz_mat(rows).charpoly().coeffs())
     return all((-c if power % 2 else c) > 0 for power, c in enumerate(coefficients))
 

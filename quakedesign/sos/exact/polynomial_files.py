@@ -43,7 +43,7 @@ class GramEntries(Entries):
 
     def square(self, statement: Statement) -> Square:
         """Square; its sizes must match the statement."""
-        need(self.product in statement.products, "a square has a product that is not listed")
+        need(self.product in statement.products, "the product of a square is not among the products of the statement")
         n, size = len(statement.variables), len(self.basis)
         basis = tuple(entry if isinstance(entry, tuple) else read_polynomial(entry) for entry in self.basis)
         monomials = [element for element in basis if isinstance(element, tuple)]

@@ -67,7 +67,9 @@ class Expansion:
     Parameters
     ----------
     text : str
-        Source of the excerpts in messages.
+        Text that messages quote.
+    variables : sequence of str
+        Names in the order of the exponents.
     """
 
     def __init__(self, text: str, variables: Sequence[str]) -> None:
@@ -476,7 +478,7 @@ def read_element(given: Any, names: tuple[str, ...]) -> Element:
 
 
 def _whole(exponent: Any) -> Any:
-    """Integer of an exponent, also if it is a whole float; text of any other value."""
+    """Exponent as an integer if its value is whole, otherwise as text, which is rejected later."""
     return floor(exponent) if isinstance(exponent, Real) and exponent % 1 == 0 else str(exponent)
 
 
@@ -525,7 +527,7 @@ def _constraint(given: Any, names: tuple[str, ...]) -> tuple[str, dict[Exponents
     read = parse_constraint if isinstance(given, str) else _read_relation
     kind, *_, polynomial = read(given, names)
     if not polynomial:
-        raise PolynomialError(f"a constraint must not be always true. Received {given}. Omit this constraint.")
+        raise PolynomialError(f"the constraint {given} reduces to 0 >= 0 or 0 == 0: omit it.")
     return kind, polynomial
 
 
@@ -541,5 +543,5 @@ def _read_relation(given: Any, names: tuple[str, ...]) -> tuple[str, dict[Expone
             return "equality", _sympy(given.lhs - given.rhs, names)
     raise PolynomialError(
         f"a constraint is text such as 'x >= 0', or a SymPy relation >=, <=, Eq. Received {given!s:.60}. "
-        "Strict inequalities are not closed; use >=."
+        "Strict inequalities are not supported, as their sets are not closed; use >=."
     )

@@ -199,7 +199,7 @@ class Functional:
     Attributes
     ----------
     values : mapping of exponents to Fraction
-        L of each monomial; zero for all others.
+        L of each listed monomial; L of every other monomial is zero.
     """
 
     values: Mapping[Exponents, Fraction]
@@ -312,7 +312,8 @@ def _sum(statement: Statement, squares: Iterable[tuple[Square, IntegerGram]]) ->
     for square, gram in squares:
         if square.product not in statement.products or not has_own_monomials(square.basis):
             raise ValueError(
-                "the product of a square is not one of the statement, or its basis is not in echelon form."
+                "the product of a square is not among those of the statement, or an element of its basis has no "
+                "monomial of its own."
             )
         if square.product not in products:
             products[square.product] = reduce(multiplied, (inequalities[i] for i in square.product), one)

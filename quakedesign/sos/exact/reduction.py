@@ -24,7 +24,7 @@ Bases = tuple[tuple[Exponents, ...], ...]
 
 
 def full_bases(statement: Statement) -> Bases:
-    """For every product of inequalities, all monomials whose squares times the product keep the degree bound."""
+    """For every product of inequalities, all monomials whose squares times the product respect the degree bound."""
     size = len(statement.variables)
     halves = [(statement.degree - degree(w)) // 2 for w in statement.weights]
     counts = [comb(size + h, size) if h >= 0 else 0 for h in halves]

@@ -180,11 +180,11 @@ def read_as(kind: type[_Kind], raw: object, what: str = "the file") -> _Kind:
         value = msgspec.convert(raw, kind, dec_hook=_decoded)
     except msgspec.ValidationError as error:
         reason, _, place = str(error).partition(" - at ")
-        reason = _PATTERN.sub("a name of up to 40 letters and digits", reason)
+        reason = _PATTERN.sub("a name of up to 40 letters, digits and underscores that begins with a letter", reason)
         place = place.replace("`", "").replace("$.", "").strip("$.")
         _reject(f"{place or what}: {reason[:1].lower()}{reason[1:].strip('.')}")
     if place := _difference(raw, written(value)):
-        _reject(f"{place.strip('. ')} must be a known key, and omitted where it has its default value")
+        _reject(f"{place.strip('. ')} is an unknown key, or has its default value, which must be omitted")
     return value
 
 

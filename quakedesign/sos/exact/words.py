@@ -47,7 +47,7 @@ def sentences(answer: Answer, *, verbose: bool = False) -> list[str]:
     if multiplier != "1":
         lines.append(f"multiplied by {multiplier}")
     lines += [*_reason(answer), *filter(None, [answer.remark])]
-    lines += ["the set is empty, so that this holds trivially"] if answer.set_is_empty else []
+    lines += ["the set is empty, so the statement holds trivially"] if answer.set_is_empty else []
     if verbose:
         lines += [
             f"Gram matrices {when} reduction: {' + '.join(map(str, sizes)) or 'none'}"
@@ -90,11 +90,11 @@ def _reason(answer: Answer) -> list[str]:
                 f"{n} = {exact_text(v)}" for n, v in zip(statement.variables, proof.coordinates, strict=True)
             )
             return [f"negative at {point}", f"value {_shown(evaluate(answer.statement.polynomial, proof.coordinates))}"]
-    return ["neither a rational proof nor a rational refutation was found; the polynomial remains undecided"]
+    return ["neither a rational proof nor a rational refutation was found"]
 
 
 def _shown(value: Fraction) -> str:
-    """Number as text; a long one is rounded up to six digits."""
+    """Number as text; a long one is rounded upward, to six significant digits."""
     if length(value) < 1000:
         return _short(exact_text(value))
     upwards = Context(prec=6, rounding=ROUND_CEILING)
@@ -115,7 +115,7 @@ def claim_words(claim: Attraction) -> list[str]:
     lines = [f"{name}' = {polynomial_words(f, names)}" for name, f in zip(names, claim.field, strict=True)]
     lines.append(f"V = {polynomial_words(claim.lyapunov, names)}")
     if claim.refutation is not None:
-        level = [f"level {claim.level} is not proved by V"] if claim.level is not None else []
+        level = [f"level {claim.level} is refuted for this V"] if claim.level is not None else []
         return [*lines, *level, *_point_words(claim)]
     if claim.proof is None:
         return lines
@@ -173,6 +173,6 @@ def _point_words(claim: Attraction) -> list[str]:
     point = ", ".join(f"{name} = {x}" for name, x in zip(claim.variables, claim.refutation.coordinates, strict=True))
     if claim.equilibrium:
         return [f"another equilibrium, which no region of attraction contains: {point}"]
-    what = "V is not positive" if claim.height <= 0 else "V does not fall"
-    above = "" if claim.height <= 0 else f", so that no level above {UpperBound(claim.height)} (rounded up) holds"
+    what = "V is not positive" if claim.height <= 0 else "V does not decrease"
+    above = "" if claim.height <= 0 else f", which refutes every level above {UpperBound(claim.height)} (rounded up)"
     return [f"{what} at {point}{above}"]

@@ -30,7 +30,7 @@ def limited(steps: int | None = None) -> Iterator[None]:
 
 
 def spend(steps: int, bits: int = 0) -> None:
-    """Count steps on integers of a bit length, whose weight is quadratic in it, like that of division.
+    """Count steps on integers of a bit length; a step costs 1 + bits²/2²⁰ units, as division is quadratic.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def spend(steps: int, bits: int = 0) -> None:
     left -= steps * (1 + (bits * bits >> 20))
     _left.set(left)
     if left < 0:
-        raise WorkError(f"the check takes more than {STEPS} steps of exact arithmetic. Shorten terms or digits.")
+        raise WorkError("the check exceeds its budget of exact arithmetic. Shorten terms or digits.")
 
 
 def counted() -> bool:
@@ -57,7 +57,7 @@ def length(number: Fraction) -> int:
 
 
 def longest(numbers: Iterable[Fraction]) -> int:
-    """Bound on the bit length of numbers over their common denominator, with its work counted; 0 outside `limited`."""
+    """Bound on the bit length of numbers over their common denominator; counts its own work; 0 outside `limited`."""
     if not counted():
         return 0
     top, common = 0, 1

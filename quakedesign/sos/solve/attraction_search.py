@@ -66,7 +66,7 @@ class _Rays:
         return [Arrays({e: c for e, c in polynomial.items() if sum(e) == k}, self.size) for k in range(top + 1)]
 
     def crossings(self, directions: np.ndarray, parts: list[Arrays]) -> np.ndarray:
-        """First point on each ray where a polynomial is not negative, one a row; infinite where there is none."""
+        """First point on each ray where a polynomial is not negative, one per row; infinite where there is none."""
         table = np.array([part.at(directions) for part in parts]).T
         distances = np.array([_first_root(row) for row in table])
         return np.where(
@@ -84,7 +84,7 @@ class _Rays:
         return float(self.heights((direction / np.linalg.norm(direction))[None, :])[0])
 
     def sampled(self) -> np.ndarray:
-        """Seeded random directions and those of the axes, one a row."""
+        """Seeded random directions and those of the axes, one per row."""
         random = np.random.default_rng(_SEED).standard_normal((_DIRECTIONS * self.size, self.size))
         return np.concatenate([random / np.linalg.norm(random, axis=1)[:, None], np.eye(self.size), -np.eye(self.size)])
 
@@ -165,7 +165,8 @@ _GROWTH = Fraction(1002, 1000)  # least growth of β in a round that continues t
 _INSIDE = Fraction(999999, 1000000)  # share of the level that V must not exceed where shape ≤ β
 # Shares of the β at which {shape ≤ β} touches the level set
 _SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))
-_SLACK = (Fraction(99, 100), Fraction(9, 10))  # share of level and β for the multipliers; at 1, V could not change
+# shares of level and β for which the multipliers are computed; at 1, V could not change
+_SLACK = (Fraction(99, 100), Fraction(9, 10))
 _MORE = (0, 2)
 _LOSS = 1e-3  # share of the largest β given up for a V with a margin
 _GRID = 2**20  # denominator of the coefficients of V
@@ -191,12 +192,17 @@ def with_shape(region: Region, shape: Polynomial) -> Region:
 
 
 def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
-    """Region with a larger part of the shape, by another V of degree at most `top`, from a proved region.
+    """Enlarge β of a proved region, where {shape ≤ β} lies in it, by searching V of degree up to `top`.
 
     Parameters
     ----------
+    given : Region
+        Proved region to start from.
+    shape : Polynomial
+    top : int
+        Largest degree of V; even.
     certify : callable
-        Proved region of a claim with another V.
+        Maps a claim with a new V to a region with a proved level.
     """
     best = with_shape(given, shape)
     for degree_now in range(2, top + 1, 2):
@@ -213,7 +219,7 @@ def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attr
 
 
 def _improved(region: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
-    """Unproved claims with another V, from multipliers with small and with large slack."""
+    """Unproved claims with new candidates for V, from multipliers computed with small, then with large slack."""
     claim, beta = region.proved, region.shape_level
     if claim is None or claim.level is None or beta is None:
         return
@@ -300,7 +306,8 @@ def decision_names(variables: tuple[str, ...], count: int) -> list[str]:
 _LEVEL_SHARES = tuple(
     Fraction(s) for s in ("999999/1000000", "9999/10000", "999/1000", "99/100", "9/10", "1/2", "1/10", "1/1000")
 )
-_UNBOUNDED = tuple(Fraction(10) ** power for power in range(6, -7, -1))  # levels tried when no point refutes the claim
+# levels tried if the search finds no refuting point
+_UNBOUNDED = tuple(Fraction(10) ** power for power in range(6, -7, -1))
 _FINEST = 1e-6  # finest step for which the levels of the bisection have few digits
 
 
@@ -348,14 +355,14 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
 def region_of_attraction(
     field: Mapping[Any, Any], V: Any = None, *, relative: float = 1e-4, degree: int | None = None, shape: Any = None
 ) -> Region:
-    """Find the largest level ρ with V̇ < 0 where V < ρ, except at the origin, which attracts {V < ρ}.
+    """Find the largest ρ for which {V < ρ} is a region of attraction of the origin.
 
     Parameters
     ----------
     field, V
         As for `stability`. By default V = xᵀPx with AᵀP + PA = −I for the linearised field x' = Ax.
     relative : float
-        Relative width of the final bracket of the bisection; from 1e-6 to below 1.
+        Relative width of the final bracket of the bisection, in [1e-6, 1).
     degree : int, optional
         Even degree up to which other V are tried, starting from `V` or its default, so that the region contains a
         larger part of the shape.
@@ -382,7 +389,9 @@ def region_of_attraction(
     if V is None:
         own = _of_linearised(claim)
         if own is None:
-            return Region(proved=None, refuted=None, remark="the linearised field has no V = x'Px. Give a V")
+            return Region(
+                proved=None, refuted=None, remark="the linearised field has no positive definite V = x'Px: pass V"
+            )
         claim = replace(claim, lyapunov=own)
     region = _region(claim, relative)
     if inner is None:
@@ -401,7 +410,7 @@ def _region(claim: Attraction, relative: float) -> Region:
     if refuted.level is None:
         return Region(proved=None, refuted=refuted, remark="V is not positive")
     region = Region(proved=_bisected(claim, refuted.height or Fraction(0), relative), refuted=refuted)
-    return region if region.proved else replace(region, remark="no lower level was proved")
+    return region if region.proved else replace(region, remark="no level below the refuted one was proved")
 
 
 def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomial | None:
@@ -412,7 +421,7 @@ def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomi
 
 
 def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
-    """Claim of the exact field and V, by default Σ x_i², for the whole space."""
+    """Claim about the whole space for a field and V in exact numbers; V is Σ x_i² by default."""
     names = tuple(map(str, field))
     size = len(names)
     if not names:
@@ -424,7 +433,7 @@ def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
 
 
 def _refuted(claim: Attraction) -> Attraction | None:
-    """Claim refuted by the lowest point found: level just above V there, or no level where V ≤ 0."""
+    """Claim refuted by the point with the lowest V. Its level is just above V there; None (whole space) if V ≤ 0."""
     refuted = replace(claim, proof=lowest_crossing(claim))
     if refuted.height is None:
         return None

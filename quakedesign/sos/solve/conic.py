@@ -25,7 +25,8 @@ def stated_problems() -> "Iterator[list[cp.Problem]]":
 
     Parameters, variables and multipliers have the values of the last solve. Within the block all problems are solved in
     this process, regardless of `workers`. The fastest backend to compile them is `canon_backend="COO"`. A statement
-    about one polynomial (`sos.prove`) is no cvxpy problem, as compiling it would take several times its solution time.
+    about one polynomial (`sos.prove`) is not stated in cvxpy, as compiling it would take several times as long as
+    solving it.
 
     Yields
     ------
@@ -55,7 +56,7 @@ def record(problem: "cp.Problem") -> None:
 
 
 def solve(problem: "cp.Problem", **chosen: Any) -> bool:
-    """Run Clarabel; whether its solution is usable. Its status is no verdict."""
+    """Run Clarabel; return whether its solution is usable, which does not prove feasibility."""
     import cvxpy as cp
 
     record(problem)
@@ -74,7 +75,7 @@ class Compiled:
     Parameters
     ----------
     problem : cvxpy.Problem
-        DPP-compliant (disciplined parametrised programming); no Parameter alone is a term of the objective.
+        DPP-compliant (disciplined parametrised programming); no term of the objective may consist of a Parameter alone.
     """
 
     def __init__(self, problem: "cp.Problem") -> None:
@@ -112,10 +113,12 @@ class Compiled:
         return form, chain, inverse
 
     def solve(self, accuracy: float = 1e-8, *, anew: bool = True) -> bool:
-        """Run Clarabel; whether its solution is usable. Variables and constraints then have their values.
+        """Run Clarabel; return whether its solution is usable. If so, variables and dual variables are set.
 
         Parameters
         ----------
+        accuracy : float
+            Tolerance of gap and feasibility [-].
         anew : bool
             False reuses the solver of the last call with its ordering and scaling, which is faster; rounding then
             depends on the problems solved before.

@@ -21,7 +21,8 @@ from quakedesign.sos.solve.rounding import Scaled, decimal_units, relations, rou
 
 _STRICT = 1e-7
 _ROUNDS = 4
-_ENTRIES = 50_000_000  # most entries of half the matrix that the solver factors, dense for every block: about 6 GB
+# largest number of entries of the triangular factor in the solver, dense for every block: about 6 GB
+_ENTRIES = 50_000_000
 _ACCURACIES = (1e-9, 1e-12)
 KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
@@ -168,7 +169,7 @@ class StatementSearch:
 
 
 def strict_proof(statement: Statement) -> SumOfSquares | None:
-    """Checked identity in monomials for a statement that holds with a margin; None if none is found.
+    """Sum-of-squares identity in monomials, checked exactly, for a statement with a margin; None if not found.
 
     The caller must check that the multiplier is positive.
     """

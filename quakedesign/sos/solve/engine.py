@@ -102,6 +102,7 @@ class Method(ABC):
 
     Attributes
     ----------
+    name : str
     order : int
         Rank by cost; the cheapest method, with the lowest order, is tried first.
     """
@@ -148,12 +149,13 @@ def prove(
         Constraints of the set such as ``"x >= 0"``, ``"x^2 + y^2 <= 1"``, ``"x*y == 1"``; ℝⁿ unless given.
     multiplier : str, SymPy expression or mapping, optional
         multiplier · polynomial is decided instead. ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
-        for forms on the orthant) up to the third. On ℝⁿ only variables that remain after division by the square factor
-        occur; a sum of squares of the same degree, found by a search, is tried before the first and the second power.
+        for forms on the orthant) up to the third. On ℝⁿ the sums contain only variables of
+        the polynomial without its square factor, and before the first and the second power a search proposes a sum of
+        squares of the same degree.
     variables : sequence of str or Symbol, optional
         Variables in order; by default in order of appearance.
     margin : rational, optional
-        polynomial − margin·Σ x_i^d (forms of degree d) or − margin·(1 + Σ x_i^d) is decided instead.
+        Decide p − margin·Σ x_i^d instead for a form p of degree d, and p − margin·(1 + Σ x_i^d) for any other p.
     products : bool, optional
         All squarefree products of inequalities if True, single inequalities only if False. By default products of
         inequalities that are variables, and the others singly.
@@ -323,10 +325,10 @@ class SquareFactor(Method):
     order: ClassVar[int] = 1
 
     def propose(self, claim: Statement) -> SumOfSquares | None:
-        """See `Method.propose`; None also if r is no sum of squares.
+        """See `Method.propose`; also None if no sum of squares is found for r.
 
-        Two polynomials are factored: the given one, with the multiplier kept for r, and its product with the
-        multiplier, which may lose a square factor of the multiplier that r needs.
+        Both P (multiplier retained) and multiplier·P (multiplier 1) are factored into s²·r. The second may move a
+        factor of the multiplier into s², although the proof for r needs it.
         """
         count = len(claim.variables)
         whole = replace(claim, polynomial=claim.target, multiplier=constant(count))
@@ -337,7 +339,7 @@ class SquareFactor(Method):
 
 
 def _multiplied(root: Polynomial, left: Statement, bound: int) -> SumOfSquares | None:
-    """Proof for root² times the given statement, from a proof of the statement with a degree bound."""
+    """Proof for root²·P from a proof for P, the polynomial of the given statement, with a given degree bound."""
     inner = decide(replace(left, degree=bound)).proof if bound >= 0 else None
     if not isinstance(inner, SumOfSquares):
         return None

@@ -153,7 +153,17 @@ def _modulo(block: Block, relations: Sequence[Polynomial]) -> Block | None:
 def at_kernels(
     blocks: Sequence[Block], grams: Sequence[np.ndarray], threshold: float, tolerance: float, scale: Sequence[Fraction]
 ) -> list[Block] | None:
-    """Blocks without the rounded numerical kernels of their Gram matrices; None if there is no kernel."""
+    """Blocks without the rounded numerical kernels of their Gram matrices; None if there is no kernel.
+
+    Parameters
+    ----------
+    threshold : float
+        Eigenvalues below it count as zero.
+    tolerance : float
+        Relative tolerance of the fractions of the kernel.
+    scale : sequence of Fraction
+        Scales of the variables.
+    """
     reduced, smaller_face = [], False
     for block, gram in zip(blocks, grams, strict=True):
         kernel = _kernel(block, gram, threshold, tolerance, scale)
@@ -204,7 +214,7 @@ def simplest(value: float, tolerance: float) -> Fraction:
 
 
 def just_below(value: Fraction) -> Fraction:
-    """Simple fraction at or below a positive number, by at most 1e-7 relative: finer than the bisection on levels."""
+    """Simplest fraction in [(1 − 1e-7)·value, value] for a positive value; the bisection on levels is coarser."""
     return simplest_between(value * (1 - Fraction(1, 10**7)), value)
 
 

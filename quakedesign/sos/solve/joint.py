@@ -1,13 +1,13 @@
 """Decision variables with which several polynomials lie in their cones, with the largest common margin.
 
-Primal: maximise t with C_o + Σ_j x_j P_oj − t·N_o in the cone of every obligation o, and x within bounds. The dual is
+Primal: maximise t with C_o + Σ_j x_j P_oj − t·N_o in the cone of every demand o, and x within bounds. The dual is
 solved instead,
 
     minimise Σ_o L_o(C_o) + Σ_j radius_j·|Σ_o L_o(P_oj)|
     subject to  Σ_o L_o(N_o) = 1,  L_o(g_S·b bᵀ) ⪰ 0,  L_o(m·h) = 0,
 
-with one unknown per monomial; t and x are the multipliers of equations. Every further bound adds its multiplier to the
-unknowns.
+with one unknown per monomial; t and x are the multipliers of equations. Each row of `DecisionBounds.rows` adds one
+multiplier to the unknowns.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ _cached: dict[tuple[object, ...], "JointProgram"] = {}
 
 @dataclass(frozen=True, kw_only=True)
 class Demand:
-    """One polynomial Σ_j x_j P_j − t·N that must be in a cone."""
+    """Part Σ_j x_j P_j − t·N of a polynomial that must be in a cone; its constant part is given to `solve`."""
 
     template: Statement  # Set, degree and multiplier; its polynomial only lists the monomials that may occur
     parts: Sequence[Polynomial]  # P_j
@@ -134,7 +134,7 @@ class _Stated:
         cost = given["costs"] @ moments + given["radii"] @ (above + below)
         pull, signs = above - below, [above >= 0, below >= 0]
         if rows:
-            weights = cp.Variable(rows, name="held")
+            weights = cp.Variable(rows, name="row_multipliers")
             cost, pull = cost + given["bounds"] @ weights, pull + given["rows"].T @ weights
             signs += [weights >= 0]
         if shares:

@@ -24,7 +24,8 @@ from quakedesign.sos.exact.polynomial import Exponents
 
 Array = np.ndarray
 Sided = tuple[sparse.csc_matrix, np.ndarray]  # matrix and right-hand side
-_LARGEST_MARGINS = (4.0, 1e-2, 1e-5)  # bounds of the margin, which is infinite if every polynomial is in the cone
+# upper bounds imposed on the margin in turn; without one it is infinite if every polynomial is in the cone
+_LARGEST_MARGINS = (4.0, 1e-2, 1e-5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +59,7 @@ class MomentProgram:
 
     Parameters
     ----------
+    blocks : sequence of Shape
     relations : sequence of mapping of exponents to float
         Multiples m·h of the equalities, on which L vanishes.
     """
@@ -93,13 +95,13 @@ class MomentProgram:
     def solve(self, target: Mapping[Exponents, float], accuracy: float = 1e-9) -> MomentSolution | None:
         """Largest margin for a target whose coefficients are about one; None if the solver fails.
 
-        On a set without interior the largest margin may not be attained. Then a smaller bound on it is tried.
+        If the solver fails, smaller upper bounds on the margin are tried: without an interior, it may not be attained.
         """
         answers = (self._answer(target, (accuracy, True), most) for most in _LARGEST_MARGINS)
         return next((self._solution(answer) for answer in answers if answer is not None), None)
 
     def margin(self, target: Mapping[Exponents, float], accuracy: float) -> float | None:
-        """Only the margin of `solve`; without iterative refinement if possible, in two thirds of the time."""
+        """Margin as from `solve`, first without iterative refinement, which takes two thirds of the time."""
         quick = self._answer(target, (accuracy, False), _LARGEST_MARGINS[0])
         if quick is not None:
             return -float(quick.z[0])

@@ -34,7 +34,7 @@ class Arrays:
         return float(self.coefficients @ np.prod(np.asarray(x) ** self.exponents, axis=1))
 
     def at(self, points: np.ndarray) -> np.ndarray:
-        """Values at points, one point a row."""
+        """Values at points, one point per row."""
         return np.asarray(np.prod(points[:, None, :] ** self.exponents[None, :, :], axis=2) @ self.coefficients)
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
@@ -71,7 +71,7 @@ def _polynomial(statement: Statement) -> Arrays:
 
 
 def violation(statement: Statement, points: np.ndarray) -> np.ndarray:
-    """Largest relative violation of the inequalities at points (one a row); zero inside the set."""
+    """Largest relative violation of the inequalities at points (one per row); zero inside the set."""
     worst, size = np.zeros(len(points)), len(statement.variables)
     for g in statement.inequalities:
         scale = Arrays({e: abs(c) for e, c in g.items()}, size).at(np.abs(points))
@@ -80,7 +80,7 @@ def violation(statement: Statement, points: np.ndarray) -> np.ndarray:
 
 
 def by_value(statement: Statement, candidates: Sequence[Sequence[float]]) -> list[Sequence[float]]:
-    """Candidates sorted by the value of the polynomial relative to its growth, those in the set first."""
+    """Candidates sorted by polynomial value over (1 + max|x_i|)^degree, those in the set first."""
     if not candidates:
         return []
     points = np.array(candidates, dtype=float)
@@ -93,8 +93,8 @@ def by_value(statement: Statement, candidates: Sequence[Sequence[float]]) -> lis
 def lowest_samples(statement: Statement) -> list[list[float]]:
     """Points of the set, inside and on the boundary, at which the polynomial is lowest among seeded samples.
 
-    A sample outside is moved to the boundary, along the segment to a sample inside. No points are returned for sets
-    without interior, such as those with equalities.
+    A sample outside is moved to the boundary, along the segment to a sample inside. The result is empty with
+    equalities, or if no sample lies inside the set.
     """
     if statement.equalities:
         return []
@@ -117,7 +117,7 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
 
 
 def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[float], float]]:
-    """Points strictly inside where the polynomial is negative, with their step from x, in decreasing order of the step.
+    """Points strictly inside the set with a negative polynomial, each with its step from x; largest step first.
 
     The direction is the one in which the slowest active constraint increases fastest, with coordinates of at most 1;
     without an active constraint the point is x itself; none if there is no such direction.

@@ -70,7 +70,13 @@ class NoSolution:
 
 
 class Program:
-    """Polynomials, affine in decision variables, that must be sums of squares on their sets."""
+    """Polynomials, affine in decision variables, that must have sum-of-squares proofs on their sets.
+
+    Parameters
+    ----------
+    variables, decisions : sequence of str
+        Names of the indeterminates and of the decision variables.
+    """
 
     def __init__(self, variables: Sequence[str], decisions: Sequence[str]) -> None:
         import cvxpy as cp
@@ -164,7 +170,7 @@ class Program:
         return cp.Problem(cp.Maximize(self._value(self._objective)), self._constraints(0.0))
 
     def solve(self) -> Solution | NoSolution:
-        """Exact decision with proofs, as close to the optimum as a proof is found.
+        """Exact values of the decisions with proofs, as close to the optimum as the rounding permits.
 
         Decisions that the requirements force, such as the coefficient of a monomial that no square produces, are
         eliminated exactly in advance.
@@ -191,9 +197,11 @@ class Program:
     def _ended(self) -> tuple[Solution | None, str]:
         """Solution on the present faces or None, and the outcome of the search in words."""
         if self._forced.contradiction:
-            return None, "so no decisions satisfy the requirements at this degree"
+            return None, "hence the requirements are infeasible at this degree"
         solution = next(filter(None, (self._rounded(*point) for point in self._interior(_LOSSES))), None)
-        ended = f"{'the rest' if self._forced.reasons else 'the programme'} is {self._status} in floating point"
+        ended = (
+            f"the {'remaining programme' if self._forced.reasons else 'programme'} is {self._status} in floating point"
+        )
         if self._margin is not None:
             ended += f", with a margin of {self._margin.value:.1g}, but no exact decisions were found"
         elif refuted := self._forced.refuted():
@@ -294,7 +302,7 @@ class Program:
         for rows in self._definite:
             constraints.append(_definite(self._vector, rows, margin))
         if not constraints:
-            raise PolynomialError("a program must require something. Received no requirement. Call require first.")
+            raise PolynomialError("the program has no requirement: call require or require_definite first.")
         return constraints
 
     def _value(self, affine: Mapping[Exponents, Fraction]) -> "cp.Expression":
@@ -330,9 +338,10 @@ def largest(
 
     Parameters
     ----------
-    question : callable
-        Returns the answer for a rational level.
+    problem : callable
+        Maps a rational level to an `Answer`.
     low, high : rational
+        Ends of the initial bracket; the verdict at `low` must be ``sos``.
     relative : float
         Width of the final bracket relative to its upper end.
     """
@@ -441,5 +450,5 @@ class Membership:
         return float("nan") if margin is None else margin * size
 
     def prove(self, polynomial: Mapping[Exponents, Fraction]) -> Answer:
-        """Exact answer for one polynomial."""
+        """Decide one polynomial exactly; see `quakedesign.sos.solve.engine.decide`."""
         return decide(replace(self.template, polynomial=dict(polynomial)))

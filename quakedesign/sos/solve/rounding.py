@@ -49,7 +49,7 @@ def rounded(
     solution: MomentSolution,
     checked: Callable[[SumOfSquares], SumOfSquares | None] | None = None,
 ) -> SumOfSquares | None:
-    """Exact proof near a floating-point solution, with the coarsest valid rounding; None without one.
+    """Exact proof near a floating-point solution, by the coarsest rounding that is valid; None if none is valid.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ class System:
 
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
-    """Statement in ũ = u/scale, with powers of two as scales and every polynomial over its largest coefficient."""
+    """Statement in ũ = u/scale; scales are powers of two, every polynomial is divided by its largest coefficient."""
 
     statement: Statement
     scale: tuple[Fraction, ...]

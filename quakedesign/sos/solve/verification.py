@@ -76,11 +76,13 @@ def verify(
     if equalities:
         raise PolynomialError("constraints of a given proof must be inequalities. Received an equality. Use prove.")
     if len({frozenset(g.items()) for g in inequalities}) < len(inequalities):
-        raise PolynomialError("constraints of a given proof must differ. Received one twice. Add up their matrices.")
+        raise PolynomialError(
+            "an inequality is given twice: give it once, with the sum of its Gram matrices in a common basis."
+        )
     grams, bases = (_listed(gram), _listed(basis)) if inequalities else ([gram], [basis])
     if not len(grams) == len(bases) == 1 + len(inequalities):
         raise PolynomialError(
-            f"{1 + len(inequalities)} Gram matrices and bases are needed: for the factor 1, then for each inequality. "
+            f"{1 + len(inequalities)} Gram matrices and bases are needed: one for σ_0, then one for each inequality. "
             f"Received {len(grams)} and {len(bases)}."
         )
     products = [(), *((i,) for i in range(len(inequalities)))]
@@ -186,7 +188,7 @@ def _without_kernel(block: Block, gram: Array, threshold: float, tolerance: floa
 
 
 def _rows(block: Block, monomials: Sequence[Exponents]) -> np.ndarray:
-    """Coefficients of the basis of a block in monomials, one element a row."""
+    """Coefficients of the basis of a block in monomials, one element per row."""
     polynomials = [as_polynomial(b) for b in block.basis]
     return np.array([[float(p.get(e, 0)) for e in monomials] for p in polynomials])
 
@@ -257,7 +259,7 @@ def read_gram(path: str | Path) -> GramFile:
 
 
 def _number(written: str) -> Fraction | str:
-    """Exact number, or its text if it has too many digits; a matrix accepts either."""
+    """Exact number, or its text if it has too many digits; `_matrix` converts both to floats."""
     try:
         return rational(written)
     except ParameterError:
@@ -296,7 +298,7 @@ def _is_whole(exponent: Any) -> bool:
 
 
 def _matlab(content: bytes) -> dict[str, Any]:
-    """Contents of a MATLAB file under the JSON keys; Z and p are matrices (one monomial or term a row) or text."""
+    """Contents of a MATLAB file under the JSON keys; Z and p are matrices (one monomial or term per row) or text."""
     from scipy.io import loadmat
 
     with catch_warnings():

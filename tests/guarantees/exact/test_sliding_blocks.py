@@ -199,7 +199,7 @@ def test_a_pressure_beyond_its_claim_proves_nothing(monkeypatch):
     monkeypatch.setattr(sliding_block_design, "_WeightSearch", Search)
     monkeypatch.setattr(sliding_block_design, "plant_guarantee", lambda *_: found)
     none = sliding_block_design.sliding_block_guarantee(BLOCKS, F(400))
-    assert none.reason == "the estimated bounds are not proved: reduce the stress"
+    assert none.reason == "the proof failed for the estimated bounds: reduce the stress"
 
 
 def test_claims_under_which_a_block_may_open_give_no_plant():

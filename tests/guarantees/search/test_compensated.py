@@ -260,7 +260,10 @@ def test_other_sliding_modes_have_no_guarantee_of_a_loop_that_runs():
             replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="implicit")),
             "has no estimate of the disturbance",
         ),
-        (replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated")), "Give both in its"),
+        (
+            replace(paper, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated")),
+            "requires the settings weight and authority",
+        ),
     ]
     for controller, words in others:
         found = guarantee_of(TASK, controller)

@@ -113,7 +113,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert late.sides == ("0 s", "0 s")
     assert account.badge(entry) == "not guaranteed at T_s = 0.1 s"
     real = SimpleNamespace(design=designed("real"), proof=designed("real").guarantee)
-    assert account.badge(real) == "guaranteed as it runs"
+    assert account.badge(real) == "guaranteed for the sampled loop"
     assert grade(real).startswith("guaranteed: slip rate <= ")
     # the same law held over the fault's own T_s has none
     assert (

@@ -295,8 +295,8 @@ def test_noise_is_blamed_for_what_it_does_to_a_law_that_is_proved_without(noise,
     if proved:
         assert found.sampled_loop.noise == bounds | {"rate_noise": F(0)} or found.sampled_loop.noise == bounds
         return
-    assert found.reason.startswith("with slip noise of 5 m and rate noise of 0.1 m/s the pressure may rise to ")
-    assert found.reason.endswith(": the fault may open; without it a law is proved")
+    assert found.reason.startswith("with slip noise of 5 m and rate noise of 0.1 m/s: the pressure may rise to ")
+    assert found.reason.endswith(": the fault may open; without noise a law is proved")
 
 
 def test_a_design_that_noise_leaves_without_a_proof_is_designed_without_noise(monkeypatch):
@@ -314,8 +314,8 @@ def test_a_design_that_noise_leaves_without_a_proof_is_designed_without_noise(mo
         stored.task, stored.sampled_loop.step, objective="peak", setup=ExactSetup(slip_noise=F(5))
     )
     assert noises == [5, 0]
-    assert found.reason.startswith("with slip noise of 5 m the pressure may rise to ")
-    assert found.reason.endswith("; without it a law is proved")
+    assert found.reason.startswith("with slip noise of 5 m: the pressure may rise to ")
+    assert found.reason.endswith("; without noise a law is proved")
 
 
 @pytest.mark.slow

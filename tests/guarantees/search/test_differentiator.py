@@ -110,7 +110,7 @@ def test_given_gains_are_told_as_designed_ones_are():
 def test_where_it_is_not_known_what_it_tells_nothing_is_proved(around, gains):
     found = qd.guarantee(REAL, gains=gains, measured="differentiator", **around).proof
     assert isinstance(found, NoProof)
-    assert "a differentiator needs zero initial errors" in found.reason
+    assert "a law with a differentiator requires zero initial errors" in found.reason
 
 
 def test_noise_of_a_slip_rate_that_is_not_measured_is_refused():

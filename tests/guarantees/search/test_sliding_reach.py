@@ -113,7 +113,7 @@ def test_where_no_law_is_found_near_the_fault_nothing_is_promised():
     reach = farthest(replace(TASK, stress=Fraction(10**9)), STEP, ExactSetup(lag=Fraction(600)), stressed=False)
     assert (reach.share, reach.sampled_loop) == (0, None)
     assert possible_remedy(FAULT, TASK, reach, {}, proved, spread=Fraction(0)).startswith(
-        "no guarantee was found even with a much nearer well"
+        "no guarantee was found even with a much shorter path"
     )
 
 

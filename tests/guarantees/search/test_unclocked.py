@@ -71,7 +71,7 @@ def test_a_disturbance_of_bounded_rate_has_less():
 def test_a_range_that_is_too_wide_has_none_with_its_small_gain():
     none = found(longest_step=F(1, 200))
     assert isinstance(none, NoProof)
-    assert "small gain" in none.reason or "no set" in none.reason
+    assert "small gain" in none.reason or "no invariant set" in none.reason
     assert unclocked_estimate(stored().task, replace(stored().sampled_loop, longest_step=F(1, 20))) is None
 
 

@@ -181,7 +181,7 @@ def test_meaningless_settings_are_refused(options, said):
 def test_the_continuous_scheme_has_no_settings():
     with pytest.raises(ParameterError, match=r"substeps is a setting of compensated, .* with the scheme continuous"):
         run("continuous", substeps=2)
-    with pytest.raises(ParameterError, match="Set them in the scheme"):
+    with pytest.raises(ParameterError, match="Set these in the scheme"):
         run(simulation_scheme("explicit"), substeps=2)
 
 

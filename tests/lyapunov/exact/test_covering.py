@@ -33,7 +33,9 @@ def test_a_linear_certificate_covers_a_fault_whose_ranges_it_holds_to_their_ends
                 covers(uncertain(ELQR, **{name: wrong}), LAB)
         assert covers(uncertain(ELQR, **{name: (low - 1, high + 1)}), LAB)
     for constants in ({"b": F(8, 1385)}, {"b": F(4, 1385), "c": F(1)}):
-        with pytest.raises(CertificateError, match="the control authority of the certificate is not that of lab-fault"):
+        with pytest.raises(
+            CertificateError, match="the control authority of the certificate differs from that of lab-fault"
+        ):
             covers(replace(ELQR, loop=replace(ELQR.loop, constants=constants)), LAB)
 
 
@@ -51,7 +53,10 @@ def asked(monkeypatch):
 
 def test_a_sliding_mode_s_certificate_says_which_scale_a_fault_needs(asked):
     other = load_certificate(CERTIFICATES / "super-twisting_1.5_1.1.json")
-    with pytest.raises(CertificateError, match="acts on derivative 1"):
+    with pytest.raises(
+        CertificateError,
+        match="the plant of the certificate is not a fault: the first state of super-twisting has relative degree 1",
+    ):
         covers(uncertain(other, beta=(F(1), F(2))), LAB)
     wide = uncertain(CTA, beta=(F(1), F(3, 2)), d=(F(-1, 5), F(1, 4)))
     assert covers(wide, LAB) == [

@@ -194,5 +194,5 @@ def test_a_matrix_with_huge_denominators_is_refused_in_bounded_time(texts, stand
 def test_reordered_states_are_refused_by_the_package(texts):
     raw = json.loads(texts["no"])
     raw["states"] = {"e3": 1, "e2": 2, "e1": 3}
-    with pytest.raises(CertificateError, match="field is not that of"):
+    with pytest.raises(CertificateError, match="the field in the certificate differs from that of"):
         parse_certificate(json.dumps(raw)).check()

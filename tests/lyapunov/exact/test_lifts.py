@@ -112,5 +112,5 @@ def test_other_arguments_of_lifts_are_another_field():
     _same_field(known, model)
     ((name, terms),) = known.lifts.items()
     for other in (terms[:1], tuple(replace(term, coefficient=2 * term.coefficient) for term in terms)):
-        with pytest.raises(CertificateError, match="the field is not that of own"):
+        with pytest.raises(CertificateError, match="the field in the certificate differs from that of own"):
             _same_field(replace(known, lifts={name: other}), model)

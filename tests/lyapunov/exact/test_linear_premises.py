@@ -286,7 +286,7 @@ def test_an_enclosure_that_is_not_finite_is_refused():
     mu = 0.3 - 0.8 * slip * (1 - slip)
     exact = STRESS * (1 - 0.3 / mu) + STIFFNESS * slip / (mu * AUTHORITY)
     assert low <= exact.min() < exact.max() <= high
-    with pytest.raises(ParameterError, match="no finite pressure at rest"):
+    with pytest.raises(ParameterError, match="the pressure at rest has no finite enclosure"):
         rest_pressure(fault, (F(0), F(1)), nominal=True, pieces=1)
 
 

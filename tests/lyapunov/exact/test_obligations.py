@@ -329,13 +329,13 @@ def test_conditions_differ_from_each_other_and_from_variables(conditions, fine):
     if fine:
         _require_different(conditions, ["n", "m"])
     else:
-        with pytest.raises(CertificateError, match="the signs n, m are equal"):
+        with pytest.raises(CertificateError, match="the signs of n, m coincide"):
             _require_different(conditions, ["n", "m"])
 
 
 def test_equal_signs_on_a_cell_are_refused_by_name():
     double = {"n": SUM["n"], "m": tuple(replace(t, coefficient=2 * t.coefficient) for t in SUM["n"])}
-    with pytest.raises(CertificateError, match="the signs n, m are equal"):
+    with pytest.raises(CertificateError, match="the signs of n, m coincide"):
         _ = lifted(double, ("n", 0, "s"), ("m", 0, "s")).cells
     assert lifted(double, ("n", 1, "s"), ("m", 0, "s")).cells
 

@@ -215,8 +215,8 @@ def test_both_ends_of_beta_count(real, certified, required):
     found = control_coefficient(real, 2 * least_authority(real), certified)
     assert (found.required, found.certified, found.ratio) == (required, certified[1], required / certified[1])
     assert found.holds is (certified[0] <= F(1, 2))
-    assert found.note.startswith("β from 0.5 to 0.712495; certified from 0.")
-    assert found.note.endswith(f"certified from {float(certified[0])}")
+    assert found.note.startswith("β in 0.5 to 0.712495; certified for β >= 0.")
+    assert found.note.endswith(f"certified for β >= {float(certified[0])}")
 
 
 def law_of(fault, name="none", scale=F(1)):
@@ -315,7 +315,9 @@ def test_the_closer_one_of_two_methods_counts_on_a_level_set(
     )  # fmt: skip
     found = _level_set(question)
     assert (found.name, found.required, found.certified) == ("level_set", required, certified)
-    assert found.note.startswith("rigorous on the level set of V that contains the start: |e1| <= 1 m, |e2| <= 2 m/s")
+    assert found.note.startswith(
+        "rigorous on the level set of V that contains the initial state: |e1| <= 1 m, |e2| <= 2 m/s"
+    )
     assert found.note.endswith("; with nominal feed-forward")
     assert ("fraction of the decrease of V" in found.note) is (required == F(3, 8))
     assert found.holds is (required <= 1)

@@ -13,7 +13,7 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.laws import LoopField
 from quakedesign.lyapunov import Verdict, certificate_text
 from quakedesign.lyapunov.gains.path_following import scaled_norm
-from quakedesign.lyapunov.gains.synthesise import OBJECTIVES, begin_with, compared_gains, problem_of, synthesise
+from quakedesign.lyapunov.gains.synthesise import OBJECTIVES, compared_gains, initial_loops, problem_of, synthesise
 from quakedesign.symbolic import SignedPower
 
 FAST = {"degrees": (5,), "starts": 1, "compare": False}
@@ -173,7 +173,7 @@ def test_starts_depend_on_the_seed_alone():
     asked = problem_of("cta", "norm", lipschitz=1, gain_range=(1, 1))
 
     def draw(seed, count=7):
-        return [loop.gains for loop, _ in zip(begin_with(asked, seed), range(count), strict=False)]
+        return [loop.gains for loop, _ in zip(initial_loops(asked, seed), range(count), strict=False)]
 
     assert draw(1) == draw(1)
     assert draw(1)[:4] == draw(2)[:4]  # the literature

@@ -166,7 +166,7 @@ def test_points_that_cannot_be_expressed_are_not_found():
         ({"over": ("k1", "k9")}, "two different gains among k1, k2"),
         ({"over": ("k1", "k1")}, "two different gains"),
         ({"points": 1}, "at least two points"),
-        ({"ranges": (("3", "1"), ("1", "2"))}, "range of k1 must ascend"),
+        ({"ranges": (("3", "1"), ("1", "2"))}, "the lower end of the range of k1 must be below"),
         ({"ranges": (("1", "1.00001"), ("1", "2")), "points": 60}, "too narrow for 60 points"),
         ({"levels": ("-1",)}, "must not be negative"),
         ({"levels": ()}, "must not be negative"),

@@ -153,7 +153,7 @@ def test_a_wider_range_loses_the_proof(proof):
 def test_a_field_of_another_law_is_refused(proof):
     changed = dict(proof.loop.field)
     changed["e1"] = (replace(changed["e1"][0], coefficient=F(2)),)
-    with pytest.raises(CertificateError, match="the field is not that of cta"):
+    with pytest.raises(CertificateError, match="the field in the certificate differs from that of cta"):
         replace(proof, loop=replace(proof.loop, field=changed)).check()
 
 
@@ -169,7 +169,7 @@ def test_a_missing_or_extra_witness_is_refused(proof):
     without = {name: proof.witnesses[name] for name in rest}
     with pytest.raises(CertificateError, match="missing"):
         replace(proof, witnesses=without).check()
-    with pytest.raises(CertificateError, match="not those of the obligations"):
+    with pytest.raises(CertificateError, match="must be those of the distinct obligations"):
         replace(proof, witnesses=proof.witnesses | {"decrease of nothing": proof.witnesses[first]}).check()
 
 

@@ -121,7 +121,7 @@ def test_the_margin_goes_on_below_zero_with_the_disturbance():
 def test_another_structure_is_refused():
     at, degree = loop("super-twisting")
     point = closed_loop("super-twisting", ("1.5", "1.1"), lipschitz="0.9")
-    with pytest.raises(ValueError, match="differs in structure"):
+    with pytest.raises(ValueError, match="must have the structure of the sweep"):
         Sweep(at, degree).solve(point)
     nested = closed_loop("dia", ("4", "20", "1", "0.3"), lipschitz="0.3")
     sweep = Sweep(nested, 5)

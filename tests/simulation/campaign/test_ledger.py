@@ -37,7 +37,7 @@ def test_bits_come_back(tmp_path):
 def test_another_campaign_is_refused_by_name(tmp_path):
     filled(tmp_path)
     other = {"seed": 2, "controller": {"gains": {"k1": "7", "k2": "5"}}}
-    with pytest.raises(SimulationError, match=r"Received changes of controller\.gains\.k2, seed"):
+    with pytest.raises(SimulationError, match=r"These differ: controller\.gains\.k2, seed"):
         Ledger.open(tmp_path, other)
     assert len(Ledger.open(tmp_path, INPUTS).read()) == 2
     assert not Ledger.open(tmp_path, other, renew=True).read()
@@ -75,7 +75,7 @@ def test_force_does_not_delete_the_same_campaign(tmp_path):
 
 def test_a_manifest_that_is_none(tmp_path):
     (tmp_path / "campaign.json").write_text("[1")
-    with pytest.raises(SimulationError, match="Received changes of everything"):
+    with pytest.raises(SimulationError, match="These differ: everything"):
         Ledger.open(tmp_path, INPUTS)
 
 

@@ -12,8 +12,8 @@ from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.laws import published
 from quakedesign.simulation.campaign import Campaign, SampleResult, campaign_problem
-from quakedesign.simulation.campaign.campaign_result import LEVELS, Failure, badness, figure, metric_names
-from quakedesign.simulation.campaign.space import Worst
+from quakedesign.simulation.campaign.campaign_result import LEVELS, Failure, figure, metric_names, severity
+from quakedesign.simulation.campaign.space import WorstSample
 
 PROBLEM = campaign_problem(load_fault("lab-fault"), published("lab-fault")["elqr"], duration=0.1)
 RANDOM = np.random.default_rng(0)
@@ -64,7 +64,7 @@ def test_nothing_but_divergence():
     found = campaign([None, None])
     assert found.to_dict()["quantiles"] == {}
     assert found.to_dict()["events"]["diverged"]["count"] == 2
-    with pytest.raises(ParameterError, match="metric must be one of a run without divergence"):
+    with pytest.raises(ParameterError, match="has no value, since all runs diverged"):
         found.values("max_slip_error")
     assert found.plot().axes
 
@@ -109,11 +109,11 @@ def test_a_metric_counts_where_the_run_has_ended_in_time():
     assert metric_names([early]) == ()
     assert metric_names([early, whole]) == ("max_slip_error",)
     table = [(early, "peak_slip_rate"), (whole, "peak_slip_rate"), (early, "max_slip_error"), (whole, "max_slip_error")]
-    assert [badness(*entry) for entry in table] == [math.inf, math.inf, math.inf, 1.0]
+    assert [severity(*entry) for entry in table] == [math.inf, math.inf, math.inf, 1.0]
 
 
 def test_a_metric_that_there_is_not():
-    with pytest.raises(ParameterError, match="metric must be one of a run without divergence, but all diverge"):
+    with pytest.raises(ParameterError, match="has no value, since all runs diverged"):
         campaign([None]).values("max_slip_error")
     for wrong in (campaign([1.0, None]).values, campaign([1.0, None]).worst):
         with pytest.raises(ParameterError, match=r"metric must be one of max_slip_error, min_pressure\. Received 'spe"):
@@ -138,7 +138,7 @@ def test_a_campaign_has_resumed_nothing_unless_told():
 @pytest.mark.parametrize(("metric", "sign"), [("max_slip_error", 1), ("min_pressure", -1)])
 def test_what_the_search_found_is_told_with_its_sign(metric, sign):
     samples = PROBLEM.sample(0), PROBLEM.sample(1)
-    worst = Worst(metric=metric, value=3.0, sample=samples[1], index=1, looked_at=samples)
+    worst = WorstSample(metric=metric, value=3.0, sample=samples[1], index=1, looked_at=samples)
     told = campaign([1.0], search=worst).to_dict()["search"]
     assert (told["value"], told["index"], told["looked_at"]) == (3.0 * sign, "search-1", 2)
     assert told["sample"] == samples[1].numbers
@@ -161,7 +161,9 @@ def test_a_sample_of_the_search_that_there_is_not(index):
 def test_a_sample_is_run_again_by_its_index(monkeypatch):
     monkeypatch.setattr(type(PROBLEM), "trajectory", lambda _, sample, samples: (sample, samples))
     looked_at = tuple(PROBLEM.sample(i) for i in (5, 6))
-    found = campaign([1.0], search=Worst(metric="x", value=3.0, sample=looked_at[1], index=1, looked_at=looked_at))
+    found = campaign(
+        [1.0], search=WorstSample(metric="x", value=3.0, sample=looked_at[1], index=1, looked_at=looked_at)
+    )
     assert found.trajectory(3) == (PROBLEM.sample(3), 2000)
     assert [found.trajectory(f"search-{i}", 20) for i in (0, 1)] == [(sample, 20) for sample in looked_at]
     for index in ("1", "search-2", "search--1", "search-"):

@@ -258,7 +258,7 @@ def _alive(pid):
 )
 def test_another_campaign_does_not_go_on_here(serial, change):
     before = {path: path.stat().st_mtime_ns for path in serial[1].rglob("*")}
-    with pytest.raises(SimulationError, match=rf"Received changes of .*{next(iter(change))}"):
+    with pytest.raises(SimulationError, match=rf"These differ: .*{next(iter(change))}"):
         run_campaign(replace(PROBLEM, **change), COUNT, serial[1], executor=SerialExecutor())
     assert {path: path.stat().st_mtime_ns for path in serial[1].rglob("*")} == before
 

@@ -125,12 +125,12 @@ def test_what_a_run_goes_through_is_the_actuators(tmp_path):
     [
         ({"controller": None}, "needs a sampled law that measures the slip alone"),
         ({"controller": published("real-fault")["elqr"]}, "needs a sampled law"),
-        ({"load": Load(drift=1e-9)}, "Received a load"),
-        ({"initial_slip": 1e-3}, "Received a load, an initial slip"),
-        ({"initial_slip_rate": 1e-9}, "Received a load, an initial slip"),
+        ({"load": Load(drift=1e-9)}, "load, initial_slip and initial_slip_rate do not apply"),
+        ({"initial_slip": 1e-3}, "load, initial_slip and initial_slip_rate do not apply"),
+        ({"initial_slip_rate": 1e-9}, "load, initial_slip and initial_slip_rate do not apply"),
         (
             {"scheme": simulation_scheme("explicit", measurement=Measurement(slip_noise=1e-6))},
-            r"must be explicit, .*Received scheme explicit, substeps 1, measurement .*slip_noise=1e-06.*Omit scheme",
+            "needs the scheme explicit, .*Received scheme explicit, substeps 1, measurement .*slip_noise=1e-06.*Omit",
         ),
         (
             {"scheme": simulation_scheme("explicit", substeps=3, actuator=Actuator(stages=(Lag(time_constant=9.0),)))},
@@ -147,7 +147,7 @@ def test_what_does_not_apply_is_refused(wrong, said):
     with pytest.raises((ParameterError, UnknownNameError), match=said):
         campaign_problem(**({"fault": PATCH, "controller": CONTROLLER, "duration": 3000.0} | wrong))
     for given in ({"stress": 1.0}, {"spread": 0.1}):
-        with pytest.raises(ParameterError, match="need friction with a state"):
+        with pytest.raises(ParameterError, match="apply only to friction with a state"):
             campaign_problem(load_fault("real-fault"), None, **given)
 
 

@@ -152,13 +152,13 @@ def test_words_of_claims():
     cubic = ["x' = x^3 - x", "V = x^2"]
     assert claim_words(CUBIC) == cubic
     assert claim_words(EQUILIBRIUM) == [
-        *cubic, "level 2 is not proved by V", "another equilibrium, which no region of attraction contains: x = 1",
+        *cubic, "level 2 is refuted for this V", "another equilibrium, which no region of attraction contains: x = 1",
     ]  # fmt: skip
     assert claim_words(BEYOND) == [
-        *cubic, "V does not fall at x = 2, so that no level above 4 (rounded up) holds",
+        *cubic, "V does not decrease at x = 2, which refutes every level above 4 (rounded up)",
     ]  # fmt: skip
     assert claim_words(replace(BEYOND, lyapunov={(2,): F(1, 8)}))[-1] == (
-        "V does not fall at x = 2, so that no level above 0.5 (rounded up) holds"
+        "V does not decrease at x = 2, which refutes every level above 0.5 (rounded up)"
     )
     assert claim_words(replace(BEYOND, lyapunov={(2,): F(-1)}))[-1] == "V is not positive at x = 2"
     assert claim_words(replace(BEYOND, lyapunov={(2,): F(1), (1,): F(-2)}))[-1] == "V is not positive at x = 2"
@@ -171,7 +171,7 @@ def test_words_and_entries_of_a_region_with_both_ends_and_a_shape():
         "proved",
         *claim_words(PROVED),
         "the region contains 3*x^2 <= 1/8 (0.125 rounded down)",
-        "V does not fall at x = 2, so that no level above 4 (rounded up) holds",
+        "V does not decrease at x = 2, which refutes every level above 4 (rounded up)",
     ]
     assert region_entries(region) == {
         "verdict": "proved", "variables": ["x"], "V": "x^2", "everywhere": False, "level": "1/3", "shape": "3*x^2",
@@ -272,8 +272,8 @@ def test_a_set_is_evidently_empty(given, empty):
 
 
 def test_a_proof_on_an_empty_set_says_so():
-    assert "the set is empty, so that this holds trivially" in sentences(answer(MINUS))
-    assert "the set is empty, so that this holds trivially" not in sentences(answer(X2))
+    assert "the set is empty, so the statement holds trivially" in sentences(answer(MINUS))
+    assert "the set is empty, so the statement holds trivially" not in sentences(answer(X2))
 
 
 def test_a_verdict_is_that_of_the_proof():

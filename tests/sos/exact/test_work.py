@@ -98,7 +98,7 @@ def test_a_file_that_would_take_too_long_is_undecided_within_seconds(case, tmp_p
     start = time.process_time()
     found, said = verdict(HOSTILE[case](), tmp_path)
     assert found.startswith("undecided: ")
-    assert "steps of exact arithmetic" in found or f"more than {TERMS} terms" in found
+    assert "budget of exact arithmetic" in found or f"more than {TERMS} terms" in found
     assert said == []
     assert time.process_time() - start < 20
 
@@ -122,7 +122,7 @@ def test_nothing_is_counted_outside():
 def test_a_budget_ends_where_it_is_used_up_and_the_outer_one_goes_on():
     with limited(10):
         spend(10)
-        with limited(3), pytest.raises(WorkError, match="steps of exact arithmetic"):
+        with limited(3), pytest.raises(WorkError, match="budget of exact arithmetic"):
             spend(4)
         with pytest.raises(WorkError):
             spend(1)
@@ -259,7 +259,7 @@ def test_the_command_and_python_refuse_the_same_work_to_the_last_step(name, tmp_
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if fits(middle) else (middle, high)
-    for steps, expected in ((high, "proved"), (low, "undecided: the check takes more than")):
+    for steps, expected in ((high, "proved"), (low, "undecided: the check exceeds its budget")):
         assert fits(steps) == (expected == "proved")
         ((found, _),) = check_files([path]).values()
         assert found.startswith(expected)

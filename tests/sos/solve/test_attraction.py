@@ -266,13 +266,15 @@ def test_what_is_stable_everywhere_has_no_level():
 
 
 def test_what_is_not_proved_says_why():
-    assert sos.region_of_attraction({"x": "x"}).remark == "the linearised field has no V = x'Px. Give a V"
+    assert (
+        sos.region_of_attraction({"x": "x"}).remark == "the linearised field has no positive definite V = x'Px: pass V"
+    )
     assert sos.region_of_attraction({"x": "-x", "y": "-y"}, "x^2 - y^2").remark == "V is not positive"
     found = sos.region_of_attraction({"x": "x"}, "x^2")
     assert (found.verdict, found.level, found.remark) == (
         "undecided",
         None,
-        "no lower level was proved",
+        "no level below the refuted one was proved",
     )
     claim = sos.stability(VAN_DER_POL, degrees=())
     assert (claim.verdict, claim.check(), claim.reason) == ("undecided", True, "no degree of V was tried")

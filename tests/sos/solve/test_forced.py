@@ -50,7 +50,7 @@ def test_equations_that_contradict_each_other_name_their_monomials():
     found = program("(1 - a)*x^3 + a*y + x^2 + y^2").solve()
     assert not found
     assert "x^3, so a = 1; " in found.reason
-    assert "contains y, but its coefficient is 1; so no decisions" in found.reason
+    assert "contains y, but its coefficient is 1; hence the requirements" in found.reason
 
 
 def test_a_square_whose_coefficient_is_negative_is_named():

@@ -92,7 +92,7 @@ def test_where_only_squares_are_left_no_multiplier_is_needed(text):
 def test_an_empty_set_is_named():
     empty = prove("-1", on=["x >= 1", "x <= 0"])
     assert (empty.verdict, empty.set_is_empty) == (Positivity.SOS, True)
-    assert "the set is empty, so that this holds trivially" in sentences(empty)
+    assert "the set is empty, so the statement holds trivially" in sentences(empty)
     for answer in (prove("1", on=["x >= 1"]), prove("x - 1", on=["x >= 1"]), prove("-1", on=["x >= 0"]), prove("0")):
         assert not answer.set_is_empty
         assert not any("empty" in line for line in sentences(answer))
