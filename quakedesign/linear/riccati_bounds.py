@@ -19,7 +19,6 @@ from quakedesign.symbolic import plant
 from quakedesign.symbolic.friction_bounds import friction_bounds
 
 Range = tuple[Fraction, Fraction]
-_ZERO: Range = (Fraction(0), Fraction(0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -133,5 +132,5 @@ def _terms(fault: Fault, sectors: Sectors, ranges: Any, values: Any, drift: Frac
         ("viscosity", "slip rate", (values[plant.eta_hat] - eta[1], values[plant.eta_hat] - eta[0])),
         ("disturbance growing with slip rate", "slip rate", (growth[1], growth[1])),
         ("drift of the far end", "nothing", (Fraction(0), drift)),
-        ("disturbance at rest", "nothing", (-shaking, shaking) if shaking else _ZERO),
+        ("disturbance at rest", "nothing", (-shaking, shaking)),
     ]

@@ -9,7 +9,8 @@ import pytest
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
-from quakedesign.linear.riccati_bounds import uncertainty_bounds
+from quakedesign.fault.friction import friction_law
+from quakedesign.linear.riccati_bounds import Contribution, uncertainty_bounds
 from quakedesign.lyapunov.exact.perturbation_bounds import rest_pressure, sectors
 
 REAL = qd.load_fault("real-fault")
@@ -65,13 +66,35 @@ def test_each_term_has_the_far_ends_of_its_ranges():
     shaking = F("3.2e-4")
     assert found["disturbance at rest", "nothing"].range == (-shaking, shaking)
     assert bounds.nonvanishing == sum(c.bound for c in bounds.contributions if c.acts_on == "nothing")
+    assert found["friction chord slope", "slip"].range[0] == 0  # the weakest friction of the box has no slope
     low, high = found["friction chord slope", "slip rate"].range
     assert low == -high == 0
+    assert bounds.rest_pressure == rest_pressure(fault, (F(0), F(fault.reference.target_slip)), drift=drift)
     plain = bounds.to_dict()
     for name in ("control", "rest_pressure"):
         assert plain[name][0] <= getattr(bounds, name)[0] < getattr(bounds, name)[1] <= plain[name][1]
         assert plain[name] == pytest.approx([float(v) for v in getattr(bounds, name)], rel=1e-14)
     assert [plain["g1"], plain["g2"]] == pytest.approx([float(v) for v in sectors(fault).row_bounds], rel=1e-14)
+
+
+def test_friction_that_weakens_with_the_rate_acts_on_the_slip_rate_with_both_signs():
+    law = friction_law("slip-rate-weakening")(residual=0.2, drop=0.1, critical_rate=0.5)
+    bounds = uncertainty_bounds(replace(REAL, friction=law))
+    terms = {(c.name, c.acts_on): c for c in bounds.contributions}
+    low, high = terms["friction chord slope", "slip rate"].range
+    assert -low == high > 0
+    assert float(high) == pytest.approx(8e-8 * float(bounds.sectors.largest_effective_stress) * float(law.rate_slope))
+
+
+def test_shares_are_of_the_bounds_that_act_on_the_same_quantity():
+    bounds = uncertainty_bounds(REAL)
+    terms = [("a", "slip", 1), ("b", "slip", 3), ("c", "slip rate", 0), ("d", "nothing", 2)]
+    parts = tuple(
+        Contribution(name=name, acts_on=acts_on, range=(F(0), F(bound)), bound=F(bound))
+        for name, acts_on, bound in terms
+    )
+    shares = [line.split("|")[-2].strip() for line in replace(bounds, contributions=parts).table().splitlines()[2:]]
+    assert shares == ["25.0%", "75.0%", "-", "100.0%"]
 
 
 def test_the_table_gives_every_term_its_share_of_its_column():
