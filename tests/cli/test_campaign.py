@@ -63,6 +63,7 @@ def test_another_campaign_needs_force(call):
     assert (code, json.loads(out)["resumed"]) == (0, 0)
 
 
+@pytest.mark.slow
 def test_ctrl_c_says_that_it_can_go_on(call, monkeypatch):
     class Interrupted(SerialExecutor):
         def submit(self, task, /, *arguments, **named):

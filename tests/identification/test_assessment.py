@@ -99,6 +99,7 @@ def test_slow_evolution_that_looks_like_a_trend_leaves_the_sign_open(second):
     assert "the trend may begin with the change of rate" in found.assessment.open[-1]
 
 
+@pytest.mark.slow
 def test_a_drift_that_dies_out_and_looks_like_an_unsteady_beginning_leaves_the_sign_open():
     made = synthetic.sliding("rate-and-state-slip", ONE, sample=0.1, a=0.010, b=0.008, spring=3e-3)
     drift = -0.02 * (1 - np.exp(-made.load_point / 4e-5))

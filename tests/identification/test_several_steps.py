@@ -188,6 +188,7 @@ def test_the_chance_is_that_of_tables_of_f_and_the_law_is_the_likeliest_of_all_s
     assert found.common.assessment.verdict.startswith(verdict)
 
 
+@pytest.mark.slow
 def test_a_stiffness_is_shared_only_where_every_step_has_one():
     """Slip weakening behind a spring, then at measured slip."""
     records = [made(samples=80).noisy(0) for made in (synthetic.drawn, synthetic.weakening)]

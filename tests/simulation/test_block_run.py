@@ -112,6 +112,7 @@ def test_slips_are_those_of_an_integrator_with_events():
     assert apart[1] < 0.5 * apart[0]
 
 
+@pytest.mark.slow
 def test_slips_where_the_pressure_diffuses_are_those_of_an_integrator_with_events():
     chain, duration = replace(hurried(1000 * STEP), wells=(1400.0, 3500.0, 4600.0), diffusivity=2e6), 10.5 * STEP
     exact = with_events(chain, proved().law, 10)

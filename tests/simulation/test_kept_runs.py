@@ -49,6 +49,7 @@ def test_a_run_is_computed_once(folder, monkeypatch):
             simulate(REAL, LAW, **other)
 
 
+@pytest.mark.slow
 def test_machine_code_is_compiled_once_by_one_compiler(folder, monkeypatch, tmp_path):
     if simulate(REAL, LAW, duration=20.0).provenance["backend"] != "compiled":
         return

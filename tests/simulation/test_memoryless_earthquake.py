@@ -130,6 +130,7 @@ def test_the_measure_of_events_is_found_with_the_event(monkeypatch):
     assert len(runs) == 4
 
 
+@pytest.mark.slow
 def test_no_more_measures_are_kept_than_are_asked_for_again(monkeypatch):
     monkeypatch.setattr(memoryless_earthquake, "_PEAKS", {})
     monkeypatch.setattr(memoryless_earthquake, "_MOST_PEAKS", 1)

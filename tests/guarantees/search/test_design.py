@@ -116,6 +116,7 @@ def test_no_course_of_ten_thousand_violates_a_guarantee(row):
     assert largest[1].max() > 0.3 * float(claim.claims.slip_rate_error)  # the courses do hurt
 
 
+@pytest.mark.slow
 def test_the_worst_found_is_no_less_than_what_a_disturbance_does_to_the_plant_that_forgets_last():
     """Friction that falls as fast as it may, at its least: a linear loop, and a disturbance along its own response."""
     claim = designed("real peak")

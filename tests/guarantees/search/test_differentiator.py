@@ -83,6 +83,7 @@ def test_the_acceleration_is_what_all_claims_allow_at_once():
     assert float(claim.slip_acceleration) == pytest.approx(sum(parts) + held.force, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_answer_tells_the_least_bound_of_the_differentiator():
     claim = designed(("peak", NOISE))
     found = TrackingGuarantee(fault=REAL, proof=claim)

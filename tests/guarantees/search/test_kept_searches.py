@@ -39,6 +39,7 @@ def test_what_a_search_proposes_is_decided_each_time(task, monkeypatch):
     assert isinstance(found, NoProof) or found.check() is Verdict.PROVED
 
 
+@pytest.mark.slow
 def test_a_design_is_searched_once(task, tmp_path, monkeypatch):
     monkeypatch.setenv(cache.PLACE, str(tmp_path / "kept"))
     first = design.design_sampled_law(task, STEP)

@@ -278,6 +278,7 @@ class Failing(SerialExecutor):
         return super().submit(fail) if bad else super().submit(task, *arguments, **named)
 
 
+@pytest.mark.slow
 def test_a_batch_that_fails_leaves_the_others(tmp_path):
     failing = Failing(PROBLEM.start(PROBLEM.sample(4)))
     found = run_campaign(PROBLEM, 8, tmp_path, executor=failing, batch=3)
