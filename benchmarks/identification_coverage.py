@@ -26,12 +26,11 @@ from typing import Any
 import numpy as np
 
 from quakedesign.fault import FrictionLaw, friction_law
-from quakedesign.identification.experiment import TREND, TREND_IN_TIME
+from quakedesign.identification.experiment import START_STATE, TREND, TREND_IN_TIME
 from quakedesign.identification.fitting import Fit, fit, minimised, settled
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import _Choice, _Fitted, identified_as, set_up
 from quakedesign.identification.loading import prepared
-from quakedesign.identification.sliding_experiment import START_STATE
 from quakedesign.identification.two_states import with_two_states
 
 

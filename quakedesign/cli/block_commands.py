@@ -298,7 +298,7 @@ def export_chain(
     chain: "BlockChain", law: "LawOptions", fmu: bool, out: Path | None, force: bool, output: Output
 ) -> int:
     """The command `export`: the designed law, or that of a certificate, if it has a guarantee."""
-    from quakedesign.report.plain_text import export_lines
+    from quakedesign.report.terminal import export_lines
     from quakedesign.simulation.export import FILES, block_step, require_free, write_step
     from quakedesign.studies.several_blocks import chain_law
 

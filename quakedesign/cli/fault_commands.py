@@ -106,7 +106,7 @@ def scale(
         Time scale from operation-time or natural-period; by default operation-time,
         or natural-period if the ratio of the operation times differs from that of the natural periods.
     """
-    from quakedesign.report.plain_text import scale_lines
+    from quakedesign.report.terminal import scale_lines
     from quakedesign.studies.scaling import scale_answer
 
     clocks = {None: None, "operation-time": "reference.operation_time", "natural-period": "shear_modulus"}

@@ -316,7 +316,7 @@ def export(
     options = dict(locals())
     from quakedesign.cli.block_commands import export_chain, several_blocks
     from quakedesign.fault import load_fault
-    from quakedesign.report.plain_text import export_lines
+    from quakedesign.report.terminal import export_lines
     from quakedesign.studies.exporting import export_result
 
     if (

@@ -12,11 +12,10 @@ import numpy as np
 from numpy import ndarray
 
 from quakedesign.files import Json
-from quakedesign.identification.experiment import TREND, TREND_IN_TIME
+from quakedesign.identification.experiment import START_STATE, TREND, TREND_IN_TIME
 from quakedesign.identification.fitting import Fit, weighted
 from quakedesign.identification.loading import Loading
 from quakedesign.identification.record import Record, scatter
-from quakedesign.identification.sliding_experiment import START_STATE
 
 SEVERAL = 2.0  # ratio to the noise above which residuals are no noise
 _PEAK = 10.0  # critical slips after a change of rate that count as its peak

@@ -25,11 +25,18 @@ from quakedesign.identification.assessment import (
 from quakedesign.identification.correlated_noise import CorrelatedNoise, noise_of
 from quakedesign.identification.experiment import (
     DELAY,
+    START,
+    START_RATE,
+    START_STATE,
+    STIFFNESS,
     TREND,
     TREND_IN_TIME,
     Coordinate,
     Difference,
     Experiment,
+    MeasuredSlip,
+    SlidingExperiment,
+    SpringLoaded,
     delayed,
     trended,
 )
@@ -37,9 +44,7 @@ from quakedesign.identification.fitting import BetterFit, Fit, Profile, advantag
 from quakedesign.identification.identification_result import Identification, OtherLaw, ParameterEstimate, estimate
 from quakedesign.identification.loading import Loading, prepared
 from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
-from quakedesign.identification.sliding_experiment import START_RATE, START_STATE, STIFFNESS, SlidingExperiment
 from quakedesign.identification.two_states import SECOND_EFFECT, with_two_states
-from quakedesign.identification.weakening_experiment import START, MeasuredSlip, SpringLoaded
 
 _EFFECTS = 1e-5, 1.0, (2e-3, 3e-2)
 _SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}

@@ -12,8 +12,8 @@ from scipy.optimize import differential_evolution
 
 from quakedesign.errors import RecordError
 from quakedesign.identification.correlated_noise import noise_of
+from quakedesign.identification.experiment import Drive
 from quakedesign.identification.record import FAR_OFF, Record, reading_step, scatter, thinned
-from quakedesign.identification.sliding_experiment import Drive
 
 _MOST_POINTS = 2000  # largest number of means in the search for changes of rate
 _CANDIDATES = 400

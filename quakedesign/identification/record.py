@@ -13,8 +13,7 @@ from numpy import ndarray
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import RecordError, UnitError
 from quakedesign.fault.units import si_value
-from quakedesign.identification.column_names import COLUMNS, columns_by_name
-from quakedesign.identification.record_file import read_columns
+from quakedesign.identification.record_file import COLUMNS, columns_by_name, read_columns
 
 _SHEAR = {"shear_stress": "normal_stress", "shear_force": "normal_force"}
 _SAME = 0.01  # largest relative difference of two columns of friction

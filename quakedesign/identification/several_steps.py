@@ -19,13 +19,12 @@ from quakedesign.errors import RecordError
 from quakedesign.fault import FrictionLaw
 from quakedesign.files import Json
 from quakedesign.identification.assessment import Assessment, Check, sign_check
-from quakedesign.identification.experiment import Coordinate, Experiment
+from quakedesign.identification.experiment import STIFFNESS, Coordinate, Experiment
 from quakedesign.identification.fitting import Fit, minimised, weighted
 from quakedesign.identification.identification_result import Identification
 from quakedesign.identification.identify import Setup, identified_as, kinds_of, profiled
 from quakedesign.identification.loading import prepared
 from quakedesign.identification.record import Record, part, read_record, read_windows
-from quakedesign.identification.sliding_experiment import STIFFNESS
 from quakedesign.text import counted, shown
 
 _LEVEL = "reference_coefficient"

@@ -4,6 +4,6 @@ from .figures import stability_map as stability_map
 from .gain_map_drawing import gain_map_figure as gain_map_figure
 from .identification_page import identification_figure as identification_figure
 from .limits_table import limits_lines as limits_lines
-from .plain_text import scale_lines as scale_lines
 from .sentences import headline as headline
 from .sentences import verdict_lines as verdict_lines
+from .terminal import scale_lines as scale_lines

@@ -21,11 +21,11 @@ from quakedesign.loop import Actuator, Scheme, simulation_scheme
 from quakedesign.loop.schemes.base import MOST_SUBSTEPS, AperiodicClock
 from quakedesign.loop.sensing import Sensor
 from quakedesign.simulation import stepping
-from quakedesign.simulation.adaptive import require_smooth, smooth_march
 from quakedesign.simulation.closed_loop import ClosedLoop, names
 from quakedesign.simulation.compiled import STEP, prepare
 from quakedesign.simulation.integrators import FLOOR, AdaptiveIntegrator, Integrator
 from quakedesign.simulation.recorder import Recorder, events, metrics
+from quakedesign.simulation.smooth_integration import require_smooth, smooth_march
 from quakedesign.simulation.stepping import Advancer, Checkpoint, instants, march
 from quakedesign.simulation.stick_slip_plant import StickSlipLoop
 from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion

@@ -9,10 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from quakedesign.fault import friction_law
-from quakedesign.identification.experiment import TREND, Difference
+from quakedesign.identification.experiment import START_RATE, START_STATE, TREND, Difference, step
 from quakedesign.identification.identify import set_up
 from quakedesign.identification.loading import prepared
-from quakedesign.identification.sliding_experiment import START_RATE, START_STATE, step
 from quakedesign.identification.two_states import with_two_states
 
 SPECIFICATION = importlib.util.spec_from_file_location("synthetic_records", Path(__file__).with_name("synthetic.py"))

@@ -8,8 +8,8 @@ import pytest
 
 from quakedesign.errors import QuakedesignError, RecordError
 from quakedesign.fault.units import si_value
-from quakedesign.identification.column_names import COLUMNS, _meant
 from quakedesign.identification.record import read_record
+from quakedesign.identification.record_file import COLUMNS, _meant
 
 HEAD = "time [ms], load_point_displacement [um], shear_stress [MPa], normal_stress [kPa]"
 ROWS = ["0, 5, 3, 5000", "100, 6, 3.1, 5000", "300, 8, 3.2, 6000"]

@@ -13,13 +13,12 @@ from quakedesign.exact import rational
 from quakedesign.fault import friction_law, load_fault
 from quakedesign.identification import assessment
 from quakedesign.identification.assessment import Assessment, checks_of, sign_check, unsteady_beginning
-from quakedesign.identification.experiment import TREND, TREND_IN_TIME
+from quakedesign.identification.experiment import START_STATE, TREND, TREND_IN_TIME
 from quakedesign.identification.fault_file import cover, identified_fault
 from quakedesign.identification.fault_file import next_command as checked_command
 from quakedesign.identification.fitting import BetterFit
 from quakedesign.identification.identification_result import ParameterEstimate
 from quakedesign.identification.identify import _Choice, _Fitted, needed
-from quakedesign.identification.sliding_experiment import START_STATE
 
 COUNT = 401
 IDENTIFY = import_module("quakedesign.identification.identify")

@@ -13,7 +13,7 @@ from quakedesign.lyapunov.exact import certificate as checking
 from quakedesign.lyapunov.exact import certificate_files as term_files
 from quakedesign.lyapunov.exact.certificate_files import read_json
 from quakedesign.sos.exact import polynomial_files as files
-from quakedesign.sos.exact import reduction, strict
+from quakedesign.sos.exact import proofs, strict
 from quakedesign.sos.exact import work_budget as work
 from quakedesign.sos.exact.polynomial_files import load
 from quakedesign.sos.exact.proofs import SumOfSquares, holds
@@ -122,4 +122,4 @@ def test_both_checkers_have_the_same_limits():
         files.TERMS, files._VARIABLES, files._CONSTRAINTS, files._PRODUCTS, files._BASIS
     ]  # fmt: skip
     assert standalone("BYTES", "DENOMINATOR_BITS", "NESTING") == [strict.LARGEST_FILE, strict._GRID_BITS, strict._DEPTH]
-    assert standalone("STEPS", "POLYNOMIAL", "MONOMIALS") == [work.STEPS, work.TERMS, reduction._MONOMIALS]
+    assert standalone("STEPS", "POLYNOMIAL", "MONOMIALS") == [work.STEPS, work.TERMS, proofs._MONOMIALS]

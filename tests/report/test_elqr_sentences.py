@@ -26,7 +26,7 @@ def held(verdict, *, step="0.184", longest=LONGEST, witness=None):
 @pytest.mark.parametrize(
     ("loop", "said"),
     [
-        (held(Verdict.PROVED, step="0.1"), "stable with zero-order hold over T_s = 0.1 s, proved for any time-varying parameters"),
+        (held(Verdict.PROVED, step="0.1"), "T_s = 0.1 s, proved for any time-varying parameters, with integrals"),
         (held(Verdict.PROVED, step="0.1"), "T_s up to 0.1576 s and refuted for 0.15822 s"),
         (held(Verdict.REFUTED, witness=(F("1.4"), F(-1, 2), F(2))), "UNSTABLE with zero-order hold over T_s = 0.184 s"),
         (held(Verdict.UNDECIDED, step="0.158"), "undecided with zero-order hold over T_s = 0.158 s; stability is"),

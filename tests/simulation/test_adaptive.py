@@ -13,7 +13,7 @@ from thinned import few
 from quakedesign.errors import ParameterError, SimulationError
 from quakedesign.fault import Disturbance, friction_law, load_fault
 from quakedesign.laws import published
-from quakedesign.simulation import adaptive, simulate
+from quakedesign.simulation import simulate, smooth_integration
 from quakedesign.simulation.closed_loop import Load, Variation
 
 REAL = load_fault("real-fault")
@@ -103,7 +103,7 @@ def test_the_whole_task_agrees_with_scipy(method):
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_the_run_is_watched_as_one_with_a_fixed_step_is(method, monkeypatch):
     """Pieces of a chunk, metrics, events, works and kept instants; only the numerical error differs."""
-    monkeypatch.setattr(adaptive, "CHUNK", 100)
+    monkeypatch.setattr(smooth_integration, "CHUNK", 100)
     setting = {"step": 0.02, "duration": 8.4, "samples": 7}
     fixed = simulate(REAL, published("real-fault")["elqr"], **setting, plant="printed")
     run = simulate(REAL, published("real-fault")["elqr"], method=method, rtol=1e-11, **setting, plant="printed")
@@ -184,7 +184,7 @@ def test_where_the_solver_stops_it_is_tried_over_fewer_steps_and_then_no_longer_
         def vectors(vector):
             tried.append(count)
             if count > 1:
-                raise adaptive.StoppedError("step too small")
+                raise smooth_integration.StoppedError("step too small")
             return vector[:, None] + 1
 
         return vectors
@@ -192,9 +192,9 @@ def test_where_the_solver_stops_it_is_tried_over_fewer_steps_and_then_no_longer_
     def parts(vector):
         return SimpleNamespace(counter=vector[0], watched={"diverged": -1.0})
 
-    monkeypatch.setattr(adaptive, "_piece", piece)
+    monkeypatch.setattr(smooth_integration, "_piece", piece)
     recorder, heard = SimpleNamespace(parts=parts, step=1.0), []
-    found = adaptive.smooth_march(recorder, None, 1e-6, [0.0], [0, 20, 40], heard.append)
+    found = smooth_integration.smooth_march(recorder, None, 1e-6, [0.0], [0, 20, 40], heard.append)
     assert found.tolist() == [[0.0, 20.0, 40.0]]
     assert tried == [40, 2] + [1] * 40
     assert heard == [k / 40 for k in range(1, 41)]

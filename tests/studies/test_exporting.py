@@ -6,7 +6,7 @@ import pytest
 
 from quakedesign.fault import load_fault
 from quakedesign.laws import published
-from quakedesign.report.plain_text import export_lines
+from quakedesign.report.terminal import export_lines
 from quakedesign.studies.exporting import export_result
 
 LAB = load_fault("lab-fault")

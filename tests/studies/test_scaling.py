@@ -10,7 +10,7 @@ from quakedesign.errors import ParameterError, UnknownNameError
 from quakedesign.exact import rational
 from quakedesign.fault import load_fault
 from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
-from quakedesign.report.plain_text import scale_lines
+from quakedesign.report.terminal import scale_lines
 from quakedesign.studies.scaling import scale_answer
 
 LAB, REAL = load_fault("lab-fault"), load_fault("real-fault")

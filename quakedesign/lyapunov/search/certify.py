@@ -17,7 +17,7 @@ from quakedesign.laws import LoopField, Subject, law, model_of
 from quakedesign.lyapunov.exact.certificate import Certificate, cached_verdict
 from quakedesign.lyapunov.exact.claim import Loop, Verdict, loop_of
 from quakedesign.lyapunov.maps.sweep import SURE, Screened, Sweep, prove
-from quakedesign.lyapunov.search.falsification import escape
+from quakedesign.lyapunov.search.infeasibility import escape
 from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees, find_certificate, refute
 from quakedesign.symbolic.terms import Term
 from quakedesign.symbolic.terms import value as coefficient

@@ -12,8 +12,16 @@ from quakedesign.errors import PolynomialError
 from quakedesign.exact import fraction_of, nearest
 from quakedesign.sos.exact.polynomial import Exponents, Polynomial, degree
 from quakedesign.sos.exact.polynomial_statement import Statement, Structure
-from quakedesign.sos.exact.proofs import Functional, Proof, SumOfSquares, holds, identity_holds
-from quakedesign.sos.exact.reduction import full_bases, parity_classes, reduced_bases
+from quakedesign.sos.exact.proofs import (
+    Functional,
+    Proof,
+    SumOfSquares,
+    full_bases,
+    holds,
+    identity_holds,
+    parity_classes,
+    reduced_bases,
+)
 from quakedesign.sos.solve.facial_reduction import Block, at_kernels, at_real_zeros, at_zeros, modulo
 from quakedesign.sos.solve.moment import MomentProgram, MomentSolution
 from quakedesign.sos.solve.points import local_minima, negative_point, polished_zeros, rational_zeros

@@ -38,9 +38,9 @@ from quakedesign.sos.exact.proofs import (
     as_element,
     as_polynomial,
     in_echelon_form,
+    invariant,
     multiplier_is_positive,
 )
-from quakedesign.sos.exact.reduction import invariant
 from quakedesign.sos.solve.decide import StatementSearch, block_sizes, strict_proof
 from quakedesign.sos.solve.joint import Demand, joint_program
 from quakedesign.sos.solve.rounding import scaled

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from quakedesign.lyapunov.search.certify import closed_loop
-from quakedesign.lyapunov.search.falsification import escape
+from quakedesign.lyapunov.search.infeasibility import escape
 
 SPECIFICATION = importlib.util.spec_from_file_location(
     "escape_region", Path(__file__).with_name("super_twisting_region.py")

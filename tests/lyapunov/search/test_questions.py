@@ -143,7 +143,7 @@ def test_the_smallest_scale_is_enough_and_a_smaller_one_is_not():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: largest_lipschitz("elqr", (1, 1, 1, 1)), "applies to sliding-mode laws"),
+        (lambda: largest_lipschitz("elqr", (1, 1, 1, 1)), "requires a sliding-mode law"),
         (lambda: largest_lipschitz("cta", (1, 1)), "needs 4 gains"),
         (lambda: largest_gain_range("cta", (7, 5, 2, 1), lipschitz=-1), "must not be negative"),
         (lambda: largest_gain_range("cta", (7, 5, 2, 1), lipschitz=1, nominal=0), "0 < b_m"),

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from quakedesign.errors import PolynomialError
 from quakedesign.sos.exact import polynomial_text as text
 from quakedesign.sos.exact.polynomial_statement import statement
-from quakedesign.sos.exact.reduction import full_bases, invariant, parity_classes, reduced_bases
+from quakedesign.sos.exact.proofs import full_bases, invariant, parity_classes, reduced_bases
 
 
 def asked(polynomial, *, on=(), **options):

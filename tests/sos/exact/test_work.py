@@ -29,13 +29,14 @@ from quakedesign.sos.exact.proofs import (
     Functional,
     IntegerGram,
     Square,
+    _contributions,
     _functional_holds,
     _sum,
+    equality_monomials,
     form,
     integer_gram,
     localizing_matrix,
 )
-from quakedesign.sos.exact.reduction import _contributions, equality_monomials
 from quakedesign.sos.exact.work_budget import STEPS, TERMS, expanded, length, limited, longest, spend
 from quakedesign.sos.solve.engine import prove
 
