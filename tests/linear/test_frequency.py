@@ -7,6 +7,7 @@ from itertools import product
 import control
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from quakedesign.errors import ParameterError
 from quakedesign.linear.frequency import circle_limit, frequency_properties, slip_limit
@@ -81,6 +82,90 @@ def test_the_least_limit_may_lie_inside_the_range_of_beta():
 def test_a_loop_without_double_integral_action_has_no_limit():
     loop = loop_of((F(104), F(14), F(150), F(-1)), beta=(F(1),) * 2, slip=(F(-1),) * 2, rate=(F(2),) * 2)
     assert slip_limit(loop, F(2)) is None
+
+
+def test_no_limit_is_given_where_one_end_of_the_range_has_no_damping():
+    loop = loop_of((F(4), F(3, 10), F(1), F(1)), beta=(F(1), F(4)), slip=(F(-1),) * 2, rate=(F(-1, 2),) * 2)
+    assert slip_limit(loop, F(-1, 2)) is None
+
+
+@pytest.mark.parametrize(
+    ("gains", "rate"),
+    [
+        (("4", "0", "3", "2"), "2"),  # no feedback of the slip rate
+        (("4", "3", "3", "4"), "2"),  # k1·k3 = k2·k4
+        (("1", "3", "2", "40"), "2"),  # k1·k3 < k2·k4
+        (("0.24", "0.2", "1", "1"), "0.01"),  # the least limit lies inside the range, for a small damping
+    ],
+)
+def test_the_limit_is_the_least_of_all_beta(gains, rate):
+    k1, k2, k3, k4 = map(float, gains)
+    loop = loop_of(tuple(map(F, gains)), beta=(F(1), F(4)), slip=(F(-1),) * 2, rate=(F(rate),) * 2)
+    limit, beta = slip_limit(loop, F(rate))
+    b = np.linspace(1, 4, 300001)
+    damping = float(rate) + b * k2
+    every = b * k1 - b * k3 / damping - damping * k4 / k3
+    assert float(limit) == pytest.approx(every.min(), rel=1e-7)
+    assert float(beta) == pytest.approx(b[every.argmin()], abs=1e-3)
+
+
+def test_the_circle_criterion_allows_every_slope_where_the_real_part_is_nowhere_positive():
+    # characteristic polynomial z⁴ + 2z³ + 2z² + z + 10: Re D(jω) = ω⁴ − 2ω² + 10 > 0
+    loop = loop_of((1, 0, 1, 10), beta=(F(1),) * 2, slip=(F(-1),) * 2, rate=(F(2),) * 2)
+    assert circle_limit(loop, F(1), F(2), F(-1)) == float("inf")
+
+
+@pytest.mark.parametrize("share", [F(1, 2), F(2)])
+def test_margins_of_one_integral_in_closed_form(share):
+    """L = K/(z(z² + 3z + 2)): the phase is −180° at ω = √2, where |L| = K/6."""
+    loop = loop_of((0, 0, 6 * share, 0), beta=(F(1),) * 2, slip=(F(-2),) * 2, rate=(F(3),) * 2)
+    facts = frequency_properties(loop, (F(1), F(-2), F(3)))
+    expected = float(1 / share)
+    found = {"gain_margin": facts.gain_margin, "gain_reduction": facts.gain_reduction}
+    assert found == {
+        "gain_margin": pytest.approx(expected) if expected > 1 else None,
+        "gain_reduction": pytest.approx(expected) if expected < 1 else None,
+    }
+    at = brentq(lambda w: w * abs(2 - w**2 + 3j * w) - float(6 * share), 1e-3, 10)
+    phase = 90 - np.degrees(np.arctan2(3 * at, 2 - at**2))
+    assert facts.phase_margin == pytest.approx(abs(phase), rel=1e-6)
+    assert facts.delay_margin == pytest.approx(np.radians(phase % 360) / at, rel=1e-6)
+
+
+def test_margins_of_feedback_of_the_slip_in_closed_form():
+    """L = 10/(z² + z + 1): |L| = 1 where ω⁴ − ω² − 99 = 0, and both integrals cancel."""
+    loop = loop_of((10, 0, 0, 0), beta=(F(1),) * 2, slip=(F(-1),) * 2, rate=(F(1),) * 2)
+    facts = frequency_properties(loop, (F(1), F(-1), F(1)))
+    at = np.sqrt((1 + np.sqrt(397)) / 2)
+    phase = 180 - np.degrees(np.arctan2(at, 1 - at**2))
+    assert (facts.gain_margin, facts.gain_reduction) == (None, None)
+    assert facts.phase_margin == pytest.approx(phase, rel=1e-6)
+    assert facts.delay_margin == pytest.approx(np.radians(phase) / at, rel=1e-6)
+
+
+def test_the_nearest_of_several_crossings_is_the_margin():
+    """An unstable plant with integrals has a gain reduction from statics and one from the integrals."""
+    corner, gains = (F(1), F(29, 10), F(23, 10)), (104, 14, 150, 78)
+    loop = loop_of(gains, beta=(F(1),) * 2, slip=(F(29, 10),) * 2, rate=(F(23, 10),) * 2)
+    facts = frequency_properties(loop, corner)
+    w = np.logspace(-2, 3, 2_000_001)
+    z = 1j * w
+    L = (14 * z**3 + 104 * z**2 + 150 * z + 78) / (z**2 * (z**2 + 2.3 * z - 2.9))
+    crossings = np.flatnonzero((L.imag[:-1] * L.imag[1:] < 0) & (L.real[:-1] < 0))
+    factors = 1 / np.abs(L[crossings])
+    assert facts.gain_margin is None
+    assert not (factors > 1).any()
+    assert facts.gain_reduction == pytest.approx(factors[factors < 1].max(), rel=1e-4)
+    passing = np.flatnonzero((np.abs(L[:-1]) - 1) * (np.abs(L[1:]) - 1) < 0)
+    phases = np.degrees(np.angle(-L[passing]))
+    assert facts.phase_margin == pytest.approx(np.abs(phases).min(), rel=1e-4)
+    assert facts.delay_margin == pytest.approx((np.radians(phases % 360) / w[passing]).min(), rel=1e-4)
+
+
+def test_without_feedback_nothing_crosses():
+    loop = loop_of((0, 0, 0, 0), beta=(F(1),) * 2, slip=(F(-1),) * 2, rate=(F(2),) * 2)
+    facts = frequency_properties(loop, (F(1), F(-1), F(2)))
+    assert (facts.gain_margin, facts.gain_reduction, facts.phase_margin, facts.delay_margin) == (None,) * 4
 
 
 def test_the_circle_criterion_is_never_above_the_linear_limit_and_here_close():

@@ -52,6 +52,9 @@ def test_the_routh_test_refuses_roots_on_the_axis():
     assert not m.hurwitz([F(1), F(1), F(0)])
     assert m.hurwitz([F(-1), F(-2)])
     assert m.hurwitz([F(1), F(3), F(3), F(1)])
+    assert m.hurwitz([F(-1), F(-2), F(-3)])
+    assert m.hurwitz([F(1, 2), F(1), F(1)])
+    assert not m.hurwitz([F(-1), F(2)])
 
 
 def test_the_characteristic_polynomial_of_a_companion_matrix():

@@ -1,5 +1,6 @@
 """The error loop against the force balance itself, and coordinates that forget the units."""
 
+from dataclasses import replace
 from fractions import Fraction as F
 
 import numpy as np
@@ -13,6 +14,7 @@ from quakedesign.linear.linear_problem import Polytope, modal_scaling, polytope_
 from quakedesign.linear.robust_stability import sector_loop
 from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.symbolic import plant
+from quakedesign.symbolic.terms import Term
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +83,37 @@ def test_a_field_that_is_not_linear_is_refused():
     )
     with pytest.raises(ParameterError, match="linear field"):
         polytope_of(loop)
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        Term(F(1), (), (("e1", F(3), "s"),)),
+        Term(F(1), (), (("e1", F(1), "s"), ("e2", F(1), "s"))),
+        Term(F(1), (), (("e1", F(1), "a"),)),
+        Term(F(1), (), ()),
+    ],
+    ids=["cube", "product", "modulus", "constant"],
+)
+def test_a_field_with_one_other_term_is_no_polytope(real, term):
+    loop = sector_loop(published("real-fault")["elqr"], sectors(real))
+    assert len(polytope_of(loop).vertices) > 1
+    state = next(iter(loop.states))
+    parts = tuple((s, *rest) for s, (_, *rest) in zip(loop.states, term.factors, strict=False))
+    changed = replace(loop, field=dict(loop.field) | {state: (*loop.field[state], replace(term, factors=parts))})
+    with pytest.raises(ParameterError, match="linear field"):
+        polytope_of(changed)
+
+
+def test_a_linear_field_on_cells_is_no_polytope(real):
+    loop = sector_loop(published("real-fault")["elqr"], sectors(real))
+    with pytest.raises(ParameterError, match="linear field"):
+        polytope_of(replace(loop, domain="cells"))
+
+
+def test_the_slowest_vertex_bounds_the_rate():
+    one, two = ((F(-1), F(0)), (F(0), F(-2))), ((F(-3), F(0)), (F(0), F(-4)))
+    assert Polytope(states=("x", "y"), vertices={"one": one, "two": two}).slowest() == pytest.approx(-1)
 
 
 def test_modal_coordinates_do_not_depend_on_the_units_of_the_states(real):

@@ -6,13 +6,15 @@ from fractions import Fraction as F
 import numpy as np
 import pytest
 from own.printed_theorem import inverse_optimality
+from scipy.linalg import eigvalsh, solve_continuous_lyapunov
 
 import quakedesign as qd
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance, Reference
-from quakedesign.linear.linear_problem import LinearProblem
+from quakedesign.linear.linear_problem import LinearProblem, decreases, definite, lyapunov, rounded, times
 from quakedesign.linear.riccati import riccati_design
 from quakedesign.linear.sampled_stability import HeldPoles
+from quakedesign.lyapunov.exact.perturbation_bounds import Sectors
 
 YEAR = 31557600.0
 UNITS = {
@@ -94,6 +96,11 @@ def test_scaling_is_undone_exactly():
     assert float(inside.stiffness) == pytest.approx(1, rel=1e-12)
     # g1 in Pa/m over the unit of pressure per unit of slip
     assert inside.bounds[0] == problem.bounds[0] * scales.slip / scales.pressure
+    low, high = problem.sectors.rate
+    assert low < high
+    assert inside.sectors.rate == (low * scales.time, high * scales.time)
+    assert inside.sectors.largest_effective_stress == problem.sectors.largest_effective_stress / scales.pressure
+    assert problem.scales() == problem.scales(1)
 
 
 def test_a_loop_and_its_twin_have_the_same_poles():
@@ -114,5 +121,42 @@ def test_a_loop_and_its_twin_have_the_same_poles():
 
 def test_an_authority_that_is_not_the_least_is_refused():
     problem = LinearProblem.of(qd.load_fault("real-fault"))
-    with pytest.raises(ParameterError, match="the smallest in the range: beta >= 1"):
-        replace(problem, sectors=replace(problem.sectors, beta=(F(9, 10), F(3, 2))))
+    for change in ({"beta": (F(9, 10), F(3, 2))}, {"authority": F(0)}, {"authority": F(-1)}):
+        with pytest.raises(ParameterError, match="the smallest in the range: beta >= 1"):
+            replace(problem, sectors=replace(problem.sectors, **change))
+
+
+def unit_problem(**ranges):
+    """b = 1 and the nominal plant k̂ = η̂ = 1."""
+    given = {"beta": (F(1), F(1)), "slip": (F(-1), F(-1)), "rate": (F(1), F(1))} | ranges
+    sectors = Sectors(authority=F(1), row_bounds=(F(0), F(0)), largest_effective_stress=F(1), **given)
+    return LinearProblem(stiffness=F(1), damping=F(1), sectors=sectors)
+
+
+def exact_form(problem, gains, vertex):
+    """Θ with AᵀΘ + ΘA = −1 at a vertex, rounded."""
+    A = np.array(problem.loop(vertex, gains), dtype=float)
+    return rounded(solve_continuous_lyapunov(A.T, -np.eye(4)))
+
+
+def test_a_form_decreases_as_fast_as_its_generalised_eigenvalues_say():
+    problem, gains = unit_problem(beta=(F(1), F(2)), slip=(F(-1), F(1, 10))), (F(20), F(8), F(15), F(5))
+    form = exact_form(problem, gains, problem.vertices()[0])
+    theta, rates = np.array(form, dtype=float), []
+    for vertex in problem.vertices():
+        A = np.array(problem.loop(vertex, gains), dtype=float)
+        rates.append(eigvalsh(-(A.T @ theta + theta @ A), 2 * theta).min())
+    fastest = min(rates)
+    assert fastest > 0
+    assert decreases(problem, gains, form)
+    assert decreases(problem, gains, form, rate=F(fastest * 0.999))
+    assert not decreases(problem, gains, form, rate=F(fastest * 1.001))
+
+
+def test_a_form_that_is_not_positive_proves_nothing_though_it_decreases():
+    problem, gains = unit_problem(), (F(-20), F(8), F(15), F(5))
+    (vertex,) = problem.vertices()
+    assert np.linalg.eigvals(np.array(problem.loop(vertex, gains), dtype=float)).real.max() > 0
+    form = exact_form(problem, gains, vertex)
+    assert definite(times(-1, lyapunov(problem.loop(vertex, gains), form)))
+    assert not decreases(problem, gains, form)
