@@ -28,16 +28,16 @@ _NUMBERS = {"float": Real, "int": Integral, "Fraction": Rational, "Expr": Real, 
 """Types of numbers accepted for each annotation; SymPy and CasADi accept Python numbers."""
 _WORDS = {
     "float": "a number",
-    "SX": "an expression of CasADi",
+    "SX": "a CasADi expression",
     "int": "a whole number",
     "str": "a string",
     "bool": "True or False",
     "NoneType": "None",
 }
 _REMEDIES = {
-    "Fault": "Write load_fault('real-fault'), say.",
-    "Controller": "Use design(fault, 'cta').controller or published('real-fault')['cta'], say.",
-    "Fraction": "Write Fraction('0.1'), say.",
+    "Fault": "Give for example load_fault('real-fault').",
+    "Controller": "Give for example design(fault, 'cta').controller or published('real-fault')['cta'].",
+    "Fraction": "Give for example Fraction('0.1').",
     "float": "Give it in SI units.",
 }
 _Value = TypeVar("_Value")
@@ -83,7 +83,7 @@ if TYPE_CHECKING:
 else:
 
     def checked_dataclass(**options: object) -> Callable[[type], type]:
-        """Dataclass that checks the arguments of construction and methods, even if imported from its own module."""
+        """Dataclass that checks the arguments of construction and methods, also if not imported through `attach`."""
         return lambda kind: checked(dataclasses.dataclass(**options)(kind))
 
 
@@ -128,7 +128,7 @@ def _signature(function: Callable[..., object]) -> Signature:
 
 @cache
 def _accept(function: Callable[..., object], name: str) -> Callable[[Any], Any]:
-    """Function that returns a valid value of a parameter, NumPy numbers converted, and raises for an invalid one."""
+    """Function that returns a valid argument with NumPy numbers converted, and raises for an invalid argument."""
     parameter, hint = _signature(function).parameters[name], _hint(function, name)
     if parameter.kind is Parameter.VAR_POSITIONAL:
         return lambda values: tuple(_accepted(function, name, hint, value) for value in values)

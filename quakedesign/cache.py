@@ -66,7 +66,7 @@ def load(kind: str, *key: bytes) -> bytes | None:
             if not stat.S_ISREG(status.st_mode) or not _owned(status):
                 return None
             content = file.read()
-            with suppress(OSError):  # an entry that was read counts as new, and is not among the oldest
+            with suppress(OSError):  # reading renews the time of an entry, so that `_evict` deletes it later
                 os.utime(file.fileno())
     except OSError:
         return None

@@ -40,7 +40,7 @@ __all__ = ["check_files"]
 
 @checked
 def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tuple[str, list[str]]]:
-    """Verdict (``proved``, ``refuted`` or ``invalid: reason``) and statement for every certificate file.
+    """Verdict (``proved``, ``refuted``, ``undecided: reason``, ``invalid: reason``) and statement, by file.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tu
     Raises
     ------
     CertificateError
-        For a file that cannot be read.
+        For a path that is not a file.
     QuakedesignError
         For a fault that cannot be read.
     """
@@ -105,11 +105,11 @@ def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
         task, healing = plants.plant_like(claim.task, fault, wide=True), rational(fault.friction.rest_excess)
         covers = claim.covers_healing and healing > 0
         if covers:
-            task, uncovered = claim.beside_healing(task, healing)
-            if uncovered is not None:
+            task, covered_healing = claim.beside_healing(task, healing)
+            if covered_healing is not None:
                 raise CertificateError(
-                    f'healing of "{fault.name}" must be at most {uncovered:.3g}, covered with its disturbance. '
-                    f"Received {UpperBound(healing):.3g}"
+                    f'healing of "{fault.name}" must be at most {covered_healing:.3g}, the largest that the proof '
+                    f"covers together with the disturbance of the fault. Received {UpperBound(healing):.3g}"
                 )
         if claim.task != replace(task, name=claim.task.name):
             raise CertificateError(f'the data are not those of "{fault.name}"')
@@ -141,7 +141,7 @@ def _other_step(claim: Any, fault: "Fault") -> str:
     if not claim.sampled or claim.sampled_loop.step == own:
         return text
     proved, its = apart(claim.sampled_loop.step, own)
-    return f"{text}; proved at T_s = {proved} s, NOT at its T_s = {its} s"
+    return f"{text}; proved at T_s = {proved} s, NOT at the T_s of the fault, {its} s"
 
 
 def _polynomial(raw: Any) -> tuple[str, list[str]]:

@@ -16,12 +16,12 @@ from quakedesign.text import shown
 Kind = TypeVar("Kind")
 _allowed: ContextVar[bool] = ContextVar("allowed", default=False)
 _imported: set[str] = set()
-"""User modules whose classes were named."""
+"""Names of the user-defined modules whose classes have been loaded by `named`."""
 _OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
 
 
 def discovered(package: str, kind: type) -> dict[str, Any]:
-    """All concrete subclasses of a class in the modules of a package that have a name, by this name."""
+    """Concrete subclasses of `kind` in the modules of a package, by their attribute `name`; others are omitted."""
     kinds: dict[str, Any] = {}
     for info in iter_modules(import_module(package).__path__):
         own = vars(import_module(f"{package}.{info.name}")).values()
@@ -49,10 +49,13 @@ def user_code() -> Iterator[None]:
 
 
 def _raised_by(error: BaseException) -> str | None:
-    """User module in the traceback of an error; an unnamed one for a non-`Exception`, which only user code raises."""
+    """Name of the user module in the traceback of an error, or None.
+
+    For an error that is no `Exception`, which only user code raises: "a user-defined module" if no name is known.
+    """
     through = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
     by_others = isinstance(error, Exception) or not _imported or through[-1].startswith("rich.")  # closed pipe
-    others = None if by_others else "a module of the user's"
+    others = None if by_others else "a user-defined module"
     return next((module for module in reversed(through) if module in _imported), others)
 
 
@@ -87,7 +90,7 @@ def named(
     if in_file and not (code or _allowed.get()):
         raise UnknownNameError(
             f"{what} in a file must be one of {', '.join(known)}. Received {shown(name)}, which runs code of that "
-            "module. If you trust it, add --allow-code, in Python allow_code=True."
+            "module. If you trust the file, add --allow-code, or allow_code=True in Python."
         )
     if "__main__" in module.split("."):
         raise UnknownNameError(f"{what} must not be in __main__. Received {shown(name)}. Move it to another module.")

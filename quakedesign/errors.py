@@ -14,7 +14,7 @@ class QuakedesignError(Exception):
     Attributes
     ----------
     parts : tuple of QuakedesignError
-        The single errors, if one exception reports several; empty otherwise.
+        The individual errors, if one exception reports several; empty otherwise.
     code : str
         Kind of the error for scripts, such as ``parameter``; each class has its own.
     """
@@ -30,7 +30,7 @@ class QuakedesignError(Exception):
 
     @property
     def quantity(self) -> str:
-        """Quantity at fault: the text before "must", "need" or "needs" in the message; empty without these words."""
+        """Quantity in error: the message text before "must", "need" or "needs"; empty without these words."""
         subject, verb, _ = re.split(r" (must|needs?) ", f"{self.args[0]} must ", maxsplit=1)
         return subject if verb and subject != self.args[0] else ""
 
@@ -52,7 +52,7 @@ class RecordError(QuakedesignError, ValueError):
 
 
 class UnknownNameError(QuakedesignError, KeyError):
-    """A preset, law or controller that does not exist."""
+    """A name that does not exist, such as that of a preset, law, controller, objective or class."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -83,7 +83,7 @@ class WorkError(QuakedesignError, ArithmeticError):
 
 
 class SimulationError(QuakedesignError, RuntimeError):
-    """A closed loop that cannot be integrated as requested."""
+    """A simulation that cannot be run as requested, or worker processes or a scheduler that fail."""
 
 
 class OutputError(QuakedesignError, OSError):

@@ -117,7 +117,7 @@ def to_sympy(value: Fraction) -> "sp.Rational":
 
 
 def exact_text(value: Any) -> str:
-    """A rational as p/q, or p, of any length: ``str`` rejects more than 4300 digits, `Decimal` does not.
+    """Text p/q, or p for an integer, of a rational of any length; ``str`` rejects integers of over 4300 digits.
 
     Values of other types are written by ``str``.
     """
@@ -128,7 +128,7 @@ def exact_text(value: Any) -> str:
 
 
 def float_above(value: Fraction) -> float:
-    """Float at or just above a rational, infinite above the largest."""
+    """Smallest float that is not below a rational; infinity above the largest float."""
     try:
         number = float(value)
     except OverflowError:
@@ -137,7 +137,7 @@ def float_above(value: Fraction) -> float:
 
 
 def float_below(value: Fraction) -> float:
-    """Float at or just below a rational."""
+    """Largest float that is not above a rational; −infinity below the least float."""
     return -float_above(-value)
 
 
@@ -151,7 +151,7 @@ def shortly(value: Fraction | float) -> str:
 
 
 def apart(*values: Fraction) -> tuple[str, ...]:
-    """Texts of numbers, with six digits or as many as distinguish them, such as a value and its limit."""
+    """Texts of numbers, such as a value and its limit, with six digits, or more if needed to distinguish them."""
     texts, count = tuple(map(shortly, values)), len(set(values))
     for digits in (9, 12, 24):
         if len(set(map(Fraction, texts))) == count:
@@ -197,7 +197,7 @@ class Bound(Fraction):
         Parameters
         ----------
         unit : str
-            One that takes prefixes, such as Pa, m or m/s.
+            Unit that takes a prefix, such as Pa, m or m/s.
         digits : int
             Number of significant digits; digits before the point are always shown.
         """

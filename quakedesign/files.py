@@ -55,7 +55,7 @@ def read_text(
     try:
         return read_bytes(path, what, largest=largest, refusal=refusal).decode("utf-8-sig" if marked else "utf-8")
     except UnicodeDecodeError:
-        raise refusal(f"{what} cannot be read: {path}: its text is not UTF-8. Give a readable file.") from None
+        raise refusal(f"{what} must be UTF-8 text. Received {path}, which is not. Convert the file to UTF-8.") from None
 
 
 def read_bytes(path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError]) -> bytes:
@@ -69,7 +69,7 @@ def read_bytes(path: str | Path, what: str, *, largest: int, refusal: type[Quake
     largest : int
         Largest size [byte].
     refusal : type of QuakedesignError
-        Error that is raised when it cannot be read, is larger, or is a pipe, a device or a folder.
+        Error that is raised when the file cannot be read, is larger, or is a pipe, a device or a folder.
     """
     try:
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as handle:
@@ -96,7 +96,7 @@ if sys.platform != "win32":
 FAMILY = ".quakedesign-"
 """Beginning of the names of temporary folders."""
 PREFIX = f"{FAMILY}{sha256(platform.node().encode()).hexdigest()[:8]}-"
-"""The same with this machine's name: on a shared disk, a lock may be visible to one machine only."""
+"""`FAMILY` and a hash of this machine's name: on a shared disk, a lock may be visible to one machine only."""
 ASIDE = "aside"
 """Subfolder of a temporary folder for files moved aside; each is restored if its original place is empty."""
 
@@ -211,14 +211,14 @@ def _taken(folder: Path) -> int | None:
         except OSError:
             return None
         else:
-            if _stands(folder, lock):
+            if _is_same_folder(folder, lock):
                 return lock
             os.close(lock)
     raise BlockingIOError
 
 
-def _stands(folder: Path, lock: int) -> bool:
-    """Whether a folder is still the locked one, not swept or created anew since."""
+def _is_same_folder(folder: Path, lock: int) -> bool:
+    """Whether the locked folder still exists at its path: it was not removed or replaced by a new one."""
     try:
         return os.path.samestat(os.fstat(lock), os.stat(folder))
     except FileNotFoundError:
@@ -226,7 +226,7 @@ def _stands(folder: Path, lock: int) -> bool:
 
 
 def _locked(folder: Path) -> int:
-    """Descriptor that locks a folder until it is closed, at the latest when the process ends.
+    """Descriptor that locks a folder until the descriptor is closed, at the latest when the process ends.
 
     Raises
     ------

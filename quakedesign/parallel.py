@@ -39,11 +39,11 @@ from quakedesign.text import one_line
 
 _Result = TypeVar("_Result")
 _SWITCH = 2e-4  # switch interval of threads [s] while one runs in the background
-_PATIENT = 0.2  # time between two reports of progress [s]
+_REPORT_INTERVAL = 0.2  # time between two reports of progress [s]
 
 
 class Background:
-    """A second thread for runs: compiled steps and the C compiler need no interpreter lock."""
+    """Queue of runs in a second thread; they proceed in parallel, since compiled code releases the interpreter lock."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
@@ -51,7 +51,7 @@ class Background:
         self._done = 0.0
 
     def _report(self, done: float) -> None:
-        """Report the progress of the thread; ends the thread here if the caller no longer waits."""
+        """Store the progress of the run; raise in the second thread after `stop`, which ends the run."""
         if self._stopped:
             raise SimulationError("the run was stopped.")
         self._done = done
@@ -61,14 +61,14 @@ class Background:
         self._stopped = True
 
     def submit(self, run: Callable[..., _Result], *given: object, **named: object) -> "Future[_Result]":
-        """Queue a run; it takes ``progress``."""
+        """Queue a run: a callable that accepts the keyword ``progress``, a function of the completed fraction."""
         return self._executor.submit(run, *given, **named, progress=self._report)
 
     def result(self, run: "Future[_Result]", tell: Callable[[float], None]) -> _Result:
         """Wait for a run, reporting its progress."""
         while not run.done():
             tell(self._done)
-            wait([run], timeout=_PATIENT)
+            wait([run], timeout=_REPORT_INTERVAL)
         return run.result()
 
 
@@ -99,13 +99,13 @@ PATIENCE = 3.0  # longest wait [s] for a library that swallows the signal or doe
 class Interruption(KeyboardInterrupt):
     """Exception raised by a signal that ends the command.
 
-    After a plain `KeyboardInterrupt` inside ``exec`` of a text, as in generated classes, Python ends itself with
-    SIGINT, also if another exit code was requested.
+    It is a subclass because Python ends itself with SIGINT, and ignores a requested exit code, after a plain
+    `KeyboardInterrupt` inside ``exec`` of a text, as in generated classes.
     """
 
 
 class _Ending:
-    """State of the ending of a command."""
+    """Handlers of the signals that end a command, and their state."""
 
     def __init__(self, last: bool) -> None:
         self._last = last
@@ -154,7 +154,7 @@ class _Ending:
 
     @contextmanager
     def concluded(self) -> Iterator[None]:
-        """Treat every exception after a signal as its consequence: libraries convert it to other exceptions."""
+        """Treat every exception after a signal as an interruption: libraries convert `Interruption` to other types."""
         try:
             yield
         except BaseException as error:
@@ -162,7 +162,7 @@ class _Ending:
                 raise
             code = self._conclude()
             if self._last:
-                leave(code, whatever=True)
+                leave(code, even_if_unwritable=True)
             raise SystemExit(code) from None
 
     def _conclude(self) -> int:
@@ -189,7 +189,7 @@ def remedy(text: str) -> None:
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def signals_delayed() -> Iterator[None]:
     """Delay signals until the block has ended; processes started in it inherit the signal mask."""
     blocks = hasattr(signal, "pthread_sigmask")
     before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS) if blocks else ()
@@ -253,15 +253,15 @@ def _received(by: _Ending, last: bool) -> Iterator[None]:
         os.close(writer)
 
 
-def leave(code: str | int | None, *, whatever: bool = False) -> None:
+def leave(code: str | int | None, *, even_if_unwritable: bool = False) -> None:
     """End the process after the registered exit functions, without the interpreter's shutdown.
 
     Parameters
     ----------
     code : str or int or None
         As in `SystemExit`; with a text the process does not end here.
-    whatever : bool
-        End here even if the output can no longer be written; otherwise return in this case.
+    even_if_unwritable : bool
+        End the process even if stdout or stderr can no longer be written; otherwise return in this case.
     """
     if isinstance(code, str):
         return
@@ -270,7 +270,7 @@ def leave(code: str | int | None, *, whatever: bool = False) -> None:
         try:
             stream.flush()
         except (OSError, ValueError):
-            if not whatever:
+            if not even_if_unwritable:
                 return
     os._exit(code or 0)
 
@@ -285,7 +285,7 @@ def _say(line: str) -> None:
 # ----------------------------------------------------------------------
 # Worker processes, which end at once when this process ends, however it ends.
 
-_LIVES = 3
+_MOST_ATTEMPTS = 3
 _PR_SET_PDEATHSIG = 1
 
 
@@ -295,7 +295,7 @@ class Crew(ABC):
     @property
     @abstractmethod
     def width(self) -> int:
-        """Useful number of simultaneous tasks."""
+        """Number of tasks that should be submitted at a time."""
 
     @abstractmethod
     def submit(self, task: Callable[..., _Result], *arguments: object) -> "Future[_Result]":
@@ -312,7 +312,7 @@ class Crew(ABC):
         """
 
     def shared(self, value: Any) -> Any:
-        """Argument in place of a value that many tasks use, so that it is sent to the workers only once."""
+        """Reference to pass to tasks instead of a value that many tasks use; the value is sent to workers only once."""
         return value
 
     def results(
@@ -326,7 +326,7 @@ class Crew(ABC):
             When workers die repeatedly; workers killed from outside are replaced.
         """
         waiting = dict(enumerate(arguments))
-        for _ in range(_LIVES):
+        for _ in range(_MOST_ATTEMPTS):
             try:
                 futures = {self.submit(task, *given): place for place, given in waiting.items()}
                 for future in as_completed(futures):
@@ -337,8 +337,8 @@ class Crew(ABC):
             except BrokenExecutor:
                 self.renew()
         raise SimulationError(
-            f"workers must live until their tasks are done. They died {_LIVES} times, with {len(waiting)} tasks left. "
-            "Use fewer workers, or free memory."
+            f"workers must live until their tasks are done. They died {_MOST_ATTEMPTS} times, with {len(waiting)} "
+            "tasks left. Use fewer workers, or free memory."
         )
 
     def __enter__(self) -> Self:
@@ -351,8 +351,8 @@ class Crew(ABC):
 class Processes(Crew):
     """A pool of newly started processes on this machine, which is restored after a process has died.
 
-    An error in the block, including an interruption, ends the processes at once. So does the death of this process:
-    a thread in each of them waits for it, and on Linux the kernel ends them even in foreign code.
+    An error in the ``with`` block, including an interruption, ends the processes at once. So does the end of this
+    process: a thread in each worker waits for it, and on Linux the kernel kills the workers even in compiled code.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ class Processes(Crew):
 
     def submit(self, task: Callable[..., _Result], *arguments: object) -> "Future[_Result]":
         """See `Crew.submit`."""
-        with undisturbed():  # so that every started process is registered
+        with signals_delayed():  # so that every started process is registered
             try:
                 return self._pool.submit(task, *arguments)
             except (OSError, ValueError) as error:  # the death of a process closed the pipes of the starting one
@@ -415,7 +415,7 @@ def require_workers(count: int) -> int:
 
 
 def _enlist(packed: bytes) -> None:
-    """Prepare a process of a pool: the parent handles Ctrl-C, and the process ends with it, even during imports."""
+    """Prepare a worker: only the parent handles Ctrl-C; the worker ends when its parent ends, even during imports."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
     if sys.platform == "linux":
@@ -438,7 +438,7 @@ def _follow_parent() -> None:
 # ----------------------------------------------------------------------
 # Executors of many tasks: this process, other processes of this machine, a cluster, any `concurrent.futures` executor.
 
-_PATIENCE = "10s"
+_CONNECTION_TIMEOUT = "10s"
 
 
 class SerialExecutor(Executor):
@@ -534,22 +534,23 @@ class Cluster(UserExecutor):
         except ImportError:
             raise SimulationError(
                 f"a scheduler needs dask.distributed. Received {address!r}, and it is not installed. "
-                "Install it with pip install 'dask[distributed]', or leave the scheduler out."
+                "Install it with pip install 'dask[distributed]', or omit scheduler."
             ) from None
         try:
-            self._client = Client(address, timeout=_PATIENCE, set_as_default=False)
+            self._client = Client(address, timeout=_CONNECTION_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             said = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise SimulationError(
-                f"a scheduler must answer at {address!r}. {said}. Start one with 'dask scheduler', or omit scheduler."
+                f"scheduler must be the address of a running scheduler. Received {address!r}: {said}. Start one with "
+                "'dask scheduler', or omit scheduler."
             ) from None
         try:
-            self._client.wait_for_workers(1, timeout=_PATIENCE)
+            self._client.wait_for_workers(1, timeout=_CONNECTION_TIMEOUT)
         except TimeoutError:
             self._client.close()
             raise SimulationError(
-                f"a scheduler must have workers. The one at {address!r} has none. Start one with 'dask worker "
-                f"{address}', or leave the scheduler out."
+                f"a scheduler must have workers. Received {address!r}, which has none. Start one with 'dask worker "
+                f"{address}', or omit scheduler."
             ) from None
         super().__init__(self._client.get_executor(pure=False))
 
@@ -583,8 +584,8 @@ class Cluster(UserExecutor):
         except (KilledWorker, CancelledError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
             raise SimulationError(
-                f"workers of the cluster must live until their tasks are done. {said} Give them more memory, or ask "
-                "for processes of this machine."
+                f"workers of the cluster must live until their tasks are done. Received: {said}. Give them more "
+                "memory, or omit scheduler to use processes of this machine."
             ) from None
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -593,7 +594,7 @@ class Cluster(UserExecutor):
 
 
 def crew_of(workers: int | None, scheduler: str | None = None, executor: Executor | None = None) -> Crew:
-    """Processes, unless a scheduler or an executor is given.
+    """Crew on a scheduler or an executor if one is given, else a pool of local processes.
 
     Parameters
     ----------
@@ -601,6 +602,8 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
         Number of processes, or of simultaneous tasks of an executor; one per core if None.
     scheduler : str, optional
         Address of a dask.distributed scheduler.
+    executor : Executor, optional
+        User-defined executor, which the caller opens and closes.
 
     Raises
     ------

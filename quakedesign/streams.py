@@ -11,7 +11,7 @@ if sys.platform != "win32":
 
 LACKS_MEMORY = 4
 """Exit code of a command that ran out of memory, without a result."""
-_NARROWEST, _WIDEST = 20, 1000  # columns; help layout never ends below 3, and huge widths fill the memory with blanks
+_NARROWEST, _WIDEST = 20, 1000  # columns; below 3 help layout loops endlessly; huge widths fill the memory with blanks
 _LEAST = 600 * 2**20  # bytes of address space
 _SAID = ("cannot allocate memory", "failed to map", "out of memory", "can't start new thread", "std::bad_alloc")
 

@@ -96,13 +96,13 @@ def _shortened(text: str, length: int) -> str:
 
 
 def lasting(seconds: float, digits: int = 4) -> str:
-    """A time in seconds, from two hours on also in years, days or hours: the largest unit that it contains twice."""
+    """A time in seconds; from two hours on also in years, days or hours (largest unit with a value of at least 2)."""
     short = duration(seconds)
     return f"{seconds:.{digits}g} s" + ("" if short.endswith(" s") else f" ({short})")
 
 
 def duration(seconds: float) -> str:
-    """A time in years, days or hours, the largest unit that it contains twice, else in seconds."""
+    """A time in years, days or hours, the largest of these with a value of 2 or more; else in seconds."""
     size, name = next(((size, name) for size, name in _TIMES if seconds >= 2 * size), (1.0, "s"))
     return f"{plain(seconds / size)} {name}"
 
@@ -127,7 +127,7 @@ def power_of(value: float) -> int:
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """Significant digits without a power of ten."""
+    """Number with significant digits; without a power of ten from 1e-4 to 1e15."""
     return f"{float(f'{value + 0.0:.{digits}g}'):.15g}"
 
 

@@ -87,7 +87,7 @@ def methods(kind):
 WRONG = {
     "a name of a law": (
         lambda: qd.simulate(LAB, "cta"),
-        "controller of simulate .* Received 'cta'. Use design",
+        "controller of simulate .* Received 'cta'. Give for example design",
     ),
     "a name of a fault": (lambda: qd.simulate("lab-fault"), "fault of simulate must be a Fault.*load_fault"),
     "a text as density": (lambda: dataclasses.replace(LAB, density="2600 kg/m^3"), "density of Fault must be a number"),
@@ -259,7 +259,7 @@ def test_an_expression_of_casadi_may_be_of_any_kind_or_a_number(value):
 
 @pytest.mark.parametrize("value", ["x", None, True, np.ones(2)])
 def test_what_is_no_expression_of_casadi_is_refused(value):
-    with pytest.raises(ParameterError, match=r"x of Measurement\.measure must be an expression of CasADi"):
+    with pytest.raises(ParameterError, match=r"x of Measurement\.measure must be a CasADi expression"):
         Measurement().measure([], [], value)
 
 

@@ -87,10 +87,10 @@ def test_a_guarantee_covers_the_fault_whose_data_it_has(monkeypatch, tmp_path):
     monkeypatch.setattr(
         "quakedesign.fault.load_fault", lambda name, **_: slower if name == "slower" else load_fault(name)
     )
-    told = 'the data are those of "real-fault", box paper; proved at T_s = 0.184 s, NOT at its T_s = 0.5 s'
+    told = 'the data are those of "real-fault", box paper; proved at T_s = 0.184 s, NOT at the T_s of the fault, 0.5 s'
     assert checked(path, "slower") == ("proved", [*said, told])
     slower = replace(slower, sampling_time=0.1840001)
-    assert checked(path, "slower")[1][-1].endswith("T_s = 0.184 s, NOT at its T_s = 0.1840001 s")
+    assert checked(path, "slower")[1][-1].endswith("T_s = 0.184 s, NOT at the T_s of the fault, 0.1840001 s")
     assert checked(path, "lab-fault") == ('invalid: the data are not those of "lab-fault"', [])
     raw = json.loads(path.read_text())
     raw["disturbance"]["change"] = "69/312500"

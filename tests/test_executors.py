@@ -113,7 +113,7 @@ def test_what_many_tasks_take_is_sent_once_and_again_where_it_is_lost(scheduler)
 def test_a_scheduler_without_workers_is_told_what_to_start(monkeypatch):
     from distributed import LocalCluster
 
-    monkeypatch.setattr(executors, "_PATIENCE", "300ms")
+    monkeypatch.setattr(executors, "_CONNECTION_TIMEOUT", "300ms")
     with LocalCluster(n_workers=0, processes=False, dashboard_address=":0", protocol="tcp") as cluster:
         with pytest.raises(SimulationError, match=r"a scheduler must have workers.*Start one with 'dask worker tcp"):
             Cluster(cluster.scheduler_address)
@@ -147,8 +147,8 @@ def test_a_number_of_workers_that_is_none(count):
 
 
 def test_a_scheduler_that_does_not_answer(monkeypatch):
-    monkeypatch.setattr(executors, "_PATIENCE", "100ms")
-    with pytest.raises(SimulationError, match="a scheduler must answer"):
+    monkeypatch.setattr(executors, "_CONNECTION_TIMEOUT", "100ms")
+    with pytest.raises(SimulationError, match="scheduler must be the address of a running scheduler"):
         executors.Cluster("tcp://127.0.0.1:9")
 
 

@@ -28,7 +28,7 @@ def test_what_is_no_file_is_refused_at_once(tmp_path):
         "zero": "regular file",
         "loop": "Too many levels",
         "large": "at most 2 KiB",
-        "latin": "not UTF-8",
+        "latin": "must be UTF-8 text",
         ".": "Is a directory|regular file",
         "none": "No such file",
         "x" * 5000: "File name too long",

@@ -12,7 +12,7 @@ import pytest
 
 from quakedesign.cli import main
 from quakedesign.files import write_whole
-from quakedesign.parallel import SIGNALS, ending, remedy, undisturbed
+from quakedesign.parallel import SIGNALS, ending, remedy, signals_delayed
 
 
 @pytest.fixture(autouse=True)
@@ -74,7 +74,7 @@ def test_a_signal_waits_for_the_block_even_if_another_thread_receives_it(capsys)
     other.start()
 
     def block():
-        with undisturbed():
+        with signals_delayed():
             signal.pthread_kill(other.ident, signal.SIGTERM)
             for _ in range(20):  # bytecode, between which Python calls its handlers
                 time.sleep(0.01)

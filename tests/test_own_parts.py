@@ -179,7 +179,7 @@ def test_no_command_runs_code_that_a_file_names(command, law, code, capsys):
     assert (said.out, said.err.count("\n")) == ("", 1)
     assert not (code / "ran").exists()
     if command[0] == "fault":
-        assert "add --allow-code, in Python allow_code=True" in said.err
+        assert "add --allow-code, or allow_code=True in Python" in said.err
         with pytest.raises(UnknownNameError, match="allow_code=True"):
             qd.load_fault(path)
 

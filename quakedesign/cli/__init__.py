@@ -79,10 +79,10 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _with_help(error: CycloptsError) -> str:
-    """Error message of a command line, with a pointer to the help unless it is about a value and states a remedy."""
+    """Error message of a command line; a pointer to --help follows unless the error is about an option's value."""
     if isinstance(error, CoercionError):
         return str(error)
-    hyphen = " Join a value that begins with - to its option by =." if isinstance(error, MissingArgumentError) else ""
+    hyphen = " If a value begins with -, write --option=value." if isinstance(error, MissingArgumentError) else ""
     return f"{error}{hyphen} See {' '.join(('quakedesign', *(error.command_chain or ())))} --help."
 
 

@@ -70,7 +70,7 @@ app.version = _version
 
 
 def specified(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Given options, those that are not None."""
+    """Options whose value is not None."""
     return {name: value for name, value in options.items() if value is not None}
 
 
@@ -131,7 +131,7 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
     if path is None:
         return
     if os.path.isdir(path):
-        raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another --out.")
+        raise OutputError(f"{what} must be a file. Received {path}, which is a folder. Choose another path.")
     if os.path.exists(path) and not force:
         raise OutputError(f"{what} must be new. Received {path}, which exists. Give --force to replace it.")
     require_writable(path)

@@ -48,7 +48,7 @@ def blocks(
 ) -> int:
     """Check whether one block is an adequate model of a fault, by guarantees for the fault cut into several blocks.
 
-    Each block has its own friction law, any one within the uncertainty box, and its own disturbance. Springs connect
+    Each block has its own friction law, any law within the uncertainty box, and its own disturbance. Springs connect
     neighbours. A law is designed for each number of blocks. Exit code 0 only if every number of blocks has a proof.
 
     Parameters
@@ -134,11 +134,11 @@ def _scope(proof: Any, chain: "BlockChain") -> list[str]:
     """Conditions of a statement about blocks, and its terms."""
     from quakedesign.studies.several_blocks import farthest_balance
 
-    meant = "the load of a pressure is the pressure that balances the blocks on the reference"
+    meant = "'load of a pressure' in the statement: the well pressure that keeps the blocks in balance on the reference"
     if chain.has_state:
         return [
-            "a log state is ln of the state over D_c/V; |y| is bounded for log states and pulls [MPa]; the load of a "
-            "pressure is the plan",
+            "log state: ln(θV/D_c), θ the friction state; pull: shear stress by springs and wells [MPa]; a bound |y| "
+            "is one of a log state or a pull; load of a pressure: the planned pressure",
         ]
     if (far := farthest_balance(chain, proof)) is not None:
         meant = (
@@ -164,7 +164,7 @@ def _lines(proof: Any, chain: "BlockChain", one: "ChainRun | SlidingChainRun | N
     if proof.available:
         conditions = [*proof.statement(), *_scope(proof, chain)]
         return conditions if one is None else one.screen(conditions)
-    far = "the command limits gives the pressures that every controller of this file needs with its diffusivity"
+    far = "the command limits gives the pressures that every controller needs for the diffusivity of this fault file"
     return [proof.sentence(), *([far] if chain.diffusivity else [])]
 
 
@@ -186,13 +186,14 @@ def chain_limits(chain: "BlockChain", output: Output, **beside: Any) -> int:
 
 
 def block_law(named: str, usual: str, certificate: Path | None = None) -> str:
-    """Kind of law of several blocks.
+    """Kind of law of several blocks: `named`, or the default kind if `named` is `usual`, the default of the command.
 
     Raises
     ------
     ParameterError
-        For a kind together with a certificate, which has its own.
+        For a kind together with a certificate, which contains its own law.
     UnknownNameError
+        For a kind that does not exist.
     """
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
@@ -242,7 +243,7 @@ _HEADS = ("law", "proved", "", "in the run", "", "pressure", "")
 
 
 def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any], output: Output) -> int:
-    """The command `compare`: laws whose wells use all measurements, or only their own."""
+    """The command `compare`: centralised laws (each well uses all measurements) and decentralised laws (its own)."""
     from quakedesign.studies.several_blocks import run_of_chain, run_sliding_chain
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# The main job.
+# The command `design`.
 
 _SHARED = ("objective", "continuous", "stress", "spread", "disturbance_class")
 
@@ -97,7 +97,7 @@ class DesignOptions(WellOptions):
     accept_poor_fit: bool = False
 
     def problem(self, fault: str) -> "tuple[Fault, dict[str, Any]]":
-        """Fault of a name, and the arguments of `designed_comparison`; checked before heavy libraries load."""
+        """Fault that a name denotes, and arguments of `designed_comparison`; checked before heavy libraries load."""
         from quakedesign.fault import load_fault, with_accepted_fit
 
         loaded = load_fault(fault, box=self.box, disturbance=self.disturbance)
@@ -137,7 +137,7 @@ class DesignOptions(WellOptions):
 
     @property
     def _laws(self) -> str:
-        """Requested laws; with the slip alone, the only law that exists."""
+        """Requested law, or all; if only the slip is measured, elqr, the only law that can be designed then."""
         if self.measured != "slip" or self.controller == "elqr":
             return self.controller
         if self.controller != "all":
@@ -225,7 +225,7 @@ def controllers(name: str, fault: "Fault | None" = None) -> list[str]:
 
 
 def positive(comparison: Any) -> bool:
-    """Whether every design is proved, its premises except those on run and start hold, and its run is harmless.
+    """Whether every design is proved, its premises listed in `needed` hold, and its run is harmless.
 
     False for a design without the guarantee of its sampled loop.
     """

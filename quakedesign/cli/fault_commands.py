@@ -100,8 +100,8 @@ def scale(
     controller
         cta, dia or elqr.
     gains
-        published, or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min
-        the smallest N̂ of the source).
+        published, or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min,
+        N̂_min the smallest N̂ of the source).
     clock
         Time scale from operation-time or natural-period; by default operation-time,
         or natural-period if the ratio of the operation times differs from that of the natural periods.
@@ -117,7 +117,7 @@ def scale(
 
 @app.command
 def errata(*rows: int, output: Output = PLAIN) -> int:
-    """List the statements of the paper that cannot be taken literally; every row is recomputed.
+    """List the statements of the paper that need a correction; every correction is re-checked by computation.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def errata(*rows: int, output: Output = PLAIN) -> int:
 
 
 def _row_lines(row: Json) -> list[str]:
-    outcome = "holds" if row["holds"] else "DOES NOT HOLD"
+    outcome = "correction confirmed" if row["holds"] else "CORRECTION NOT CONFIRMED"
     text = f"{row['row']}. {outcome} ({row['kind']}): {row['evidence']}"
     return [text, f"    printed: {row['printed']}", f"    correct: {row['correct']}"]
 
@@ -185,9 +185,9 @@ def init(
 
 
 _SOURCE = (
-    "Preset or .toml file that supplies everything but the friction of the file to write. If the identified friction "
-    "has a state and its own has none, its disturbance and T_s are not used; a T_s that it does not state follows from "
-    "the identified friction."
+    "Preset or .toml file from which --out takes everything except friction. If the identified friction has a state "
+    "and the friction of this fault has none, the disturbance is omitted and T_s is chosen for the identified "
+    "friction. T_s is also chosen if both have a state and this fault specifies no T_s."
 )
 
 
@@ -218,8 +218,8 @@ def identify(
 
     Velocity steps and slide-hold-slide tests give rate-and-state parameters; a measured slip, or a test on a stiff
     machine, gives slip-weakening parameters. The first line is the verdict: the fit explains the record, does not
-    explain it, or the record cannot tell. Exit code 0 only if the fit explains the record and every parameter is
-    determined.
+    explain it, or the record does not suffice to decide. Exit code 0 only if the fit explains the record and every
+    parameter is determined.
 
     Parameters
     ----------
@@ -229,7 +229,8 @@ def identify(
         column separator; xlook's text and reduced binary; vectors of a MATLAB file. A column weight (1/variance of
         friction, in any unit) weights the samples.
     more
-        Further files, each with a step of the same experiment. Each step is fitted alone, then one law to all steps.
+        Further files, each with one velocity step of the same experiment. Each step is fitted alone; then one law is
+        fitted to all steps.
     law
         Friction law. By default rate-and-state-aging and rate-and-state-slip are fitted and the better one is taken;
         others are regularised-rate-and-state, exponential-slip-weakening and linear-slip-weakening.
@@ -248,8 +249,8 @@ def identify(
         Windows of a file that are separate steps, such as '0 s to 60 s, 60 s to 120 s', or auto, which cuts midway
         between changes of rate.
     rates
-        Rates of the load point one after the other, such as '1 um/s, 10 um/s', where they are known; from its
-        displacement by default.
+        Successive rates of the load point, such as '1 um/s, 10 um/s', if known; by default they are computed from the
+        displacement of the load point.
     states
         Number of friction states; 2 may explain a record that 1 does not, but a fault file can have only 1.
     trend

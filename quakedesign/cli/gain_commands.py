@@ -127,7 +127,7 @@ def _sampled(
 
 
 def _values(synthesis: "Synthesis | None") -> Json:
-    """Answer as JSON: gains and ranges as strings, measured values as numbers."""
+    """Result as JSON: gains and ranges as strings, measured values as numbers."""
     if synthesis is None:
         return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
     ranges = synthesis.certificate.loop.uncertain
@@ -164,9 +164,9 @@ def _print(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> 
         out.print(f"measured, not proved: {synthesis.objective} of one {of_run.format(**more)}")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     unit = "" if synthesis.unit == "-" else f" [{synthesis.unit}]"
-    for column in ("gains", f"{synthesis.objective}{unit}", "norm", "better by"):
+    for column in ("gains", f"{synthesis.objective}{unit}", "norm", "improvement factor"):
         table.add_column(Text(column))
-    rows: list[tuple[str, float | None, float, float | None]] = [("these", synthesis.value, synthesis.norm, None)]
+    rows: list[tuple[str, float | None, float, float | None]] = [("synthesised", synthesis.value, synthesis.norm, None)]
     rows += [
         (" ".join(f"{float(k):.4g}" for k in c.gains.values()), c.value, c.norm, c.ratio) for c in synthesis.compared
     ]
@@ -205,9 +205,9 @@ def gain_map(
 ) -> int:
     """Map where two gains are certified, at one or more levels of |h'|, with certificates, figure and table.
 
-    Every grid point is screened in floating point. All points at the edge of the certified region of a level, and a
-    random sample inside, are then proved exactly; figure and table distinguish screened from proved points. Exit code 0
-    if some point is certified and every edge point is proved.
+    Every grid point is screened in floating point. At every level, all points at the edge of the screened region and a
+    random sample of its inner points are then proved exactly; figure and table distinguish screened from proved points.
+    Exit code 0 if some point passes the screening and every edge point is proved.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def gain_map(
         --gains.
     lipschitz
         One or more bounds on |h'|, the rate of change of the matched perturbation h; by default 25, 50, 75, 90 and 99 %
-        of the bound that no proof can exceed.
+        of the largest |h'| for which any proof can exist.
     gain_range
         b_m and b_M, the range of the input gain β.
     points

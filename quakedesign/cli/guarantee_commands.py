@@ -82,8 +82,8 @@ def guarantee(
         Of a design. peak: the smallest certified slip-rate error. tracking: a smaller slip error under a drifting
         disturbance, with a somewhat larger slip-rate error.
     gains
-        k1 to k4 of an e-LQR with integral action, summed once per sample; without them a law is designed that estimates
-        the disturbance instead. For a sliding mode its base gains (λ = 1), which the command scales by λ.
+        k1 to k4 of an e-LQR, whose integral is a sum over the samples; by default a law is designed that estimates the
+        disturbance instead of integral action. Of a sliding mode: base gains (λ = 1); the command chooses λ.
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
@@ -241,7 +241,7 @@ def limits(
         Largest withdrawal that the limits assume, such as '20 MPa'; in slow sliding the largest deviation from the
         planned pressure. By default the effective normal stress, of several blocks the smallest. --withdrawal and the
         other options of the pump are for the proved designs alone.
-    around
+    setup_options
         Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; with noise
         the smallest slip-rate error of every controller is larger.
     stress

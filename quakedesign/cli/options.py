@@ -40,7 +40,7 @@ Texts = Annotated[tuple[str, ...], Parameter(consume_multiple=True)]
 
 
 def _gains(_type: object, tokens: Sequence[Token]) -> tuple[str, ...]:
-    """One word, or numbers as typed."""
+    """Texts of --gains as typed: one keyword, or numbers, each of which is checked."""
     texts = tuple(token.value for token in tokens)
     for place, text in enumerate(texts if len(texts) > 1 else (), start=1):
         rational(text, f"gain k{place}")
@@ -91,12 +91,12 @@ def _exact_reader(unit: str) -> Callable[[object, Sequence[Token]], str]:
 
 
 def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> str | None:
-    """L²/D [s] as given, or from the distance of a well [m] and the diffusivity of the rock [m²/s].
+    """Diffusion time L²/D [s], as given or from the distance L of a well [m] and the diffusivity D [m²/s].
 
     Raises
     ------
     ParameterError
-        For both forms, for only distance or diffusivity, or for a value that is not positive.
+        If both forms are given, if only one of distance and diffusivity is given, or if one is not positive.
     """
     if well is None and diffusivity is None:
         return diffusion
@@ -240,8 +240,8 @@ class LawOptions:
         cta, dia or elqr, or your own law as module:Class; none (not for export): a run without control.
     gains
         published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
-        time), or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min the
-        smallest N̂ of the box). Rate-and-state faults: designed.
+        time), or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min
+        the smallest N̂ of the box). Rate-and-state faults: designed.
     scale
         Scale λ of a sliding mode, decimal or p/q; replaces that of --gains.
     feedforward
@@ -249,7 +249,7 @@ class LawOptions:
     certificate
         Certificate file that guarantee --out wrote; it replaces the options above. The law runs with the T_s, pressure
         limit at rest, noise, delay, lag and diffusion path of the file. Runs in slow sliding have a sinusoidal shear
-        stress of the certified amplitude; simulate and campaign take another from --stress.
+        stress of the certified amplitude; in simulate and campaign, --stress replaces this amplitude.
     law
         File of your own sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
     """
@@ -276,8 +276,8 @@ class LawOptions:
         if self.law is not None:
             if self != replace(type(self)(), law=self.law):
                 raise ParameterError(
-                    f"--law contains the law with its T_s. Received it with another option of a law, such as "
-                    f"--controller or --certificate, and {self.law}. Omit these options."
+                    f"--law contains the law with its T_s. Received --law {self.law} together with another option of "
+                    "the law, such as --controller or --certificate. Omit the other options."
                 )
             return Choice(controller=SampledLaw.load(self.law))
         if self.certificate is None:
@@ -324,10 +324,11 @@ class RunOptions:
         stick). Rate-and-state faults never rest: smooth or quasi-dynamic (without inertia), by default
         smooth for one block and quasi-dynamic for several.
     step
-        Sampling time T_s, or step of the scheme continuous; the fault's T_s by default.
+        Sampling time T_s, or integration step of the scheme continuous; the fault's T_s by default.
     duration
-        Duration of the run; the operation time by default. A slip-weakening fault without a controller and without a
-        duration has the natural earthquake, without disturbance and with its own duration.
+        Duration of the run; the operation time by default. Without a
+        controller and a duration, the run of a slip-weakening fault is its natural earthquake: without disturbance,
+        with a duration that is chosen automatically.
     substeps
         Integrator steps per sample.
     drift
@@ -607,8 +608,8 @@ def loop_elements(
 ) -> "tuple[int, Actuator, Sensor]":
     """Substeps, actuator and sensor of a run with a sampling period [s].
 
-    Stages that are not given are those for which a sampled law is designed, with the substeps that these need. Without
-    given noise, it is that of the certificate.
+    Stages that are not given are replaced by those for which a sampled law is designed, with the substeps that these
+    stages need. If no noise is given, the sensor has the noise of the certificate.
     """
     from quakedesign.simulation.run_settings import designed_path
 
@@ -635,7 +636,7 @@ _COMMON = ("fault", "controller", "gains", "state", "out", "force", "json")
 @Parameter(name="*", group=_GROUP)
 @dataclass(frozen=True, kw_only=True)
 class StateOptions:
-    """Initial state and pressure of a rate-and-state fault; the far end moves at --drift, or at the reference rate.
+    """Initial state and pressure of a rate-and-state fault, whose spring is loaded at --drift or at the reference rate.
 
     Parameters
     ----------
@@ -663,7 +664,7 @@ class StateOptions:
     stress_period: Seconds | None = None
 
     def free_options(self) -> list[str]:
-        """Given options that apply to a run without control alone."""
+        """Given options that apply only to a run without control."""
         return [f"--{name}" for name in ("pressure", "start", "hold", "share") if getattr(self, name) is not None]
 
     def of_control(self) -> dict[str, Any]:
@@ -680,7 +681,9 @@ class StateOptions:
         from quakedesign.simulation import pressure_history
 
         if self.stress is not None or self.stress_period is not None:
-            raise ParameterError("--stress needs a controller. Received none. Give --controller elqr.")
+            raise ParameterError(
+                "--stress and --stress-period need a controller. Received none. Give --controller elqr."
+            )
         values = specified({"start": self.start, "hold": self.hold, "share": self.share})
         return values | ({} if self.pressure is None else {"pressure": pressure_history(self.pressure)})
 
@@ -725,7 +728,7 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
 
 
 def changed_options(command: Any, options: dict[str, Any]) -> dict[str, Any]:
-    """Options of a command that differ from their defaults, by the names of single options, except `state`."""
+    """Options of a command that differ from their defaults, by name; option groups are expanded, except `state`."""
     usual = _single({name: option.default for name, option in signature(command).parameters.items()})
     return {name: value for name, value in _single(options).items() if value != usual[name]}
 
@@ -754,10 +757,10 @@ class SpreadOptions:
     def choose(
         self, fault: "Fault", law: "LawOptions", step: float | None, path: dict[str, float]
     ) -> tuple["Choice | None", dict[str, Any]]:
-        """Law of a campaign, with its spread and stress, which friction without a state does not have.
+        """Law of a campaign and, for friction with a state, spread [-] and stress [Pa] of the samples.
 
-        With a state it is the law that `design` gives for the nominal normal stress, stiffness and damping, for every
-        box of the campaign.
+        For friction with a state the law is that of the certificate or, without one, the law that `design` gives for
+        the nominal normal stress, stiffness and damping, whatever the box of the campaign.
         """
 
         def tracking(fault: "Fault") -> tuple["Choice | None", dict[str, Any]]:
@@ -778,9 +781,9 @@ class SpreadOptions:
                 task: Any = chosen.claim.task  # type: ignore[union-attr]
                 if slow_sliding_plant(fault, task.stress).ramp != task.ramp:
                     raise ParameterError(
-                        "a campaign of slow sliding varies the fault that the certificate is about. Received "
-                        f"{fault.name}, with other constants than {task.name}. Give that fault, or use simulate "
-                        "--certificate."
+                        "the fault of a campaign of slow sliding must have the constants of the fault in the "
+                        f"certificate, {task.name}. Received {fault.name}, whose constants differ. Give the fault of "
+                        "the certificate, or use simulate --certificate."
                     )
                 return chosen, _of_proof(chosen.claim, self.spread, self.stress) | period
             _require_designed({"controller": law.controller, "gains": law.gains})
@@ -820,7 +823,8 @@ def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
 def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
     """Entries of a run of a certified law on its fault, by default under the largest proved stress, a sine.
 
-    The measurement error is at most the noise of the certificate: readings are rounded to multiples of twice this.
+    The measurement error is at most the noise of the certificate: readings are rounded to multiples of twice this
+    noise bound.
     """
     from quakedesign.loop.sensing import Transducer
 
@@ -848,7 +852,7 @@ def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any
 def _named(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()) -> dict[str, Any]:
     """Given options under the argument names of a run; rejects options that do not apply."""
     if foreign := [name for name in changed if name not in (*taken, *_COMMON)]:
-        kind = f"friction with a state {'with' if taken is _HELD else 'without'} control"
+        kind = f"friction with a state in a run {'with' if taken is _HELD else 'without'} control"
         raise ParameterError(
             f"{', '.join(foreign)} cannot be used for {kind}. Received {fault.friction.name}. "
             f"Use {', '.join((*taken, *more))} and the options of friction with a state only."
@@ -866,7 +870,7 @@ def _require_designed(options: dict[str, Any]) -> None:
 
 
 def _single(options: dict[str, Any]) -> dict[str, Any]:
-    """Options of all groups except `state`, by their own names."""
+    """Options by name; those of option groups except `state` are expanded."""
     groups = [name for name, value in options.items() if is_dataclass(value) and name != "state"]
     alone = {name: value for name, value in options.items() if name not in groups}
     return alone | {name: value for group in groups for name, value in asdict(options[group]).items()}

@@ -312,7 +312,8 @@ def attraction(
     rates, function = read_field(field)
     if everywhere and (degree, shape) != (None, None):
         raise PolynomialError(
-            "--degree and --shape cannot be used with --everywhere. Received both. Omit --everywhere, or these two."
+            "--degree and --shape cannot be used with --everywhere. Received at least one of them. "
+            "Omit --everywhere, or --degree and --shape."
         )
     if everywhere:
         region = Region.of(stability(rates, function))

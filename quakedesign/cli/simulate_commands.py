@@ -245,8 +245,8 @@ def sampling(
     controller
         cta, dia or elqr.
     gains
-        designed (in continuous time), published, or the numbers of the gains (of a sliding mode: with scale λ = 1
-        and control ν = p·μ_res·N̂_min, N̂_min the smallest N̂ of the box).
+        designed or continuous (both: designed in continuous time), published, or the numbers of the gains (of a sliding
+        mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min the smallest N̂ of the box).
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes
@@ -305,7 +305,7 @@ def export(
     Parameters
     ----------
     step
-        Sampling time, also of designed gains; the fault's by default.
+        Sampling time T_s of the exported controller, for which gains are also designed; the fault's by default.
     scheme
         explicit (default), implicit, semi-implicit, compensated or stick-slip.
     fmu
@@ -386,7 +386,9 @@ def campaign(
 ) -> int:
     """Simulate many samples of the uncertainty box, disturbances, noise and initial states, and report the worst.
 
-    Finished batches are kept in the folder: after an interruption the same command continues and gives the same result.
+    Finished batches are stored in the folder; after an interruption the same command continues from them, with the same
+    result.
+
     Exit code 0 if all samples have a result (a diverged run is one), 1 if a batch failed. Give quantities with a unit,
     such as '20 MPa', or as numbers in SI units.
 
@@ -403,7 +405,7 @@ def campaign(
     search
         Metric to maximise by search, such as max_slip_rate_error.
     rerun
-        Index of a sample to simulate again and store as NetCDF in the folder.
+        Index of a sample, or search-N for sample N of the search, to simulate again and store as NetCDF in the folder.
     workers
         Number of processes; by default one per core.
     out
@@ -484,7 +486,10 @@ def _print(problem: "CampaignProblem", done: "Campaign", result: Json, written: 
     out.print(table, soft_wrap=False)
     for search in (result["search"],) if result["search"] else ():
         value = "diverges" if search["value"] is None else f"{search['value']:.6g} {Metrics.unit(search['metric'])}"
-        out.print(f"search: {search['metric']} = {value} in {search['index']} of {search['looked_at']} samples")
+        out.print(
+            f"search: largest {search['metric']} = {value}, in sample {search['index']}; "
+            f"{search['looked_at']} samples evaluated"
+        )
     for failure in result["failures"]:
         span = f"{failure['samples'][0]} … {failure['samples'][-1]}"
         out.print(f"failed: samples {span}: {failure['reason']}")

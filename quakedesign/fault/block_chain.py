@@ -1,4 +1,4 @@
-"""Faults of several blocks in a row, coupled by springs, with wells along them; their files.
+"""Faults of several blocks in a row, coupled by springs, with wells along the fault; reading of their files.
 
 A fault file has ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between two
 wells, constant beyond the outermost ones, taken at the middle of each block. With a diffusivity D the pressure diffuses
@@ -38,8 +38,9 @@ class FaultBlock:
     length : float
         Length of the block along the fault [m].
     effective_normal_stress : float
-        σ'_n [Pa], positive in compression; that of the fault if omitted.
+        σ'_n [Pa], positive in compression; a file may omit it for a block with that of the fault.
     friction : FrictionLaw
+        Friction law of the block; a file may omit it for a block with that of the fault.
     """
 
     length: float
@@ -76,8 +77,8 @@ class BlockChain:
         if not 2 <= blocks <= MOST_BLOCKS or not 1 <= wells <= blocks:
             raise ParameterError(
                 f"a fault of several blocks must have 2 to {MOST_BLOCKS} blocks, and 1 to as many wells as blocks. "
-                f"Received {counted(blocks, 'block')} and {counted(wells, 'well')}. Add or omit tables; a fault of one "
-                "block has neither."
+                f"Received {counted(blocks, 'block')} and {counted(wells, 'well')}. Add or omit [[block]] or "
+                "[[well]] tables; the file of a fault of one block has neither."
             )
         whole, length = sum(self.lengths, Fraction(0)), rational(self.fault.length)
         if whole != length:
@@ -89,8 +90,8 @@ class BlockChain:
         if not all(0 <= v <= length for v in places) or any(a >= b for a, b in pairwise(places)):
             most, *received = apart(length, *places)
             raise ParameterError(
-                f"positions of wells must increase, from 0 to {most} m. Received {', '.join(received)} m. Sort the "
-                "wells, and place each on the fault where no other is."
+                f"positions of wells must be from 0 to {most} m and increase. Received {', '.join(received)} m. Sort "
+                "the wells, and give each its own position on the fault."
             )
         if self.diffusivity is not None:
             require_positive(diffusivity=self.diffusivity)
@@ -134,9 +135,9 @@ class BlockChain:
 
     @cached_property
     def flow(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Coefficients of q' [1/s]: of the pressures q of blocks without a well at their middle, then of the wells.
+        """Coefficients in q' [1/s] of q (first columns) and of the well pressures (last columns).
 
-        Empty without a diffusivity.
+        q are the pressures of the blocks without a well at their middle. Empty without a diffusivity.
         """
         wells, slow = [rational(v) for v in self.wells], self._diffusing
         diffusivity = rational(self.diffusivity or 0)
@@ -155,7 +156,7 @@ class BlockChain:
 
     @cached_property
     def pressures(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Share of the pressures of `flow` (columns) in each block (rows) [-]; `shares` without a diffusivity."""
+        """Share of each pressure of `flow` (columns) in each block pressure (rows) [-]; `shares` if it is steady."""
         if self.diffusivity is None:
             return self.shares
         wells, slow = [rational(v) for v in self.wells], self._diffusing
@@ -171,7 +172,7 @@ class BlockChain:
 
     @cached_property
     def springs(self) -> tuple[tuple[int, int, Fraction], ...]:
-        """(i, j, K): block j pulls block i with K [1/s²] per metre of relative slip, G/(ρ·distance·length of i)."""
+        """(i, j, K): block j accelerates block i by K [1/s²] per relative slip, K = G/(ρ·distance·length of i)."""
         wave, springs = rational(self.fault.shear_modulus) / rational(self.fault.density), []
         for i, j in pairwise(range(len(self.blocks))):
             distance = self.middles[j] - self.middles[i]
@@ -203,7 +204,7 @@ class BlockChain:
 
 
 def add_springs(rows: Any, springs: Iterable[tuple[int, int, Fraction]], scale: Any = 1) -> None:
-    """Add to the rows of a matrix the force of springs (i, j, K) on block i per slip of every block, times a scale."""
+    """Add to the rows of a matrix the acceleration of block i by springs (i, j, K) per slip of every block, × scale."""
     for i, j, K in springs:
         rows[i][j] += K * scale
         rows[i][i] -= K * scale
@@ -213,17 +214,18 @@ BLOCK = {
     name: replace(PLANT[name], required=name == "length", owner=FaultBlock)
     for name in ("length", "effective_normal_stress")
 }
-WELL = {"position": FileEntry(name="position", unit="m", example="1 km", text="along the fault")}
+WELL = {"position": FileEntry(name="position", unit="m", example="1 km", text="Position along the fault")}
 DIFFUSION = entries_of(BlockChain)
 """Entries of a file of several blocks outside of its tables."""
 
 
 def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool = False) -> BlockChain | None:
-    """Fault of several blocks from a TOML file; None for a file or preset without ``[[block]]`` tables.
+    """Fault of several blocks from a TOML file; None without ``[[block]]`` and ``[[well]]`` tables, or if not TOML.
 
     Parameters
     ----------
     source : str or Path
+        Name of a preset, or a path that ends in ``.toml``.
     box : str, optional
         Name of an uncertainty box in place of that of the file.
     allow_code : bool
@@ -255,7 +257,7 @@ def _tables(given: object, key: str, problems: Problems) -> list[Table]:
     if not isinstance(given, list) or not all(isinstance(one, Mapping) for one in given):
         with problems.collected():
             kind = type(given).__name__
-            raise ScenarioError(f"{key} must be tables [[{key}]]. Received {kind}. Write [[{key}]] before each.")
+            raise ScenarioError(f"{key} must be [[{key}]] tables. Received {kind}. Begin each table with [[{key}]].")
         return []
     return [Table(one, Problems()) for one in given]
 

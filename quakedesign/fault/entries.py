@@ -154,7 +154,7 @@ class Table:
         return None
 
     def built(self, kind: Callable[..., _Value], values: Json) -> _Value | None:
-        """Object of these values; None if one of them is invalid."""
+        """Object `kind(**values)`; None if one of the values, or the object, is invalid."""
         with self.problems.collected():
             return None if None in values.values() else kind(**values)
         return None

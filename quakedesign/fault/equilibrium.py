@@ -14,8 +14,8 @@ class FaultEquilibrium:
     """Equilibrium about which a fault is studied and controlled."""
 
     name: str
-    coordinates: str  # Coordinates of the plant: beginning of a sentence that its equations complete
-    poles: str  # Equilibrium of the poles in words: a format string for the slip rate [m/s]
+    coordinates: str  # Coordinates of the plant: beginning of a sentence that the equations of the plant complete
+    poles: str  # Equilibrium about which the poles are computed, in words: format string for the slip rate [m/s]
     messages: Mapping[str, str]  # Message for each quantity that does not apply, by name
 
 
@@ -39,11 +39,12 @@ STEADY_SLIDING = FaultEquilibrium(
         "diffusivity": "diffusivity along the fault needs friction without a state. Received {law}. Omit diffusivity, "
         "for steady pressures along the fault.",
         "purpose": "{value} needs a friction law of slip and slip rate alone. Received {law}, with the state {states}. "
-        "Use fault, derive, simulate, guarantee or design for it.",
-        "blocks": "blocks needs friction of slip and slip rate. Received {law}. Write [[block]] and [[well]] tables "
-        "into the fault file, and run limits: it names unstable modes that no well reaches.",
+        "The commands fault, derive, simulate, guarantee and design accept this law.",
+        "blocks": "the command blocks needs friction without a state. Received {law}. Write [[block]] and [[well]] "
+        "tables into the fault file, and run limits, which lists the unstable modes that no well can control.",
         "no_diffusion": "diffusion must be above 0 s. Received 0 s. Omit --diffusion for a well at the fault.",
-        "plant": "plant is for friction without a state, got {value!r} with {law}, which never rests: omit it.",
+        "plant": "plant must be omitted for friction with a state, which never rests. Received {value!r} with {law}. "
+        "Omit plant.",
         "stick_slip": "plant must be omitted for friction with a state, which never rests. Received stick-slip with "
         "{law}. Omit plant.",
     },

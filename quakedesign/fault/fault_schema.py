@@ -32,7 +32,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
     Raises
     ------
     UnknownNameError
-        For another law.
+        For an unknown friction law.
     """
     friction = friction_law(law)
     task = {key: entry for key, entry in TASK.items() if key not in friction.equilibrium.messages}
@@ -40,14 +40,14 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
         task["target_slip"] = replace(task["target_slip"], required=True)
     lines = [f"#:schema ./{SCHEMA_NAME}"] if schema else []
     lines += [
-        "# A fault for quakedesign. Every number is an example: put in your own, each with its unit. What begins with",
-        "# a # may be left out. `quakedesign fault FILE` shows what follows from it and what was assumed.",
+        "# A fault for quakedesign. Every number is an example: replace each, with its unit. Lines that begin with #",
+        "# are optional. `quakedesign fault FILE` shows the derived quantities of the fault and the default values.",
         f"name = {written(name)}",
         '# source = "where the numbers come from"',
         *_lines(PLANT),
         "",
         "# What is uncertain besides friction: paper (nothing) or ten-percent (stiffness, damping and authority), or a",
-        "# table [uncertainty] of your own, see the end.",
+        "# table [uncertainty] as at the end of this file.",
         '# uncertainty = "paper"',
         "",
         f"[friction]  # {_first_paragraph(friction)}",
@@ -78,7 +78,7 @@ def _example(friction: type[FrictionLaw]) -> Fault:
 
 
 def _comes_to_rest(fault: Fault) -> bool:
-    """Whether the fault has a next rest slip; slip weakening is steepest where slip begins, which decides fast."""
+    """Whether the rest slip is positive; slip weakening is steepest at slip 0, so its slope there decides quickly."""
     if isinstance(fault.friction, SlipWeakening):
         weakening = fault.authority * fault.effective_normal_stress * fault.friction.slip_slope
         return weakening > fault.specific_stiffness

@@ -76,8 +76,8 @@ PERIODS = 4.6e5
 """ω_n times the operation time [-] of both faults of Table I."""
 SAMPLES = 10.0
 """Samples per e-folding time of an error, or per radian of the free oscillation if that is faster."""
-AGEINGS = 20.0
-"""Samples per D_c/V in slow sliding at V: few enough that a proof can sum the response, enough for control."""
+SAMPLES_PER_STATE_TIME = 20.0
+"""Samples per d_c/V in slow sliding at a rate V: enough for control, and few enough for the sums of a proof."""
 _STEP = "sampling time"
 _SHARE = 1000  # least operation time over sampling time
 
@@ -102,15 +102,17 @@ def radiation_damping(density: float, shear_modulus: float, area: float) -> floa
 
 
 def sliding_step(law: FrictionLaw, task: Reference) -> float:
-    """T_s [s] near which slow sliding at the mean rate V of a task has a guarantee: D_c/(20 V), rounded down.
+    """Default T_s [s] for slow sliding at the mean rate V of a task: d_c/(20 V), at most t_op/1000, rounded down.
 
     Parameters
     ----------
     law : FrictionLaw
         Friction law with a state.
+    task : Reference
+        Gives V and the operation time t_op.
     """
     ageing = float(min(law.steady_state(mean_rate(task))))
-    return _cut(min(ageing / AGEINGS, task.operation_time / _SHARE), digits=2)
+    return _cut(min(ageing / SAMPLES_PER_STATE_TIME, task.operation_time / _SHARE), digits=2)
 
 
 def mean_rate(task: Reference) -> float:
@@ -118,10 +120,10 @@ def mean_rate(task: Reference) -> float:
     return task.target_slip / task.operation_time
 
 
-def beyond_rates(law: FrictionLaw, rate: float, *, source: str = "") -> str:
+def rate_out_of_range(law: FrictionLaw, rate: float, *, source: str = "") -> str:
     """Statement that a slip rate [m/s] is outside the working range of a law; empty for a rate inside.
 
-    The range is given by slowest_rate and fastest_rate unless `source` names another origin.
+    The range is that of slowest_rate and fastest_rate; the text names `source` as its origin if given.
     """
     slowest, fastest = law.working_rates
     if slowest <= rate <= fastest:
@@ -148,7 +150,7 @@ def completed(parts: Json, task: Mapping[str, float], remarks: tuple[str, ...] =
     task : mapping
         target_slip [m], operation_time [s], ramp [-], sampling_time [s]; all are optional.
     remarks : tuple of str
-        Assumptions made before.
+        Remarks that precede the default values in `Fault.assumed`.
 
     Raises
     ------
@@ -205,7 +207,9 @@ def _target(fault: Fault, assumed: list[str]) -> float:
 
 def _step_of_sliding(fault: Fault, task: Reference, assumed: list[str]) -> float:
     step = sliding_step(fault.friction, task)
-    assumed.append(f"{_STEP} {step:g} s, near D_c/({AGEINGS:g} V) in slow sliding at the task's mean rate V")
+    assumed.append(
+        f"{_STEP} {step:g} s, near D_c/({SAMPLES_PER_STATE_TIME:g} V) in slow sliding at the task's mean rate V"
+    )
     return step
 
 
@@ -258,7 +262,7 @@ def load_fault(
     Parameters
     ----------
     source : str or Path
-        ``"real-fault"``, ``"lab-fault"``, or a path that ends in ``.toml``.
+        Name of a preset, such as ``"real-fault"``, or a path that ends in ``.toml``.
     box : str, optional
         Name of an uncertainty box that replaces the one in the file.
     disturbance : str, optional
@@ -277,7 +281,7 @@ def load_fault(
     UnknownNameError
         For a preset or box that does not exist.
     ScenarioError
-        For a file that cannot be read, is not TOML, or lacks or adds a key.
+        For a file that cannot be read, is not TOML, lacks a required key or has an unknown one.
     UnitError, ParameterError
         For a wrong unit or an unphysical value.
     """
@@ -436,7 +440,7 @@ def _values(part: object, entries: Mapping[str, FileEntry]) -> Json:
 
 
 def _stresses(fault: Fault) -> dict[str, str]:
-    """Stresses [Pa] that were given for the disturbance: least floats that yield at least its accelerations."""
+    """Stresses [Pa] of parts given as a stress: smallest floats that accelerate at least as much as stored."""
     stresses = {}
     for name in fault.disturbance.stresses:
         size = abs(getattr(fault.disturbance, name))

@@ -94,7 +94,7 @@ _strength_drop = by_equilibrium(rest=lambda law: law.bounds[1] - law.bounds[0], 
 
 
 def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
-    """Smallest positive slip [m] where the excess of load over strength turns from driving to resisting.
+    """Smallest positive slip [m] at which the excess of load over strength changes from positive to negative.
 
     The excess is (μ(0) − μ(x))σ'_n A − kx at zero pressure (statics of eq. shift), for a load σ'_n A [N] and a
     stiffness k [N/m]. All roots lie below (μ_max − μ_min)σ'_n A/k. The result is 0 for a fault with a stable origin,
@@ -121,7 +121,7 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
 
 
 def _turn(drive: Callable[[float], float], furthest: float) -> tuple[float, float] | None:
-    """Slips [m] between which an excess turns from driving to resisting; None if it does not drive near 0."""
+    """Slips [m] between which an excess changes from positive to negative; None if it is not positive near slip 0."""
     grid = [furthest * i / _SCAN for i in range(_SCAN + 1)]
     if drive(grid[1] / _SCAN) <= 0:
         return None
@@ -258,7 +258,7 @@ def require_name(name: str) -> None:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """Smooth slip r(t) from rest to rest, constant at its final value for t > operation_time (row 26 of the errata).
+    """Smooth slip r(t) from rest to rest, constant at its final value for t > operation_time (ERRATA 26).
 
     Attributes
     ----------
@@ -344,7 +344,7 @@ class SlidingReference:
 
     @property
     def swing(self) -> Fraction:
-        """w [-]: r′ lies between V and V(1 + w)."""
+        """w [-], the largest excess of r′ over V relative to V: V ≤ r′ ≤ V(1 + w)."""
         steady, share = self._shares
         return Fraction(15, 8) * share / steady
 
@@ -376,8 +376,10 @@ def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[floa
 
     Parameters
     ----------
+    quantity : str
+        Acceleration, or shear stress on the fault, with its unit.
     authority : Fraction
-        A/m [m²/kg] of the fault, the nominal one.
+        Nominal A/m of the fault [m²/kg].
     name : str
         Name of the quantity in error messages.
 
@@ -400,7 +402,7 @@ def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[floa
     require_ordinary(**{name: float(stress)})
     exact = abs(stress) * authority
     size = float(exact)
-    while rational(size) < exact:  # the decimal that proofs read
+    while rational(size) < exact:  # proofs use `rational(size)`, the decimal of the float
         size = nextafter(size, inf)
     return (size if stress >= 0 else -size), True
 
@@ -412,9 +414,9 @@ class Disturbance:
     Attributes
     ----------
     constant : float
-        [m/s²], in a file also as a shear stress on the fault, such as "35 kPa".
+        Constant acceleration [m/s²], in a file also as a shear stress on the fault, such as "35 kPa".
     amplitude : float
-        [m/s²], not negative, in a file also as a shear stress on the fault, such as "35 kPa".
+        Amplitude of the sine [m/s²], not negative, in a file also as a shear stress on the fault, such as "35 kPa".
     frequency : float
         Angular frequency [rad/s], not negative.
     slip_growth : float
@@ -461,7 +463,7 @@ class Disturbance:
         return self.amplitude * self.frequency
 
     def exact_bounds(self, width: Fraction = Fraction(0)) -> tuple[Fraction, Fraction]:
-        """Exact `largest_explicit` [m/s²] and `largest_rate` [m/s³] for proofs; these floats may be rounded inward.
+        """Exact `largest_explicit` [m/s²] and `largest_rate` [m/s³] for proofs; those two are rounded floats.
 
         `width` [-] is the half-width of the area per mass: a stress accelerates by up to 1 + `width` times as much.
         """
@@ -504,7 +506,7 @@ class Fault:
     disturbance : Disturbance
     box : UncertaintyBox
     assumed : tuple of str
-        Default values that replace missing entries of a file, one sentence each.
+        Default values that replace missing entries of a file, and remarks on the disturbance, one sentence each.
     poor_fit : str
         Reason why the friction identified from a record is not reliable; empty if it is.
 
@@ -658,7 +660,7 @@ class Fault:
 
     @property
     def magnitude(self) -> float:
-        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity for a stable fault, nan if the moment is."""
+        """M_w = ⅔log10(M0) − 6.07 [-], eq. magnitude; minus infinity for a stable fault, nan for a moment of nan."""
         return magnitude(self.seismic_moment)
 
     def moment_of(self, slip: float) -> float:

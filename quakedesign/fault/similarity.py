@@ -3,7 +3,7 @@
 The dimensional matrix is derived from units alone; two faults are similar if all π-groups agree
 (Buckingham 1914, Phys. Rev. 4, 345). Slip, fault length and the normal direction have separate units of
 length (directed lengths, Huntley 1967, Dimensional Analysis), as Table I of the paper requires. A scale
-factor is a signed root of a rational.
+factor is a root of a positive rational.
 """
 
 from collections.abc import Mapping, Sequence
@@ -107,8 +107,8 @@ def dimensional_matrix(units: Sequence[str]) -> "sp.Matrix":
 def quantities(fault: Fault) -> dict[str, Quantity]:
     """Every parameter of a fault by dotted name, including those of its friction law.
 
-    If no scaling of the dimensionless parameters of a friction law scales its friction coefficient, friction has no
-    scale; the constant coefficient 1 is then one more parameter, the same for every fault.
+    If the friction coefficient is not proportional to the dimensionless parameters of its law, it cannot be scaled.
+    The constant coefficient 1 is then one more parameter, the same for every fault.
     """
     law = fault.friction
     named = {name: (unit, attrgetter(name)(fault)) for name, unit in PLANT_UNITS.items()}
@@ -190,7 +190,10 @@ class Radical:
     def __pow__(self, exponent: Fraction | int) -> "Radical":
         power = Fraction(exponent)
         if (self.sign == 0 and power <= 0) or (self.sign < 0 and power.denominator != 1):
-            raise ParameterError(f"{self.text()} has no power {power} here.")
+            raise ParameterError(
+                f"a power must be real and finite. Received the base {self.text()} and the exponent {power}. "
+                "A base of 0 needs a positive exponent, and a negative base an integer exponent."
+            )
         if self.sign == 0:
             return self
         sign = -1 if self.sign < 0 and power.numerator % 2 else 1
@@ -417,7 +420,7 @@ def ordered(fault: Fault, clock: str = CLOCKS[0]) -> tuple[Quantity, ...]:
     Raises
     ------
     UnknownNameError
-        For another clock.
+        For any other value of `clock`.
     """
     require_known(clock, CLOCKS, "clock", UnknownNameError)
     every, (slip, normal, time) = quantities(fault), map(BASES.index, ("slip", "normal_length", "time"))
@@ -482,7 +485,7 @@ def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Faul
     Raises
     ------
     ParameterError
-        When a scaled value is out of range, or the scales change friction although its law admits no factor.
+        When a scaled value is out of range, or friction has a scale factor although its law cannot be scaled.
     """
     exact = scaled_parameters(quantities(source), scales)
     if exact.pop(_UNIT_FRICTION, radical(1)) != radical(1):

@@ -116,7 +116,7 @@ def si_value(quantity: object, unit: str, name: str) -> float:
     except pint.UndefinedUnitError:
         raise UnitError(unknown) from None
     except pint.DimensionalityError:
-        raise UnitError(f"{received}, which has another dimension.") from None
+        raise UnitError(f"{received}, whose unit has another dimension. Check the unit.") from None
     except Exception:
         raise UnitError(f"{received}, which cannot be read.") from None
     if not isinstance(parsed.magnitude, Decimal):
@@ -143,7 +143,9 @@ def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fract
     Raises
     ------
     ParameterError
-        For a text that is no number or quantity; `UnitError` as in `si_value`.
+        For a number that is not finite, or an object that is neither a number nor a text.
+        UnitError
+        As in `si_value`, for a text that is not a number.
     """
     try:
         return rational(quantity, name)

@@ -11,7 +11,7 @@ import numpy as np
 from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
-from quakedesign.fault.fault_toml import AGEINGS
+from quakedesign.fault.fault_toml import SAMPLES_PER_STATE_TIME
 from quakedesign.files import Json
 from quakedesign.guarantees.exact.limit_theorems import SlidingPush, longest_diffusion
 from quakedesign.guarantees.exact.proof import NoProof
@@ -207,7 +207,7 @@ def _remedy(
     if well.share < 1:
         return possible_remedy(fault, task, well, setup, prove, spread=spread)
     suits = admissible_step(task, step)
-    near = f"T_s near D_c/({AGEINGS:g} V), here {float(suits):.2g} s, suits: set sampling_time in [task]"
+    near = f"T_s near D_c/({SAMPLES_PER_STATE_TIME:g} V), here {float(suits):.2g} s, suits: set sampling_time in [task]"
     return "" if suits == step else near
 
 

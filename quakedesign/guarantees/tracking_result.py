@@ -17,7 +17,7 @@ from quakedesign.guarantees.search.linear_design import AMPLITUDE, BOX, SATURATI
 from quakedesign.guarantees.search.lqg import measured_by
 from quakedesign.guarantees.search.worst_case import WorstCase, worst_tracking
 from quakedesign.laws import LinearLaw, RestLimit
-from quakedesign.laws.sampled_controller import growth_at_rest, warning_at_rest
+from quakedesign.laws.sampled_controller import growth_time_at_rest, warning_at_rest
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.loop.sensing.differentiator import least_bound
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -149,7 +149,7 @@ class TrackingGuarantee(Guarantee):
         """
         if not self.proof.available:
             return None
-        return growth_at_rest(self.proof.sampled_loop.law, self.proof.sampled_loop.step)
+        return growth_time_at_rest(self.proof.sampled_loop.law, self.proof.sampled_loop.step)
 
     @property
     def differentiator_bound(self) -> UpperBound | None:

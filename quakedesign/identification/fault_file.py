@@ -21,7 +21,7 @@ from quakedesign.errors import RecordError
 from quakedesign.exact import rational
 from quakedesign.fault import Disturbance, Fault, FrictionLaw, UncertaintyBox, friction_laws
 from quakedesign.fault.equilibrium import STEADY_SLIDING
-from quakedesign.fault.fault_toml import beyond_rates, fault_toml, mean_rate, sliding_step, step_assumed
+from quakedesign.fault.fault_toml import fault_toml, mean_rate, rate_out_of_range, sliding_step, step_assumed
 from quakedesign.fault.friction.rate_and_state import RateAndState
 from quakedesign.files import write_whole
 from quakedesign.identification.assessment import EXPLAINS, EXPLAINS_NOT
@@ -142,7 +142,7 @@ def task_remarks(identification: Identification, fault: Fault) -> list[str]:
         old, new = (quantity(each.reference_rate, "m/s", 4) for each in (law, moved))
         text = f"mu0 = {law.reference_coefficient:.5g} at {old} was converted to {moved.reference_coefficient:.5g}"
         lines.append(f"{text} at {new} for the file")
-    return [*lines, *filter(None, [beyond_rates(law, mean_rate(task), source="of the record")])]
+    return [*lines, *filter(None, [rate_out_of_range(law, mean_rate(task), source="of the record")])]
 
 
 def law_remarks(identification: Identification, fault: Fault) -> list[str]:

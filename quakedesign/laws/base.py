@@ -54,7 +54,7 @@ class Sampling:
     step : Fraction
         T_s [s].
     scheme : str
-        Of `quakedesign.loop.schemes`.
+        Name of a scheme of `quakedesign.loop.schemes`.
     settings : tuple of (str, Fraction)
         Numbers of the scheme by name, in its own units.
     delay, lag, diffusion : Fraction
@@ -93,7 +93,7 @@ class BaseGains(Generic[L]):
     ----------
     law : Law
     lipschitz : Fraction
-        [m/s³]
+        Bound on |h'| [m/s³].
     source : str
     literature : bool
         False for gains that were computed with this package.
@@ -165,7 +165,7 @@ class Law(ABC):
 
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
-        """Return a law from gains in order.
+        """Return a law from gains in the order of `gain_units`; `more` are its other fields, by name.
 
         Raises
         ------
@@ -205,7 +205,7 @@ class Law(ABC):
 
     @property
     def lipschitz_limit(self) -> Fraction | None:
-        """Least |h'| [m/s³] for which no certificate exists; None if the law states none."""
+        """Least |h'| [m/s³] for which no certificate exists; None if it is not known for the law."""
         return None
 
     @classmethod
@@ -241,10 +241,10 @@ class DesignProblem(Protocol[Designed]):
         """Gains by the method of the family that a law belongs to."""
 
     def assessed(self, controller: "Controller") -> Designed:
-        """Verdict on gains of the law's own design."""
+        """Verdict on a controller whose gains the law designed itself."""
 
     def undecided(self, name: str, reason: str) -> Designed:
-        """Result of a law without gains."""
+        """Undecided result for a law called `name`, without gains, and the reason."""
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -273,7 +273,7 @@ class Controller(Law):
         """A note if T_s of a sampled law differs from that of the fault; empty if both are equal."""
         if self.sampling_time in (None, fault.sampling_time):
             return ""
-        return f"NOT for the fault's T_s = {fault.sampling_time:g} s: it runs once every {self.sampling_time:.4g} s"
+        return f"NOT for the fault's T_s = {fault.sampling_time:g} s: the law runs every {self.sampling_time:.4g} s"
 
     warning_at_rest: ClassVar[str] = ""
     """Warning about a law that is unstable while the fault is at rest."""

@@ -19,7 +19,7 @@ BARE = "custom"
 
 @cache
 def laws() -> dict[str, type[Law]]:
-    """Laws of the package that are defined by a list of gains, by name; laws for other plants have proofs only."""
+    """Laws of the package that are defined by a list of gains, by name; not all of them control a fault."""
     classes = discovered(__package__, Law)
     return {name: law for name, law in classes.items() if name not in _OF_MATRICES}
 

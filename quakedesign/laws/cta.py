@@ -43,14 +43,14 @@ class ContinuousTwisting(SlidingMode):
 
     @property
     def lipschitz_limit(self) -> Fraction:
-        """λ(k3 − |k4|): for a constant |h'| of at least this a Filippov equilibrium e1 ≠ 0 exists."""
+        """λ(k3 − |k4|) [m/s³]: a constant |h'| of this value has a Filippov equilibrium with e1 ≠ 0."""
         return self.scale * (self.gains["k3"] - abs(self.gains["k4"]))
 
     @classmethod
     def counterexample(
         cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
-        """On e2 = 0, e3 = k1⌈e1⌋^⅓ a constant h' ≥ k3 − |k4| gives an equilibrium."""
+        """For the constant h' = k3 − |k4| every point with e2 = 0, e3 = k1⌈e1⌋^⅓ and e1 > 0 is an equilibrium."""
         k1, _, k3, k4 = gains.values()
         pull = max(Fraction(0), k3 - abs(k4))
         if not k1 or not uncertain["d"][0] <= pull <= uncertain["d"][1] or (not k4 and pull != k3):

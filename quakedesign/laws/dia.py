@@ -77,5 +77,5 @@ class DiscontinuousIntegral(SlidingMode):
 
     @property
     def lipschitz_limit(self) -> Fraction:
-        """λk_I3: an |h'| of at least this can cancel the integral action."""
+        """λk_I3 [m/s³]: an |h'| of at least this value can cancel the integral action."""
         return self.scale * self.gains["kI3"]

@@ -61,7 +61,7 @@ class ExtendedLQR(Controller):
 
     def pressure(self, signals: Signals) -> sp.Expr:
         """Return p [Pa] = offset − Kx_a, eq. u, inside the limits if there are any."""
-        wanted = self._wanted(signals)
+        wanted = self._unlimited_pressure(signals)
         if self.limits is None:
             return wanted
         return sp.Min(sp.Max(wanted, to_sympy(self.limits.lowest)), to_sympy(self.limits.highest))
@@ -71,10 +71,10 @@ class ExtendedLQR(Controller):
         rates = signals.slip_error, signals.integrals[0]
         if self.limits is None:
             return rates
-        excess = self.pressure(signals) - self._wanted(signals)
-        return tuple(rate + back * excess for rate, back in zip(rates, self._driven_back(), strict=True))
+        excess = self.pressure(signals) - self._unlimited_pressure(signals)
+        return tuple(rate + back * excess for rate, back in zip(rates, self._back_calculation_gains(), strict=True))
 
-    def _wanted(self, signals: Signals) -> sp.Expr:
+    def _unlimited_pressure(self, signals: Signals) -> sp.Expr:
         ends = {
             "error": (signals.slip_error, signals.slip_rate_error),
             "state": (signals.slip, signals.slip_rate),
@@ -82,7 +82,7 @@ class ExtendedLQR(Controller):
         commanded = -sum(k * x for k, x in zip(self._exact_gains(), (*ends, *signals.integrals), strict=True))
         return commanded + to_sympy(self.offset) if self.offset else commanded
 
-    def _driven_back(self) -> tuple[sp.Expr, sp.Expr]:
+    def _back_calculation_gains(self) -> tuple[sp.Expr, sp.Expr]:
         """l1, l2 for which ξ' = (l1, l2)(k3ξ1 + k4ξ2) + (0, ξ1) has the double pole −1/τ."""
         assert self.limits is not None
         *_, k3, k4 = self._exact_gains()
@@ -94,8 +94,8 @@ class ExtendedLQR(Controller):
     def loop_field(cls) -> LoopField:
         """Return the loop about the equilibrium of a constant reference (ERRATA 8), all uncertainty in s, w and β.
 
-        x2' = s·x1 − w·x2 + β·b·p, where s [1/s²] is the chord of everything that depends on slip (friction,
-        spring, disturbance), w [1/s] that of everything that depends on slip rate, b = μ_res·N̂_min [m²/kg].
+        x2' = s·x1 − w·x2 + β·b·p, where s [1/s²] is the chord slope of all terms that depend on slip (friction,
+        spring, disturbance), −w [1/s] that of all terms that depend on slip rate, and b = μ_res·N̂_min [m²/kg].
         """
         x1, x2, xi1, xi2 = sp.symbols("x1 x2 xi1 xi2", real=True)
         beta, s, w, authority = sp.symbols("beta s w b", real=True)

@@ -30,7 +30,7 @@ Form = dict[str, Fraction]
 """Exponents of `BASES`."""
 
 BASES = ("slip", "time", "output")
-"""What the dimension of a gain is made of; `output` is p [Pa], or ν = p·(divisor) for a law with a divisor."""
+"""Base quantities of the dimension of a gain; `output` is p [Pa], or ν = p·divisor [m/s²] with a divisor."""
 
 UNROUNDED = {("lab-fault", "elqr"): ("1250000000/3", "6250000/9", "125000000/3", "1250000/9")}
 """Laboratory gains before they were rounded for print; only these give the printed real-fault gains (ERRATA 25)."""
@@ -44,7 +44,7 @@ class LawDimensions(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CarriedGains:
+class ScaledGains:
     """Exact gains of a law on a fault in `gain_units`, and factors of its integral states from the source fault."""
 
     law: Controller
@@ -52,45 +52,45 @@ class CarriedGains:
     integrals: Mapping[str, Radical]
 
     def controller(self, digits: int = 12) -> Controller:
-        """Controller with these gains; irrational ones rounded to so many significant digits."""
+        """Controller with these gains; irrational ones are rounded to `digits` significant digits."""
         return replace(self.law, gains={name: gain.nearest(digits) for name, gain in self.gains.items()})
 
 
-def carry(gains: Controller | CarriedGains, scales: Scales, *, divisor: Fraction | None = None) -> CarriedGains:
+def carry(gains: Controller | ScaledGains, scales: Scales, *, divisor: Fraction | None = None) -> ScaledGains:
     """Gains of the target fault that are equivalent to those of the source fault.
 
     Parameters
     ----------
-    gains : Controller or CarriedGains
-        `CarriedGains` are scaled further, or back with `scales.inverse()`, without rounding.
+    gains : Controller or ScaledGains
+        `ScaledGains` are scaled further, or back with `scales.inverse()`, without rounding.
     scales : Scales
         From source to target.
     divisor : Fraction, optional
-        μ0N̂0 of the scaled law [m²/kg], for laws that have one; unchanged unless given, as in the appendix of the
-        paper, where ν then scales as the pressure.
+        μ0N̂0 of the scaled law [m²/kg], for laws that have one. By default it is unchanged, as in the appendix of the
+        paper, and ν scales like the pressure.
 
     Raises
     ------
     ParameterError
         For a divisor of a law without one, or a law with inconsistent terms.
     """
-    start = gains if isinstance(gains, CarriedGains) else exact(gains)
+    start = gains if isinstance(gains, ScaledGains) else exact(gains)
     law, output = start.law, scales.of("Pa")
     if divisor is not None:
         law = law.with_divisor(divisor)
         output *= Fraction(divisor) / (start.law.divisor or 1)
     factors = {"slip": scales.of("slip_m"), "time": scales.of("s"), "output": output}
     forms = law_dimensions(law)
-    return CarriedGains(
+    return ScaledGains(
         law=law,
         gains={name: gain * power_product(factors, forms.gains[name]) for name, gain in start.gains.items()},
         integrals={name: xi * power_product(factors, forms.integrals[name]) for name, xi in start.integrals.items()},
     )
 
 
-def exact(controller: Controller) -> CarriedGains:
+def exact(controller: Controller) -> ScaledGains:
     """Exact gains of a controller before any scaling."""
-    return CarriedGains(
+    return ScaledGains(
         law=controller,
         gains={name: radical(gain) for name, gain in controller.gains.items()},
         integrals={name: radical(1) for name in _integral_names(controller)},

@@ -46,18 +46,18 @@ class Power:
             raise ParameterError(
                 f"a term of an implicit step needs a factor of 0 or more, an exponent p/q with 0 <= p, q <= "
                 f"{MOST_EXPONENT}, and the argument slip, rate or a sum. Received the factor {shortly(low)} to "
-                f"{shortly(high)} and the exponent {power}."
+                f"{shortly(high)}, the exponent {power} and the argument {self.argument!r:.60}."
             )
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class ImplicitStep:
-    """Implicit step: the sum q, and a sector bound of its solution for the claimed errors.
+    """Implicit step: the sum q, and a sector bound of the solution w for the errors that a claim covers.
 
     Attributes
     ----------
     pull : tuple of Power
-        q [m/s].
+        Terms of the sum q [m/s].
     slopes : (Fraction, Fraction)
         γ0 ≤ γ1 in [0, 1]: |T_s·w + γ·e1| ≤ T_s·ε for some γ between them.
     remainder : Fraction
@@ -90,7 +90,7 @@ class ImplicitStep:
 
 
 def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
-    """q in floats or arrays of them, with the midpoints of the factors and ⌈0⌋⁰ = 0."""
+    """q [m/s] at the errors slip [m] and rate [m/s], floats or arrays, with factors at their midpoints and ⌈0⌋⁰ = 0."""
     signals, total = {"slip": slip, "rate": rate}, 0.0
     for term in terms:
         nested = term.argument
@@ -101,7 +101,10 @@ def pulled(terms: tuple[Power, ...], slip: Any, rate: Any) -> Any:
 
 
 def step_solution(terms: tuple[Power, ...], step: float, slip: Any, rate: Any) -> Any:
-    """w in floats or arrays of them, by bisection down to rounding; exact where the sign keeps the slip error at 0."""
+    """w [m/s], float or array, by bisection down to rounding; −e1/T_s where the sign keeps the next slip error at 0.
+
+    `step` is T_s [s], `slip` and `rate` are the measured errors e1 [m] and e2 [m/s], floats or arrays.
+    """
     deadbeat = -slip / step
     after, before = (deadbeat - rate + pulled(terms, way * _TINY, deadbeat) for way in (1, -1))
     first = -rate + pulled(terms, slip, 0 * rate)

@@ -43,12 +43,12 @@ def field_of(subject: "Subject") -> tuple[str, FieldTerms]:
 
 
 def is_law(name: str) -> bool:
-    """Whether the package has a law of a name."""
+    """Whether the package has a law of this name."""
     return name in _stored() or name in laws.laws()
 
 
 def derived_again() -> str:
-    """Content of the file, derived anew."""
+    """New content of `derived.json`, derived from the laws of the package."""
     lines = (f"{json.dumps(n)}: {json.dumps(_plain(law.loop_field().terms))}" for n, law in laws.laws().items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
 

@@ -107,7 +107,7 @@ def _require_symbols(expression: sp.Expr, symbols: set[sp.Symbol], what: str) ->
     if unknown:
         twin = " Another symbol of this name has other assumptions." * (str(unknown[0]) in map(str, symbols))
         raise ParameterError(
-            f"{what} must hold only {', '.join(sorted(map(str, symbols))) or 'numbers'}. "
+            f"{what} must contain only {', '.join(sorted(map(str, symbols))) or 'numbers'}. "
             f"Received {unknown[0]}.{twin} Declare every symbol once."
         )
 
@@ -159,12 +159,13 @@ class LoopField:
     field : dict of Symbol to Expr
         Time derivative of every state, in gains, constants and uncertain parameters.
     gains, constants, uncertain : tuple of Symbol
+        Gains, constants and uncertain parameters of the field.
     domain : str
         ``"cells"`` for signed powers, ``"reals"`` for polynomials.
     roots : mapping of Symbol to Symbol
         Symbols that stand for the positive square root of a gain.
     units : mapping of Symbol to Expr
-        Error per unit of a state, an expression in gains; states without an entry have 1.
+        Factor by which a state is multiplied to give its error, in gains, constants and roots; 1 if omitted.
 
     Raises
     ------
@@ -199,7 +200,7 @@ class LoopField:
 
     @property
     def terms(self) -> FieldTerms:
-        """The same as plain data, with a name for the argument of every nested power.
+        """The loop as plain data, with a name for the argument of every nested power.
 
         Raises
         ------

@@ -66,13 +66,13 @@ def cut_off(
     Parameters
     ----------
     commanded : Expr
-        [Pa].
+        Commanded pressure [Pa].
     states : tuple of Expr
-        Before this sample.
+        Values of `RestLimit.STATES` before this sample [Pa, m].
     slip, reference : Expr
-        [m].
+        Measured slip and reference slip [m].
     width, per_slip, resolution : Expr
-        [Pa], [Pa/m], [m].
+        As in `RestLimit` [Pa, Pa/m, m].
     within : tuple of Expr, optional
         Least and largest pressure [Pa], and the largest slip between two samples [m] for which they apply.
     """
@@ -91,7 +91,7 @@ def cut_off(
 # A sampled linear law as a controller for simulations.
 
 
-def growth_at_rest(law: LinearLaw, step: Fraction) -> float | None:
+def growth_time_at_rest(law: LinearLaw, step: Fraction) -> float | None:
     """Time [s] in which the states grow e-fold while the fault is at rest, sampled every T_s [s]; None if stable."""
     sizes = np.abs(np.linalg.eigvals(np.array(law.update, dtype=float).reshape((len(law.states),) * 2)))
     growth = float(np.max(sizes, initial=0.0))
@@ -112,18 +112,19 @@ def warning_at_rest(law: LinearLaw, step: Fraction, *, limited: bool = False) ->
 
     Empty for other laws and, if a limit at rest bounds the pressure (`limited`), for one that only ramps.
     """
-    time = growth_at_rest(law, step)
+    time = growth_time_at_rest(law, step)
     if time:
         return (
             "NOT for a stick-slip fault: the law is unstable in open loop, and while friction holds the fault at rest "
-            f"its pressure grows e-fold in {time:.3g} s: use a law whose matrix A has no eigenvalue outside the unit "
-            "circle"
+            f"its pressure grows e-fold in {time:.3g} s: use a law whose update matrix has no eigenvalue outside the "
+            "unit circle"
         )
     if limited or not winds_up(law):
         return ""
     return (
-        "MAY WIND UP on a stick-slip fault: the law has a double integral (the eigenvalue 1 of A has a Jordan block), "
-        "which ramps the pressure while friction holds the fault at rest: run simulate before use, or use one integral"
+        "MAY WIND UP on a stick-slip fault: the law has a double integral (the eigenvalue 1 of its update matrix has "
+        "a Jordan block), which ramps the pressure while friction holds the fault at rest: run simulate before use, "
+        "or use one integral"
     )
 
 
@@ -178,7 +179,7 @@ class SampledController(Controller):
 
     @property
     def of_slip(self) -> LinearLaw | None:
-        """The law, if it measures the slip error and does not need the slip rate."""
+        """The law, if it uses the slip error alone; None if it uses the slip rate or the reference."""
         return self.law if self.law.of_slip_alone and not self.law.of_reference else None
 
     @property
@@ -197,7 +198,7 @@ class SampledController(Controller):
 
     @property
     def gain_units(self) -> Mapping[str, str]:  # type: ignore[override]
-        """Pa per unit of the state."""
+        """Units of k1 and k2, then Pa for every state of the law, which has no declared unit."""
         return {"k1": "Pa/m", "k2": "Pa s/m", **dict.fromkeys(self.law.states, "Pa")}
 
     @property
@@ -261,19 +262,20 @@ def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Exp
 # ----------------------------------------------------------------------
 # Implicit step with an estimate of the disturbance in place of integral states; simulated and proved.
 #
-# Both functions take floats, SymPy and CasADi expressions. The estimate d follows the change of e2 over the last period
-# beyond T_s·B0·p. The pressure is −d plus that which drives e2 to the solution w.
+# The first two functions take floats, SymPy and CasADi expressions. B0 [m²/kg] is the nominal input gain. The
+# estimate d [Pa] is corrected by the part of the change of e2 over the last period that T_s·B0·p does not explain.
+# The pressure p [Pa] is −d plus the pressure that drives e2 to the solution w within one period.
 
 _STATES = ("rate_error_before", "push_before", "disturbance")
 
 
 def followed(rate_error: Any, before: Any, pushed: Any, estimate: Any, weight: Any, gain: Any) -> Any:
-    """d ← d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] [Pa], with the gain T_sB0 [m/(s Pa)]."""
+    """d + a[(e2 − e2⁻)/(T_sB0) − p⁻ − d] [Pa], the new d; `weight` is a [-] and `gain` is T_sB0 [m/(s Pa)]."""
     return estimate + weight * ((rate_error - before) / gain - pushed - estimate)
 
 
-def compensation_answered(rate_error: Any, end_rate: Any, estimate: Any, gain: Any) -> Any:
-    """p = (w − e2)/(T_sB0) − d [Pa]."""
+def compensating_pressure(rate_error: Any, end_rate: Any, estimate: Any, gain: Any) -> Any:
+    """p = (w − e2)/(T_sB0) − d [Pa]; `end_rate` is w [m/s] and `gain` is T_sB0 [m/(s Pa)]."""
     return (end_rate - rate_error) / gain - estimate
 
 
@@ -298,7 +300,7 @@ def compensated(implicit_step: ImplicitStep, weight: Fraction, gain: Fraction) -
     symbols = before, pushed, estimate, _, rate_error, end_rate = sp.symbols("before pushed estimate e1 e2 w")
     share, size = to_sympy(weight), to_sympy(gain)
     level = followed(rate_error, before, pushed / size, estimate / size, share, size)
-    pressure = compensation_answered(rate_error, end_rate, level, size)
+    pressure = compensating_pressure(rate_error, end_rate, level, size)
     rows = [_coefficients(expression, symbols) for expression in (rate_error, size * pressure, size * level)]
     output = _coefficients(pressure, symbols)
     return LinearLaw(

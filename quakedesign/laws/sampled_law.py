@@ -122,7 +122,9 @@ def _require_shapes(owner: str, matrices: dict[str, tuple[Matrix, int, int]]) ->
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class NominalModel:
-    """Nominal model of a law: e2' = s·e1 − w·e2 + β·b·(p − p*) + d.
+    """Nominal model for the design of a law: e2' = s·e1 − w·e2 + β·b·(p − p*) + d.
+
+    p* is the equilibrium pressure [Pa], and d the disturbance [m/s²].
 
     Attributes
     ----------
@@ -188,6 +190,8 @@ def _exact(rows: Sequence[Sequence[Fraction]]) -> fmpq_mat:
 
 def steady_states(own: Matrix, output: Row, rates: Row, pressure: Fraction) -> Row:
     """Steady states z of a law with zero errors: Mz = v and Cz = p; free components are 0.
+
+    `own` is M = F − I, `output` is C, `rates` is v, and `pressure` is p [Pa].
 
     Raises
     ------
@@ -343,7 +347,7 @@ class ErrorModel:
         gains : tuple of Fraction
             k [Pa/m, Pa·s/m, and Pa per unit of q].
         corrections : tuple of rows
-            Of e1, e2 and d for the innovations of e1 [m] and e2 [m/s].
+            Corrections of e1, e2 and d (rows) per innovation of e1 [m] and of e2 [m/s] (columns).
         """
         n, zero = 2 + len(self.pressures), Fraction(0)
         _require_shapes(f"an error model with {n} states", {"k": ((gains,), 1, n), "l": (corrections, 3, 2)})
@@ -405,13 +409,13 @@ def slip_observer(gains: Row, corrections: tuple[Fraction, Fraction, Fraction], 
 class RestLimit:
     """Limit at rest: lower limit of the pressure relative to all earlier pressures while the fault is at rest.
 
-    The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since. A
-    loop whose pressure stays within P of p*, with |dp*/dr| at most `per_slip`, never reaches a limit with a width of
-    2P, so that the limit does not affect a guarantee. While friction holds the fault, measurements do not respond to
-    the pressure, and while the slip is ahead of the reference an integral would lower the pressure without bound. The
-    limit then saturates the pressure, with anti-windup of the law. It ends when the fault moves, for any cause. The
-    proved range of pressure limits the pressure too, at rest and in motion, unless the fault moves faster than is
-    proved.
+    The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since.
+    Let p* be the equilibrium pressure. A loop whose pressure stays within P of p*, with |dp*/dr| at most `per_slip`,
+    never reaches a limit with a width of 2P, so that the limit does not affect a guarantee. While friction holds the
+    fault at rest, measurements do not respond to the pressure, and while the slip is ahead of the reference an integral
+    would lower the pressure without bound. The limit then saturates the pressure, with anti-windup of the law. The
+    saturation ends when the fault moves, for any cause. The range of pressure that a proof covers is a limit too, at
+    rest and in motion, unless the fault moves faster than the proof covers.
 
     Attributes
     ----------
@@ -432,7 +436,7 @@ class RestLimit:
     Raises
     ------
     ParameterError
-        For a width that is not positive, another negative number, or an incomplete or invalid range.
+        For a width that is not positive, a negative per_slip, resolution or fastest, or an incomplete or invalid range.
     """
 
     STATES: ClassVar[tuple[str, ...]] = ("highest_pressure", "last_slip")

@@ -72,7 +72,7 @@ class SlidingMode(Controller):
     @property
     @abstractmethod
     def lipschitz_limit(self) -> Fraction:
-        """Bound on |h'| that no Lyapunov function can exceed with these gains."""
+        """Least |h'| [m/s³] for which no Lyapunov function exists with these gains."""
 
     @property
     def numbers(self) -> dict[str, Fraction]:
@@ -84,7 +84,7 @@ class SlidingMode(Controller):
 
     @classmethod
     def for_authority(cls, values: "tuple[str | float | Fraction, ...]", authority: Fraction) -> Self:
-        """Return a law from base gains in order, with a divisor."""
+        """Return a law from base gains in the order of `gain_units`, with the divisor `authority` [m²/kg]."""
         return cls.from_values(values, divisor=authority)
 
     def scaled(self, scale: str | float | Fraction) -> Self:
@@ -142,7 +142,7 @@ class SlidingMode(Controller):
 
 @dataclass(frozen=True, kw_only=True)
 class IntegratorChain(Law):
-    """A homogeneous law of degree −1 for e1' = e2, …, en' = β(ν + h), proved on its own plant.
+    """A homogeneous law of degree −1 for e1' = e2, …, en' = β(ν + h), with proofs for this plant, not for a fault.
 
     With e(n+1) = ξ + h the loop is en' = β(ν0(e1 … en) + e(n+1)), e(n+1)' = ξ' + d, where ν = ν0 + ξ and d = h'.
     """
@@ -180,7 +180,7 @@ class IntegratorChain(Law):
     def counterexample(
         cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
-        """The equilibrium e1 = 1, e2 = … = en = 0, e(n+1) = −ν0, if the sliding ξ' can cancel a constant d there."""
+        """The equilibrium e1 = 1, e2 = … = en = 0, e(n+1) = −ν0, if a Filippov value of ξ' cancels a constant d."""
         exact = [sp.Rational(gains[name].numerator, gains[name].denominator) for name in cls.gain_units]
         rest = sp.Rational(cls.virtual_control((sp.Integer(1), *[sp.Integer(0)] * (cls.order - 1)), exact))
         if rest == 0:

@@ -19,18 +19,18 @@ from quakedesign.laws.stick_slip_law import GAIN_UNITS, StickSlipLaw
 def level_after(
     states: Sequence[Any], seen: tuple[Any, Any], period: Any, gains: tuple[Any, Any, Any], *, sticks: bool = True
 ) -> sp.Expr:
-    """Level D [Pa] after a sample.
+    """Level D [Pa], the estimate of the disturbance, after a sample.
 
     Parameters
     ----------
     states : sequence of four
         Level D [Pa], predicted slip rate [m/s], last measured slip rate [m/s] and slip [m].
     seen : (slip, slip rate)
-        As measured [m], [m/s].
+        Measured slip [m] and slip rate [m/s].
     period : expression
         T_s [s].
     gains : (level_gain, slip_gain, rest_slip)
-        Of `StickSlipLaw`.
+        Gains of `StickSlipLaw` [Pa·s/m, Pa/m, m].
     sticks : bool
         Whether the innovation of the slip is limited at rest.
     """
@@ -80,8 +80,8 @@ class StickSlipController(Controller):
     def __post_init__(self) -> None:
         if self.law.pull:
             raise ParameterError(
-                "a StickSlipController needs a law with a linear target rate, got one with an implicit step: run its "
-                "sliding mode in the scheme stick-slip"
+                "law of a StickSlipController must have a linear target rate. Received one with an implicit step. Run "
+                "its sliding mode with the scheme stick-slip."
             )
         object.__setattr__(self, "gains", MappingProxyType({name: getattr(self.law, name) for name in GAIN_UNITS}))
 
@@ -119,9 +119,12 @@ class StickSlipController(Controller):
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
         """Raise `UnsupportedError`: a sequence of gains does not define the law."""
-        raise UnsupportedError("a stick-slip controller needs a StickSlipLaw and T_s, not a sequence of gains")
+        raise UnsupportedError(
+            "a stick-slip controller is given by a StickSlipLaw and T_s, not by gains in order. "
+            "Use StickSlipController."
+        )
 
     @classmethod
     def loop_field(cls) -> LoopField:
-        """Raise: it has no loop in continuous time."""
+        """Raise `UnsupportedError`: a sampled law has no closed loop in continuous time."""
         raise UnsupportedError("a sampled law has no loop in continuous time: use a guarantee of the sampled loop")

@@ -83,7 +83,7 @@ class SampledLaw(SampledController):
         Parameters
         ----------
         system : control.StateSpace or control.TransferFunction
-            Its one output is the pressure itself [Pa]: multiply a law designed for u = −Ky by −1.
+            Its single output is the pressure p [Pa]. Give −K for a law K that was designed for p = −Ky.
         inputs : sequence of str
             Signals in the order of its inputs: slip_error, slip_rate_error, slip, slip_rate, reference or
             reference_rate [m, m/s].
@@ -178,7 +178,7 @@ class SampledLaw(SampledController):
         kp, ki, kd : str, float or Fraction
             [Pa/m], [Pa/(m s)], [Pa·s/m].
         N : str, float or Fraction
-            Bandwidth of the derivative [1/s]: D = s·N/(s + N), by backward differences.
+            Bandwidth [1/s] of the filtered derivative D = s·N/(s + N)·e, by backward differences.
         step : str, float or Fraction
             T_s, [s] or with a unit.
         """
@@ -285,8 +285,8 @@ class SampledLaw(SampledController):
             named = {name: pid.pop(name) for name in ("kp", "ki", "kd", "N") if name in pid}
             if pid or entries or "kp" not in named:
                 raise ScenarioError(
-                    f"pid of law {path} must have the keys kp, ki, kd and N, kp at least, and nothing but step beside "
-                    'it: {"step": "50 ms", "pid": {"kp": 4e8, "ki": 1e8, "kd": 3e8, "N": 50}}.'
+                    f"pid of law {path} must have the key kp and may have ki, kd and N; the file has only step, pid "
+                    'and label. Write {"step": "50 ms", "pid": {"kp": 4e8, "ki": 1e8, "kd": 3e8, "N": 50}}.'
                 )
             return cls.from_pid(**named, step=step, label=label)
         if set(entries) in ({"gains"}, {"gains", "inputs"}):

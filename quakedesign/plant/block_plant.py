@@ -7,8 +7,8 @@ e2′ = s·e1 + ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ �
 within their ranges and S are the shares of the wells.
 
 **Balance.** Let N = σ′ − Sp* for each block. Its forces are n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, with n the area
-per mass. With μ = μ0 + δ and |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gc, where c = nδN and G is from the
-inverse of a constant matrix. Then |N − N0| ≤ |G|nh|N|, which bounds N, and with it s and w.
+per mass. With μ = μ0 + δ and |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gc, where c = nδN and G is S times
+a block of the inverse of a constant matrix. Then |N − N0| ≤ |G|nh|N|, which bounds N, and with it s and w.
 
 With x*′ = r′(1 + ξ) and p*′ = r′q the derivative of the forces is s(1 + ξ) + ΣK(ξ_j − ξ) + βb·Sq = 0, and Cξ = 0.
 With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The inverse of the matrix with s0 and β0 bounds
@@ -16,12 +16,12 @@ With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The
 of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the balance is a Lipschitz function of r
 (Clarke), and |ξ| ≤ X and |q| ≤ Q follow from F.
 
-With one well, identical blocks and symmetric springs, the springs drop out of the mean force. This is the force on one
-block whose coefficient is the mean of μ at x*. N then lies in the range of one block whose friction weakens and
-strengthens 1 + X times as fast. If X > 1, blocks may move backward, at up to X − 1 times
+With one well, identical blocks and symmetric springs, the springs drop out of the mean force. The mean force is that
+on one block whose friction coefficient is the mean of μ(x*) over the blocks. N then lies in the range of one block
+whose friction weakens and strengthens 1 + X times as fast. If X > 1, blocks may move backward, at up to X − 1 times
 the rate of the reference; weakening friction then increases again.
 
-If no such F is found, nothing is proved: the bound of the sectors is then set to 1e-30.
+If no F with M·F + f < F is found, nothing is proved: the bound `within` of the slope sectors is then 1e-30 m.
 """
 
 from collections.abc import Iterable, Sequence
@@ -43,19 +43,19 @@ from quakedesign.plant.of_fault import uncertain_plant
 from quakedesign.plant.plant_values import MOST, Matrix, Row, unit
 from quakedesign.text import counted
 
-_STEEP = Fraction(10**9)  # factor on friction slopes in the first pass: any coefficient at any slip
-_LOST = Fraction(10**9)  # X, Q and |σ′ − Sp*| where no balance is proved
+_STEEP = Fraction(10**9)  # factor on friction slopes in the first pass: allows any coefficient at any slip
+_LOST = Fraction(10**9)  # X [-], Q [Pa/m] and |σ′ − Sp*| [Pa] where no balance is proved
 _NOWHERE = Fraction(1, 10**30)  # bound of the sectors in that case, so that nothing is proved
 _TURNS = 6
 _GRID = 10**4
-_DIGITS = 6  # of the middle of a range
+_DIGITS = 6  # significant digits of the middle of a range
 _WIDER = 1 + 1e-9
 
 Spring = tuple[int, int, Fraction]
 
 
 def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupling: Any) -> dict[str, Any]:
-    """Fields of the plant of several blocks."""
+    """Fields of `UncertainPlant` for the blocks of a fault; arguments and errors as of `UncertainPlant.from_blocks`."""
     if isinstance(fault, BlockChain):
         if blocks is not None or coupling is not None or wells != "each":
             raise ParameterError(
@@ -70,7 +70,7 @@ def block_parts(fault: Fault | BlockChain, blocks: int | None, wells: str, coupl
         return _parts(tasks, fault.springs, fault.shares, name, box, fault.flow, fault.pressures)
     require_known(wells, ("each", "one"), "wells")
     if blocks is None or not 2 <= blocks <= MOST // 2:
-        raise ParameterError(f"blocks must be 2 to {MOST // 2}. Received {blocks}.")
+        raise ParameterError(f"blocks must be a whole number from 2 to {MOST // 2}. Received {blocks}.")
     task = uncertain_plant(fault)
     elastic = task.shear_modulus * blocks**2 / (task.density * rational(fault.length) ** 2)
     K = elastic if coupling is None else exact_value(coupling, "1/s^2", "coupling")
@@ -174,14 +174,14 @@ def measured_by(shares: Sequence[Row]) -> Matrix:
 
 
 def require_independent(shares: Sequence[Row]) -> None:
-    """Reject wells of which some act on the same blocks in the same proportion."""
+    """Reject wells whose effects on the measurements are linearly dependent."""
     N, m = len(shares), len(shares[0])
     weights = measured_by(shares)
     through = [[sum((c * shares[i][k] for i, c in enumerate(row)), Fraction(0)) for k in range(m)] for row in weights]
     if inverse_of(through) is None:
         raise ParameterError(
             f"a guarantee of several blocks needs wells that act independently. Received {counted(m, 'well')} for "
-            f"{N} blocks, of which some act on the same blocks in the same proportion. Move or omit wells."
+            f"{N} blocks, whose effects on the blocks are linearly dependent. Move or omit wells."
         )
 
 
@@ -197,7 +197,7 @@ def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Balance:
-    """Ranges of s and w of every block, X of every block [-], and Q of every well [Pa/m]."""
+    """Per block: ranges of s [1/s²] (`slopes`) and w [1/s] (`dampings`), X [-] (`moves`); per well: Q [Pa/m]."""
 
     slopes: list[Range]
     dampings: list[Range]
@@ -245,7 +245,7 @@ def _balancing(
 def _stresses(
     tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
 ) -> list[Range]:
-    """Ranges of σ′ − Sp* [Pa] of every block at balance; ±1e9 if none are proved."""
+    """Ranges of σ′ − Sp* [Pa] of every block at balance; ±1e9 Pa if none is proved."""
     N, m = len(tasks), len(weights)
     area = [task.area_per_mass[0] for task in tasks]
     middle = [(task.friction.least + task.friction.largest) / 2 for task in tasks]

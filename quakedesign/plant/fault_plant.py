@@ -34,9 +34,9 @@ class Friction:
     Attributes
     ----------
     weakening, strengthening : Fraction
-        Largest fall and rise of μ per unit slip.
+        Largest fall and rise of μ per slip [1/m], both positive.
     rate_slope : Fraction
-        Largest |Δμ/Δrate|.
+        Largest |Δμ/Δrate| [s/m].
     """
 
     static: Fraction
@@ -55,7 +55,8 @@ class FaultPlant:
     ----------
     name : str
     density, shear_modulus, length, damping, normal_stress : Fraction
-        ρ, G, L, η, σ′. A rectangular patch is modelled as a row of equal squares; these are the values of one square.
+        ρ [kg/m³], G [Pa], L [m], η [kg/s], σ′ [Pa]. A rectangular patch is modelled as a row of equal squares; these
+        are the values of one square.
     spreads : (Fraction, Fraction, Fraction)
         Relative half-widths of k̂, η̂ and N̂ [-].
     friction : Friction
@@ -96,7 +97,7 @@ class FaultPlant:
             self._require(getattr(self, name) >= 0, name, "0 or more", getattr(self, name))
         for name in ("weakening", "strengthening", "rate_slope"):
             self._require(getattr(law, name) >= 0, f"friction {name}", "0 or more", getattr(law, name))
-        for name, value in zip(("stiffness", "damping", "authority"), self.spreads, strict=True):
+        for name, value in zip(_SPREADS, self.spreads, strict=True):
             self._require(0 <= value < 1, f"spread of {name}", "from 0 to below 1", value)
         if not least <= static <= largest:
             low, received, high = apart(least, static, largest)
@@ -177,7 +178,7 @@ class FaultPlant:
         return self.slip_slopes(self.stress)
 
     def slip_slopes(self, stress: Range) -> Range:
-        """Force per slip and mass [1/s²] while the effective normal stress [Pa] is constant and within a range."""
+        """Range of force per slip and mass [1/s²] for any constant effective normal stress in a range [Pa]."""
         law, k = self.friction, self.stiffness
         low, high = _hull(
             n * p * c for n in self.area_per_mass for p in stress for c in (law.weakening, -law.strengthening)
@@ -190,7 +191,7 @@ class FaultPlant:
         return self.rate_slopes(self.stress)
 
     def rate_slopes(self, stress: Range) -> Range:
-        """Damping per mass [1/s] while the effective normal stress [Pa] is within a range."""
+        """Range of damping per mass [1/s] for any effective normal stress in a range [Pa]."""
         most = self.area_per_mass[1] * max(map(abs, stress)) * self.friction.rate_slope
         low, high = self.specific_damping
         return low - most - self.growths[1], high + most - self.growths[1]
@@ -227,7 +228,7 @@ class FaultPlant:
 
     @cached_property
     def half_ranges(self) -> dict[str, Fraction]:
-        """Half-widths of the ranges of s, w and β, by the output that they multiply."""
+        """Half-widths of the ranges of s [1/s²], w [1/s] and β [-], by the name of the signal that each multiplies."""
         return {
             name: (high - low) / 2
             for name, (low, high) in (
@@ -259,7 +260,7 @@ class FaultPlant:
         Constants of the fault and its reference must be the same; friction, ranges and disturbance must lie within
         those of this plant. The name is not compared.
         """
-        return [*_other(self, other), *_wider_than_proved(self, other), *_rougher(self.friction, other.friction)]
+        return [*_other(self, other), *_wider_ranges(self, other), *_rougher(self.friction, other.friction)]
 
 
 def _hull(values: Iterable[Fraction]) -> Range:
@@ -328,7 +329,7 @@ def _other(proved: FaultPlant, required: FaultPlant) -> list[str]:
     return found + ([] if proved.shape == required.shape else ["the shape of the reference"])
 
 
-def _wider_than_proved(proved: FaultPlant, required: FaultPlant) -> list[str]:
+def _wider_ranges(proved: FaultPlant, required: FaultPlant) -> list[str]:
     """Ranges and disturbances beyond those of the proof."""
     pairs = {
         f"spread of {name} [-]": both for name, *both in zip(_SPREADS, proved.spreads, required.spreads, strict=True)
@@ -351,4 +352,8 @@ def _rougher(proved: Friction, required: Friction) -> list[str]:
     beyond |= {"static": False, "least": required.least < proved.least}
     names = [name for name, wider in beyond.items() if wider]
     both = [(name, *(six_digits(getattr(one, name)) for one in (proved, required))) for name in names]
-    return [f"friction: {name} {theirs} in the certificate, {own} in the fault" for name, theirs, own in both]
+    units = {"weakening": "1/m", "strengthening": "1/m", "rate_slope": "s/m"}
+    return [
+        f"friction: {name} [{units.get(name, '-')}] {theirs} in the certificate, {own} in the fault"
+        for name, theirs, own in both
+    ]

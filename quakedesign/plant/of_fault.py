@@ -32,12 +32,14 @@ def static_friction(fault: Fault) -> Fraction:
 def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
     """Slow-sliding plant at V, the first rate of the reference, under a stress of at most `stress` [Pa].
 
-    The ranges of a, b and D extend by the fraction `spread` to both sides [-]; that of μ* follows from a − b.
+    The ranges of a, b and D extend to both sides by the fraction `spread` [-]; the range of μ* follows from those of
+    a and b, as μ* depends on a − b if V is not the reference rate of friction.
 
     Raises
     ------
     UnsupportedError
-        For friction without a state, or whose state depends on the normal stress, and for a ramp of at least 8/23.
+        For friction without a state, or whose state depends on the normal stress, and for a reference whose `ramp` is
+        at least 8/23: its rate would deviate from V by V or more.
     """
     if fault.friction.name not in _LAWS or fault.friction.stress_sensitivity:  # type: ignore[attr-defined]
         sensitivity = getattr(fault.friction, "stress_sensitivity", 0)
@@ -86,8 +88,9 @@ def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fracti
 def plant_like(plant: FaultPlant | SlidingPlant, fault: Fault, *, wide: bool = False) -> FaultPlant | SlidingPlant:
     """Plant of a fault, of the same kind as a given plant, with the disturbance class or stress of that plant.
 
-    In slow sliding the constants of friction are those of the fault, and the ramp of the planned pressure is that of
-    the given plant and its law. With `wide` they are as uncertain as the given plant's, with the fault's own ramp.
+    In slow sliding, by default the constants of friction are exact and the planned pressure has the rate `ramp` of the
+    given plant. With `wide` the constants of friction have the relative uncertainty of those of the given plant, and
+    the planned pressure has the rate that follows from the fault.
     """
     if isinstance(plant, FaultPlant):
         return uncertain_plant(fault, rate_limited=plant.change is not None)

@@ -12,7 +12,7 @@ MOST = 40
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExactSector:
-    """A sector in exact numbers, its row over states and controls."""
+    """A sector in exact numbers, see `Sector` in `user_plant`; `row` always has entries for states and controls."""
 
     entry: Row
     row: Row
@@ -22,9 +22,9 @@ class ExactSector:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowLoad:
-    """A load v = control·λ(t), |λ′| ≤ rate, λ(0) = 0, balanced by u = v with x = shift·λ; C·shift = 0.
+    """A slow load v = control·λ(t) with |λ′| ≤ rate and λ(0) = 0, which u = v balances at x = shift·λ; C·shift = 0.
 
-    The states in a statement to be proved are x − shift·λ.
+    Guarantees bound the states relative to this balance, x − shift·λ.
     """
 
     control: Row
@@ -33,5 +33,5 @@ class SlowLoad:
 
 
 def unit(size: int, place: int) -> Row:
-    """Unit row."""
+    """Row of a unit matrix: 1 at index `place`, else 0."""
     return tuple(Fraction(i == place) for i in range(size))

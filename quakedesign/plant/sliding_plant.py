@@ -18,8 +18,8 @@ from quakedesign.loop import StateLaw
 # Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at V,
 # μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
 # state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). Initially the fault slides at V,
-# without pressure, with its far end at rest. Along a reference r from 0, whose rate stays within V(1 ± ``swing``), it
-# then needs p* = Kr/μ*, of which the plan supplies ``ramp``·r/V. If ``swing`` is 0, r = Vt.
+# without pressure; the far end of its spring is at rest. Along a reference r from 0, whose rate stays within
+# V(1 ± ``swing``), it then needs p* = Kr/μ*; the planned pressure is ``ramp``·r/V. If ``swing`` is 0, r = Vt.
 
 Range = tuple[Fraction, Fraction]
 AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
@@ -97,7 +97,7 @@ class SlidingPlant:
 
     @property
     def course(self) -> str:
-        """Empty text: a statement about slow sliding names the distance elsewhere."""
+        """Empty text, in place of the distance and duration of `FaultPlant.course`; statements give them elsewhere."""
         return ""
 
     def differences(self, other: "SlidingPlant") -> list[str]:
@@ -131,7 +131,7 @@ class SlidingPlant:
 
     @property
     def stiffness(self) -> Fraction:
-        """K [Pa/m]."""
+        """Stiffness per unit area, K = G/L [Pa/m]."""
         return self.shear_modulus / self.length
 
     @property
@@ -141,7 +141,7 @@ class SlidingPlant:
 
     @property
     def radiation(self) -> Fraction:
-        """H [Pa·s/m]."""
+        """Damping per unit area, H = η/L² [Pa·s/m]."""
         return self.damping / self.length**2
 
     @property
@@ -161,7 +161,7 @@ class SlidingPlant:
         return along * (1 + self.swing)
 
     def normal_stress(self, push: Fraction) -> Range:
-        """N = σ′ − p [Pa] along the reference, with |p − p*| up to `push` [Pa]."""
+        """Range of N = σ′ − p [Pa] along the reference, for |p − p*| ≤ `push` [Pa]."""
         low, high = self.ranges["normal_stress"]
         return low - self.pressure_per_slip * self.distance - push, high + push
 
@@ -176,20 +176,21 @@ def _in_words(value: Fraction | str | bool) -> str:
 
 MOST_CELLS = 64
 Cuts = tuple[tuple[str, Fraction] | None, ...]
-"""Axis and place of the cut of a box, or None; then the same for its part below the cut, then for that above."""
+"""Tree of cuts in preorder: (axis, value) for a box that is cut, then the entries of its lower part and of its upper
+part; None for a box that is not cut, which is a cell."""
 WHOLE: Cuts = (None,)
 
 
 def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
-    """The task on every cell of the box.
+    """The plants that `task` becomes on the cells into which `cuts` divide its box.
 
     Raises
     ------
     ParameterError
-        For a cut outside its box, too few or too many cuts, or more than 64 cells.
+        For a cut outside its box, too few or too many entries of `cuts`, or more than 64 cells.
     """
     boxes, leaves = [task], []
-    for cut in cuts[: 2 * MOST_CELLS]:  # 65 cells would need one entry more
+    for cut in cuts[: 2 * MOST_CELLS]:  # 65 cells need 129 entries, one more than are read
         if not boxes:
             break
         box = boxes.pop()
@@ -211,7 +212,7 @@ def parts(task: SlidingPlant, axis: str, at: Fraction) -> tuple[SlidingPlant, Sl
     Raises
     ------
     ParameterError
-        For a cut that is not inside.
+        For an unknown axis, or a cut that is not strictly within the range of its axis.
     """
     low, high = task.ranges.get(axis, (at, at))
     if not low < at < high:

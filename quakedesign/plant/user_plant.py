@@ -30,12 +30,13 @@ class Sector:
     Attributes
     ----------
     entry : sequence of numbers
-        Its input column in x′, one number for every state.
+        Input column of φ in x′, one number for every state.
     row : sequence of numbers
-        Its argument y: one number for every state and, if y depends on the controls, for every control.
+        Coefficients of the argument y: one for every state and, if y depends on the controls, one for every control.
     slopes : (number, number) or callable
-        Low and high. A callable returns them for a bound of |y|, such as ``lambda y: (-5 * y**2 / 2, 0)``, and a
-        search finds the bound; y is a `Fraction`, and returned floats are read as the decimals that they print.
+        The slopes low and high, or a callable that returns them for a bound of |y|, such as
+        ``lambda y: (-5 * y**2 / 2, 0)``. A search then finds the bound, a `Fraction`; returned floats are read as the
+        decimals that Python prints for them.
     within : number, optional
         Bound of |y| for which the slopes are valid; the proof shows that |y| stays within it. y then depends on
         states alone.
@@ -47,7 +48,10 @@ class Sector:
     within: Any = None
 
     def at(self, bound: Fraction | None, sizes: tuple[int, int], name: str) -> "ExactSector":
-        """The sector in exact numbers; callable slopes are evaluated at a bound of the argument."""
+        """The sector in exact numbers; callable slopes are evaluated at `within`, or at `bound` if `within` is None.
+
+        `sizes` are the numbers of states and of controls.
+        """
         n, m = sizes
         row = vector(self.row, f"row of sector {name}")
         if len(row) == n:
@@ -67,7 +71,7 @@ class Sector:
         ends = vector(slopes, f"slopes of sector {name}", 2)
         if ends[0] > ends[1] or (within is not None and (within <= 0 or any(row[n:]))):
             raise ParameterError(
-                f"sector {name} must have slopes low <= high; within must be positive, with a row of states alone. "
+                f"sector {name} must have slopes low <= high; within must be positive, and its row without controls. "
                 f"Received slopes {shortly(ends[0])} and {shortly(ends[1])}, within "
                 f"{'None' if within is None else shortly(within)}."
             )
@@ -88,25 +92,25 @@ class UncertainPlant:
         What is measured; all states unless given.
     sectors : mapping of str to Sector
     gains : mapping of str to (number, number)
-        Range of the factor of a control less its loads, by the control's name; the factor may vary within this range at
-        any rate.
+        Least and largest value of the factor that multiplies a control minus its loads, u − v, by the name of the
+        control; the factor may vary within this range at any rate.
     disturbances : mapping of str to (sequence, number)
         Input column in x′, and largest magnitude.
     loads : mapping of str to (sequence, sequence or None, number)
-        Controls that balance it, shift of the states at balance (0 for None) and largest rate; see `SlowLoad`.
+        Controls that balance the load, shift of the states at balance (0 for None) and largest rate; see `SlowLoad`.
     outputs : mapping of str to sequence
         Output rows over the states, whose peaks are bounded; the measurements unless given.
     controls, measurements : sequence of str
         Names of u and Cx; u1 … and y1 … unless given.
     noise : mapping of str to number
-        Largest measurement error by the name of a measurement.
+        Largest absolute measurement error, in the unit of the measurement, by its name; 0 by default.
     start : sequence of numbers, optional
         |x_i(0)| ≤ start_i; 0 unless given.
     units : mapping of str to str
         Units of outputs, controls and disturbances by their names, for printed text: SI units, or MPa.
     name : str
     remarks : mapping of str to str
-        Text that follows the words ``plant`` and ``disturbances`` in a statement.
+        Text that follows the words "plant" and "disturbances" in a statement, by the keys ``plant``, ``disturbances``.
 
     Raises
     ------
@@ -161,7 +165,7 @@ class UncertainPlant:
                 )
         ends = {name: vector(pair, f"gains of {name}", 2) for name, pair in self.gains.items()}
         if any(low > high for low, high in ends.values()):
-            raise ParameterError("gains of a control must be the least, then the largest. Received them reversed.")
+            raise ParameterError("gains of a control must be (least, largest). Received them reversed. Swap them.")
         put("gains", _frozen(ends))
         sizes = {name: rational(size, f"noise of {name}") for name, size in self.noise.items()}
         start = (Fraction(0),) * n if self.start is None else vector(self.start, "start", n)
@@ -177,7 +181,10 @@ class UncertainPlant:
             )
         put("units", _frozen(dict(self.units)))
         if len(self.sectors) + len(ends) > MOST or not 1 <= len(self.outputs or ()) <= MOST:
-            raise ParameterError(f"a plant must have at most {MOST} sectors and gains, and 1 to {MOST} outputs.")
+            raise ParameterError(
+                f"a plant must have at most {MOST} sectors and gains together, and 1 to {MOST} outputs. Received "
+                f"{len(self.sectors) + len(ends)} and {len(self.outputs or ())}. Remove some, or add outputs."
+            )
         if double := set(self.sectors) & set(ends):
             raise ParameterError(f"sectors and gains must have different names. Received {', '.join(sorted(double))}.")
         self.exact_sectors(lambda _: Fraction(1))
@@ -217,16 +224,18 @@ class UncertainPlant:
         fault : Fault or BlockChain
             A `BlockChain` has its own blocks, springs and wells; no other argument is given with it.
         blocks : int
-            2 to 20.
+            Number of blocks, 2 to 20; required for a `Fault`, None for a `BlockChain`.
         wells : str
-            ``"each"`` or ``"one"``.
+            ``"each"``: a well for each block; ``"one"``: one well for all blocks.
         coupling : number, optional
-            Stiffness of a spring over the mass of a block [1/s²]; by default that of elastic strips, G·blocks²/(ρL²).
+            Stiffness of a spring between blocks divided by the mass of a block [1/s²]; by default that of elastic
+            strips, G·blocks²/(ρL²).
 
         Raises
         ------
         ParameterError
-            For wells that do not act independently.
+            For wells that do not act independently, a number of blocks out of range, a coupling that is not positive,
+            or a further argument with a `BlockChain`.
         """
         parts = block_parts(fault, blocks, wells, coupling)
         return cls(**parts | {"sectors": {name: Sector(**one) for name, one in parts["sectors"].items()}})
@@ -237,7 +246,7 @@ class UncertainPlant:
         return len(self.A), len(self.controls)
 
     def exact_sectors(self, bound: Callable[[str], Fraction]) -> dict[str, ExactSector]:
-        """Sectors, including those of the gains; `bound` gives the bound of an argument by name for callable slopes."""
+        """Sectors, including those of the gains; `bound` gives, by name, the bound of |y| for callable slopes."""
         n, m = self.sizes
         sectors = {name: sector.at(bound(name), (n, m), name) for name, sector in self.sectors.items()}
         for name, (low, high) in self.gains.items():

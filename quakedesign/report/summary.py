@@ -8,7 +8,7 @@ from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from quakedesign.exact import Bound, UpperBound
-from quakedesign.fault.fault_toml import beyond_rates, mean_rate
+from quakedesign.fault.fault_toml import mean_rate, rate_out_of_range
 from quakedesign.report.sentences import cycle_sentences, grade, left_out_lines
 from quakedesign.studies.comparison import pressure_extremes
 from quakedesign.studies.fault_facts import box_sentences
@@ -143,7 +143,7 @@ def _notes(comparison: "Compared", best: "Entry | None") -> Iterator[str]:
         yield f"{fault.source}"
     yield from cycle_sentences(comparison)
     yield from (f"assumed: {text}" for text in fault.assumed)
-    if beyond := beyond_rates(fault.friction, mean_rate(fault.reference)):
+    if beyond := rate_out_of_range(fault.friction, mean_rate(fault.reference)):
         yield beyond
     if best is not None:
         yield from box_sentences(fault)

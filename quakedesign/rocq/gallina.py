@@ -63,7 +63,8 @@ def in_integers(
     Parameters
     ----------
     constraints : int, optional
-        Factor of the constraints; if given, the polynomial must have integer coefficients and is not scaled.
+        Factor that clears the denominators of the constraints; if given, the polynomial must have integer coefficients
+        and is not scaled. By default the common denominator of the polynomial and its constraints.
     """
     common = clearing(statement) if constraints is None else constraints
     grams = [_over_wholes(square, common) for square in squares]
@@ -82,7 +83,7 @@ def in_integers(
 
 
 def scaled(polynomial: Polynomial, factor: int | Fraction) -> Polynomial:
-    """Polynomial times a number."""
+    """Product of a polynomial and a number."""
     return {e: c * factor for e, c in polynomial.items()}
 
 
@@ -110,9 +111,9 @@ def _square(square: Square, rows: Iterable[Iterable[Fraction]], common: int) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class Reason:
-    """Proof that a multiplier μ, times its common denominator, is nowhere negative on the set."""
+    """Proof that a multiplier μ, scaled to integer coefficients, is nowhere negative on the set of the statement."""
 
-    # numerator · μ − rest as a sum of squares; None if the sign follows from the terms of μ
+    # numerator · μ − rest as a sum of squares, rest ≥ 0; None if the sign follows from the terms of μ
     sums: IntegerWitness | None = None
     numerator: int = 1
     rest: int = 0
@@ -137,7 +138,7 @@ def multiplier_reason(statement: Statement, squares: Sequence[Square]) -> Reason
     strict = next((i for i, s in enumerate(squares) if not s.product and one in s.basis), None)
     if strict is None:
         return Reason(sums=_sums(statement, squares, Fraction(0)))
-    margin, less = _less_one(squares[strict], squares[strict].basis.index(one))
+    margin, less = _minus_margin(squares[strict], squares[strict].basis.index(one))
     numerator = margin.denominator
     return Reason(
         sums=_sums(statement, [*squares[:strict], less, *squares[strict + 1 :]], margin),
@@ -146,7 +147,7 @@ def multiplier_reason(statement: Statement, squares: Sequence[Square]) -> Reason
     )
 
 
-def _less_one(square: Square, index: int) -> tuple[Fraction, Square]:
+def _minus_margin(square: Square, index: int) -> tuple[Fraction, Square]:
     """A number δ > 0 and the square minus δ, for a basis that contains 1."""
     size = len(square.basis)
     place = index * size - index * (index - 1) // 2

@@ -15,7 +15,10 @@ _POINTS = "forall x, nowhere_zero x ->"
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """Columns, in order: states, lifts with a variable, V if a decay is claimed, lifts with only their sign used."""
+    """Variables of the loop in Rocq, in order: states, lifts with a variable, V if a decay is claimed, other lifts.
+
+    Of the other lifts only the sign is used. `weights` are the homogeneity weights of all variables, by name.
+    """
 
     weights: Mapping[str, int]
     varying: tuple[str, ...]  # Parameters with a range of more than one point
@@ -26,7 +29,7 @@ class Columns:
         return list(self.weights).index(name)
 
     def expression(self, terms: Iterable[Term]) -> str:
-        """Sum of terms, without those that vanish by a zero parameter."""
+        """Sum of terms as a Gallina list; terms with a factor that is a zero parameter are omitted."""
         return gallina.listed(filter(None, map(self._term, terms)), ";\n   ")
 
     def _term(self, term: Term) -> str:
@@ -53,7 +56,7 @@ def _power(exponent: Fraction, kind: str) -> str:
 def loop_theorems(evidence: Evidence) -> Iterator[str]:
     """Definitions of a loop on cells, and theorems about V and its derivative along the field.
 
-    They are placed after `questions` and `certificate`, the theorem that these hold.
+    They follow the definition `questions` and the theorem `certificate` that all these questions hold.
     """
     loop, obligations = evidence.loop, Obligations(evidence.loop, evidence.lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")

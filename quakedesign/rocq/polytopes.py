@@ -26,13 +26,13 @@ from quakedesign.guarantees.exact.stick_slip_set import (
 )
 from quakedesign.rocq import gallina
 
-_BITS, _GRAIN = 80, 40  # bits of numbers and of multipliers in polytope.v
-_CLOSE = 2.0**-30  # bounds by multipliers count if below 1 by more than this; else the facet itself is used
-_DIGITS = 12  # of ranges, rounded outward
+_BITS, _GRAIN = 80, 40  # binary places of numbers and of multipliers in polytope.v
+_CLOSE = 2.0**-30  # a bound by multipliers is used if below 1 − this; otherwise the facet's own inequality is used
+_DIGITS = 12  # significant digits of the ends of ranges, rounded outward
 _OFF = 77  # bits of accuracy of the polynomials for the impulse responses
 _MOST_TERMS = 400
 _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (3, 0), 6: (3, 1)}
-"""By place in `resting_rows`: number of the polytope, 0 to 3, and 0 for the least r' or 1 for the largest."""
+"""By index in `resting_rows`: number of the polytope, 0 to 3, and 0 for the least or 1 for the largest r'."""
 
 
 def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
@@ -117,9 +117,10 @@ def _near(value: arb) -> str:
 
 
 def _terms(period: Period) -> str:
-    """Number of terms of the Taylor polynomials of the impulse responses, and n with e^(KT) <= 3^n.
+    """Text "terms n": number of terms of the Taylor polynomials of the impulse responses, and n with e^(KT) <= 3^n.
 
-    K is the growth rate of their error.
+    K is the growth rate of the error of the polynomials [1/s] and T the sampling time [s].
+
 
     Raises
     ------

@@ -19,7 +19,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault, fault_toml
 from quakedesign.fault.equilibrium import by_equilibrium
-from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, mean_rate, sliding_step
+from quakedesign.fault.fault_toml import SAMPLES_PER_STATE_TIME, mean_rate, rate_out_of_range, sliding_step
 from quakedesign.files import Json
 from quakedesign.guarantees.exact.limit_theorems import longest_reaction
 from quakedesign.guarantees.search.lqg import sliding_model, sliding_poles
@@ -392,11 +392,14 @@ def sampling_sentence(adequacy: SamplingAdequacy) -> str:
 
 def _sliding_sentence(fault: Fault) -> list[str]:
     """Extrapolation of friction, and the T_s of a guarantee of slow sliding if it differs by a factor of two."""
-    beyond = list(filter(None, [beyond_rates(fault.friction, mean_rate(fault.reference))]))
+    beyond = list(filter(None, [rate_out_of_range(fault.friction, mean_rate(fault.reference))]))
     suits = sliding_step(fault.friction, fault.reference)
     if suits / 2 <= fault.sampling_time <= 2 * suits:
         return beyond
-    return [*beyond, f"for a guarantee of slow sliding choose sampling_time near D_c/({AGEINGS:g} V) = {suits:g} s"]
+    return [
+        *beyond,
+        f"for a guarantee of slow sliding choose sampling_time near D_c/({SAMPLES_PER_STATE_TIME:g} V) = {suits:g} s",
+    ]
 
 
 _of_sliding = by_equilibrium(rest=lambda fault: [], sliding=_sliding_sentence)

@@ -12,8 +12,8 @@ from quakedesign.laws import Controller, control_law
 from quakedesign.laws import published as published_controllers
 from quakedesign.laws.gain_scaling import (
     UNROUNDED,
-    CarriedGains,
     Form,
+    ScaledGains,
     agrees,
     carry,
     exact,
@@ -124,7 +124,7 @@ def _group(comparison: GroupComparison) -> Json:
     }
 
 
-def _published(target: Fault, carried: CarriedGains) -> Json | None:
+def _published(target: Fault, carried: ScaledGains) -> Json | None:
     """Printed gains of the target, if they exist for the same λ and divisor."""
     printed = published_controllers(target.name).get(carried.law.name)
     if printed is None or any(

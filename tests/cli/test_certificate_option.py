@@ -141,12 +141,12 @@ def test_a_start_for_which_a_law_is_proved_is_in_what_is_proved(capsys, tmp_path
 def test_what_is_exported_says_first_what_it_is_for(file, capsys, tmp_path):
     code, out, _ = told(capsys, "export", "real-fault", "--certificate", file, "--out", tmp_path / "c")
     lines = out.splitlines()
-    assert (code, lines[0]) == (0, "NOT for the fault's T_s = 0.184 s: it runs once every 0.15 s")
+    assert (code, lines[0]) == (0, "NOT for the fault's T_s = 0.184 s: it the law runs every 0.15 s")
     assert lines[1].startswith("designed for a lag of 0.02 s between controller and fault")
     assert "".join(lines[2:5]).replace(" ", "") == f"proved: {CLAIM.sentence()}".replace(" ", "")
     header = (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
     assert header.startswith(
-        "/*\n * NOT for the fault's T_s = 0.184 s: it runs once every 0.15 s\n *\n * designed for a lag"
+        "/*\n * NOT for the fault's T_s = 0.184 s: it the law runs every 0.15 s\n *\n * designed for a lag"
     )
     assert "rest_limit: width" in header
     assert "#define CONTROLLER_STEP 0.15 /* s */" in header

@@ -135,7 +135,7 @@ def test_options_that_do_not_apply_are_refused_before_the_work(asked, told, said
 
 
 def test_a_fault_that_never_rests_has_no_other_plant(asked):
-    assert "plant is for friction without a state" in asked("compare", "crustal-patch", "--plant", "printed")
+    assert "plant must be omitted for friction with a state" in asked("compare", "crustal-patch", "--plant", "printed")
 
 
 def test_a_well_at_the_fault_is_no_path_of_slow_sliding(asked):

@@ -380,7 +380,7 @@ def test_a_controlled_run_sets_pressure_and_start_itself(given):
 @pytest.mark.parametrize("given", [{"stress": 1e3}, {"stress_period": 60.0}, {"stress": 0.0, "stress_period": 1.0}])
 def test_a_stress_needs_a_controller(given):
     assert StateOptions(**given).of_control() == given
-    with pytest.raises(ParameterError, match="--stress needs a controller"):
+    with pytest.raises(ParameterError, match="--stress and --stress-period need a controller"):
         StateOptions(**given).of_free()
 
 
@@ -412,11 +412,13 @@ def test_what_has_no_meaning_with_a_state_is_named():
     told = options._named(CRUSTAL, {"drift": 1.0, "method": "idas", "json": True, "out": "a"}, options._FREE)
     assert told == {"loading_rate": 1.0, "method": "idas"}
     with pytest.raises(
-        ParameterError, match=r"^scheme, averaging cannot be used for friction with a state without control\."
+        ParameterError,
+        match=r"^scheme, averaging cannot be used for friction with a state in a run without control\.",
     ):
         options._named(CRUSTAL, {"scheme": "explicit", "averaging": 2, "plant": "smooth"}, options._FREE)
     with pytest.raises(
-        ParameterError, match=r"^drift cannot be used for friction with a state with control\. .*, saturation and"
+        ParameterError,
+        match=r"^drift cannot be used for friction with a state in a run with control\. .*, saturation and",
     ):
         options._named(CRUSTAL, {"drift": 1.0}, options._HELD, ("saturation",))
 

@@ -87,7 +87,7 @@ def test_friction_with_a_state_has_no_other_plant_and_nothing_is_done(capsys, tm
     monkeypatch.chdir(tmp_path)
     code, out, err = run(capsys, command, "crustal-patch", "--plant", "printed")
     assert (code, out) == (2, "")
-    assert "plant is for friction without a state, got 'printed'" in err
+    assert "plant must be omitted for friction with a state, which never rests. Received 'printed'" in err
     assert list(tmp_path.iterdir()) == []
 
 
@@ -242,7 +242,7 @@ def test_a_compiler_that_cannot_be_read_is_none(capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("given", "where"),
     [
-        (("guarantee", "lab-fault", "--step", "-1 ms"), "by =. See quakedesign guarantee --help."),
+        (("guarantee", "lab-fault", "--step", "-1 ms"), "write --option=value. See quakedesign guarantee --help."),
         (("limits", "lab-fault", "lab-fault"), "See quakedesign limits --help."),
         (("--json", "fault", "lab-fault"), "See quakedesign --help."),
         (("fault", "lab-fault", "--where", "x"), "See quakedesign fault --help."),

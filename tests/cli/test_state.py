@@ -86,17 +86,23 @@ def test_a_locked_fault_starts_with_an_aged_state(capsys, patch):
         (("--controller", "elqr", "--gains", "1", "2"), "designed gains"),
         (
             ("--controller", "elqr", "--rate-noise-deviation", "1 um/s"),
-            "rate_noise cannot be used for friction with a state with control",
+            "rate_noise cannot be used for friction with a state in a run with control",
         ),
         (
             ("--controller", "elqr", "--storage", "1e-4 m^3/Pa"),
-            "storage cannot be used for friction with a state with control",
+            "storage cannot be used for friction with a state in a run with control",
         ),
         (("--controller", "elqr", "--start", "late"), "are for runs without a controller"),
-        (("--controller", "elqr", "--drift", "1e-9"), "drift cannot be used for friction with a state with control"),
+        (
+            ("--controller", "elqr", "--drift", "1e-9"),
+            "drift cannot be used for friction with a state in a run with control",
+        ),
         (("--controller", "elqr", "--method", "radau"), "method must be one of"),
-        (("--diffusion", "10 s"), "diffusion cannot be used for friction with a state without control"),
-        (("--stress", "1 kPa"), "needs a controller"),
+        (
+            ("--diffusion", "10 s"),
+            "diffusion cannot be used for friction with a state in a run without control",
+        ),
+        (("--stress", "1 kPa"), "need a controller"),
         (("--saturation", "1 MPa"), "saturation cannot be used for friction with a state"),
         (("--plant", "stick-slip"), "one of smooth, quasi-dynamic"),
         (("--start", "early"), "one of steady, locked, late"),

@@ -47,7 +47,7 @@ def test_what_does_not_apply_is_rejected_with_the_law_and_nothing_else_is():
         REAL.friction.require(ramp=0.1)
     with pytest.raises(ParameterError, match=r"a tide needs .* Received rate-and-state-aging, with the state theta"):
         PATCH.require_memoryless("a tide")
-    with pytest.raises(ParameterError, match=r"got 'printed' with rate-and-state-aging, which never rests"):
+    with pytest.raises(ParameterError, match=r"which never rests. Received 'printed' with rate-and-state-aging"):
         PATCH.friction.require(plant="printed")
 
 

@@ -219,12 +219,12 @@ def test_files_that_cannot_be_read(tmp_path):
     reasons = {
         "missing.toml": "No such file or directory",
         "folder.toml": "Is a directory",
-        "latin.toml": "its text is not UTF-8",
+        "latin.toml": "must be UTF-8 text",
         "zero\0.toml": "no file can have this name",
         "huge.toml": "at most 64 KiB",
     }
     for name, reason in reasons.items():
-        with pytest.raises(ScenarioError, match=rf"{reason}.*Give a ") as raised:
+        with pytest.raises(ScenarioError, match=reason) as raised:
             load_fault(tmp_path / name)
         assert name.replace("\0", r"\x00") in str(raised.value)
 
@@ -380,7 +380,7 @@ def test_a_stress_is_never_made_a_smaller_acceleration():
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ("3 m", "amplitude must be a quantity in m/s.2.* another dimension. A shear stress in Pa is accepted too"),
+        ("3 m", "amplitude must be a quantity in m/s.2.* another dimension.* A shear stress in Pa is accepted too"),
         ("35 kPaa", "whose unit is unknown. Did you mean kPa?"),
         ("35", "without a unit. Add the unit. A shear stress"),
     ],

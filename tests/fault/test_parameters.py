@@ -168,5 +168,5 @@ def test_a_name_in_place_of_a_fault_is_refused_with_the_remedy():
         lambda: qd.simulate("real-fault"),
         lambda: qd.derive("real-fault"),
     ):
-        with pytest.raises(ParameterError, match=r"Received 'real-fault'\. Write load_fault"):
+        with pytest.raises(ParameterError, match=r"Received 'real-fault'\. Give for example load_fault"):
             call()

@@ -130,7 +130,7 @@ def test_to_run_it_otherwise_is_refused_everywhere(wrong, tmp_path):
 
 @pytest.mark.slow
 def test_a_campaign_runs_it_as_simulate_does():
-    """The undisturbed sample, by the program that all samples share."""
+    """The signals_delayed sample, by the program that all samples share."""
     problem = campaign_problem(REAL, HELD.controller, duration=18.4, initial_slip=1e-6)
     json.dumps(problem.inputs, allow_nan=False)
     start = Sample(numbers=asdict(Variation()) | {"initial_slip": 1e-6, "initial_slip_rate": 0.0}, noise_seed=0)

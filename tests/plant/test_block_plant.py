@@ -144,9 +144,9 @@ def test_pressures_that_diffuse_settle_at_the_shares_of_the_wells(count):
 @pytest.mark.parametrize(
     ("blocks", "wells", "coupling", "said"),
     [
-        (None, "each", None, "blocks must be 2 to 20. Received None"),
-        (1, "each", None, "blocks must be 2 to 20. Received 1"),
-        (21, "each", None, "blocks must be 2 to 20. Received 21"),
+        (None, "each", None, "blocks must be a whole number from 2 to 20. Received None"),
+        (1, "each", None, "blocks must be a whole number from 2 to 20. Received 1"),
+        (21, "each", None, "blocks must be a whole number from 2 to 20. Received 21"),
         (2, "some", None, "wells"),
         (2, "each", 0, "coupling of blocks must be positive. Received 0 1/s"),
         (2, "each", -1, "coupling of blocks must be positive. Received -1 1/s"),

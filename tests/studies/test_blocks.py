@@ -276,8 +276,8 @@ def test_a_search_leaves_the_slip_rates_no_larger_than_its_start(monkeypatch):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ({"blocks": 1}, "blocks must be 2 to 20. Received 1"),
-        ({"blocks": 21}, "blocks must be 2 to 20. Received 21"),
+        ({"blocks": 1}, "blocks must be a whole number from 2 to 20. Received 1"),
+        ({"blocks": 21}, "blocks must be a whole number from 2 to 20. Received 21"),
         ({"blocks": 2, "coupling": 0}, "coupling of blocks must be positive"),
     ],
 )

@@ -88,7 +88,10 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
         monkeypatch.setattr(f"quakedesign.{place}.guarantee", lambda *_, **__: SimpleNamespace(proof=Proved()))
     assert run("guarantee", PATH) == 0
     told = " ".join(capsys.readouterr().out.split())
-    assert "the load of a pressure is the pressure that balances the blocks on the reference" in told
+    assert (
+        "'load of a pressure' in the statement: the well pressure that keeps the blocks in balance on the reference"
+        in told
+    )
     assert "equilibrium of each block" not in told
     first = "With the centralised law the slip rate of no block exceeds 62.3 µm/s (0.078 % of the natural earthquake's"
     assert first in told  # 60 µm/s of error and 15/8 of 785 mm in 663012 s
@@ -109,7 +112,7 @@ def test_what_is_printed_of_a_proof_and_a_run_names_plant_and_units(tmp_path, ca
     assert facts["natural_peak_slip_rate"] == pytest.approx(0.0806, rel=1e-3)
     notes = facts["notes"]
     assert notes[0] == "a note"
-    assert notes[1].startswith("the load of a pressure")
+    assert notes[1].startswith("'load of a pressure' in the statement")
     healed = tmp_path / "healed.toml"
     healed.write_text(PATH.read_text().replace("drop = 0.1", "drop = 0.1\nhealing = 0.02"))
     assert run("guarantee", healed) == 0

@@ -113,7 +113,7 @@ def test_no_search_of_the_stick_slip_plant_is_said_of_laws_that_it_does_not_take
     gap = "on the stick-slip plant nothing is proved for a given law, and its worst case is not searched"
     assert referred.stick_slip_gap.startswith(gap)
     assert referred.to_dict()["worst_found_with_stick"] is None
-    monkeypatch.setattr(tracking_result, "growth_at_rest", lambda law, step: 0.5)  # e-fold in 0.5 s at rest
+    monkeypatch.setattr(tracking_result, "growth_time_at_rest", lambda law, step: 0.5)  # e-fold in 0.5 s at rest
     assert replace(found).stick_slip_gap.startswith(gap)
     assert replace(found).to_dict()["worst_found_with_stick"] is None
 

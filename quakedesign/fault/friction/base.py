@@ -21,9 +21,9 @@ class FrictionLaw(ABC):
     (LaTeX) and ``example`` (for templates); a field without a symbol is an option, not a quantity. The same methods
     serve numbers, exact rationals and symbols: `exact` and `symbolic` return copies of the law with such parameters.
 
-    A law without state defines `coefficient`, `extended` and the bounds. A law with state also names its variables
-    in `state_names` (with `state_units`), and defines `state_rates`, `steady_state`, `operating_rate` and
-    `working_rates`.
+    A law without state defines `coefficient`, `extended`, `bounds`, `slip_slope` and `rate_slope`. A law with
+    state also names its variables in `state_names` (with `state_units`), and defines `state_rates`,
+    `steady_state`, `operating_rate` and `working_rates`.
     """
 
     name: ClassVar[str]

@@ -1,6 +1,6 @@
 """Rate-and-state friction: ageing law, slip law, and the regularised form.
 
-The base class holds the parameters a, b and D_c, the range of validity and bounds of friction on it. The
+The base class holds the parameters a, b and d_c, the range of validity and bounds of friction on it. The
 state evolves by Dieterich's ageing law or Ruina's slip law; the regularised form is finite at zero slip
 rate.
 """
@@ -84,8 +84,8 @@ class RateAndState(FrictionLaw):
     def _require_working_range(self) -> None:
         if not self.slowest_rate <= self.reference_rate <= self.fastest_rate:
             raise ParameterError(
-                "reference_rate must lie between slowest_rate and fastest_rate. Received "
-                f"{self.slowest_rate!r}, {self.reference_rate!r}, {self.fastest_rate!r} m/s. Widen the working range."
+                f"reference_rate must lie between slowest_rate, {self.slowest_rate!r} m/s, and fastest_rate, "
+                f"{self.fastest_rate!r} m/s. Received {self.reference_rate!r} m/s. Widen the working range."
             )
 
     @abstractmethod
@@ -138,7 +138,7 @@ class RateAndState(FrictionLaw):
 
     @property
     def operating_rate(self) -> float:
-        """Steady sliding at the reference rate [m/s]; there is no equilibrium at rest."""
+        """Reference rate [m/s], at which the fault slides steadily; there is no equilibrium at rest."""
         return self.reference_rate
 
     @property
@@ -156,7 +156,7 @@ class RateAndState(FrictionLaw):
 
     @property
     def slip_slope(self) -> float:
-        """Bound [1/m] of |∂μ/∂θ · θ'|/v ≤ (b/θ)|θ'|/v, the change of friction by ageing per slip, rounded up."""
+        """Bound [1/m] on the change of friction per slip by the state, |∂μ/∂θ · θ'|/v ≤ (b/θ)|θ'|/v, rounded up."""
         law = self.exact()
         return outward(law.evolution_effect / law.critical_slip * law._state_slope, up=True)
 
@@ -179,7 +179,7 @@ def outward(value: "sp.Expr", *, up: bool) -> float:
     return float_above(exact) if up else float_below(exact)
 
 
-def aging_rate(rate: "sp.Expr", theta: "sp.Expr", critical_slip: "sp.Expr") -> "sp.Expr":
+def aging_law_rate(rate: "sp.Expr", theta: "sp.Expr", critical_slip: "sp.Expr") -> "sp.Expr":
     """θ' = 1 − vθ/d_c [-] (Dieterich 1979; Ruina 1983): contacts age at rest too."""
     return 1 - rate * theta / critical_slip
 
@@ -192,7 +192,7 @@ def slip_rate(rate: "sp.Expr", theta: "sp.Expr", critical_slip: "sp.Expr") -> "s
     return -share * sp.log(share)
 
 
-def aging_slope(slowest: "sp.Expr", fastest: "sp.Expr") -> "sp.Expr":
+def aging_law_slope(slowest: "sp.Expr", fastest: "sp.Expr") -> "sp.Expr":
     """Largest |1/u − 1| [-] for u = vθ/d_c between v_s/v_f and v_f/v_s: v_f/v_s − 1."""
     return fastest / slowest - 1
 
@@ -230,11 +230,11 @@ class RateAndStateAging(RateAndState):
 
     def ageing(self, rate: "sp.Expr", theta: "sp.Expr") -> "sp.Expr":
         """θ' = 1 − vθ/d_c [-]."""
-        return aging_rate(rate, theta, self.critical_slip)
+        return aging_law_rate(rate, theta, self.critical_slip)
 
     @property
     def _state_slope(self) -> "sp.Expr":
-        return aging_slope(self.slowest_rate, self.fastest_rate)
+        return aging_law_slope(self.slowest_rate, self.fastest_rate)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -260,7 +260,7 @@ class RateAndStateSlip(RateAndState):
 # ----------------------------------------------------------------------
 # Regularised rate-and-state friction, finite at zero slip rate.
 
-EVOLUTIONS = {"aging": (aging_rate, aging_slope), "slip": (slip_rate, slip_law_slope)}
+EVOLUTIONS = {"aging": (aging_law_rate, aging_law_slope), "slip": (slip_rate, slip_law_slope)}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

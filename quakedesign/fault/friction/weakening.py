@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weakening(FrictionLaw):
-    """A law without state that falls from residual + drop to residual.
+    """A law without state whose coefficient falls from residual + drop to residual.
 
     Attributes
     ----------
@@ -56,12 +56,12 @@ class Weakening(FrictionLaw):
 
     @property
     def slip_slope(self) -> float:
-        """Zero by default: the law does not depend on the slip [1/m]."""
+        """Zero [1/m] by default: the law does not depend on the slip."""
         return 0
 
     @property
     def rate_slope(self) -> float:
-        """Zero by default: the law does not depend on the slip rate [s/m]."""
+        """Zero [s/m] by default: the law does not depend on the slip rate."""
         return 0
 
 

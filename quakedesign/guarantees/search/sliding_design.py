@@ -15,7 +15,7 @@ from scipy.optimize import OptimizeResult, minimize
 from quakedesign.errors import ParameterError
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.fault import Fault
-from quakedesign.fault.fault_toml import AGEINGS, beyond_rates, sliding_step
+from quakedesign.fault.fault_toml import SAMPLES_PER_STATE_TIME, rate_out_of_range, sliding_step
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
@@ -414,7 +414,7 @@ class FarthestWell:
 
 def admissible_step(task: SlidingPlant, step: Fraction) -> Fraction:
     """T_s [s] if within a factor of 2 of D_c/(20 V), else D_c/(20 V) with two digits."""
-    suits = task.ranges["critical_slip"][0] / task.rate / int(AGEINGS)
+    suits = task.ranges["critical_slip"][0] / task.rate / int(SAMPLES_PER_STATE_TIME)
     return step if suits / _ADMISSIBLE_FACTOR <= step <= _ADMISSIBLE_FACTOR * suits else two_digits(suits)
 
 
@@ -546,7 +546,7 @@ def _slower(
     return (
         f"with this path for V = {float(slower.rate):.3g} m/s{_under(proof)}: in [task] target_slip = "
         f"'{fault.reference.target_slip:g} m', operation_time = '{time:g} s', sampling_time = '{float(step):g} s'"
-        f"{f' (but {beyond})' if (beyond := beyond_rates(fault.friction, float(slower.rate))) else ''}"
+        f"{f' (but {beyond})' if (beyond := rate_out_of_range(fault.friction, float(slower.rate))) else ''}"
     )
 
 

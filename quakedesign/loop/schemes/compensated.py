@@ -10,7 +10,7 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.files import Json
-from quakedesign.laws.sampled_controller import compensation_answered, cut_off, followed
+from quakedesign.laws.sampled_controller import compensating_pressure, cut_off, followed
 from quakedesign.laws.sampled_law import RestLimit
 from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw, Values
@@ -29,7 +29,7 @@ class Compensated(Sampled):
 
     The estimate is d ← (1 − a)d + a[(e2 − e2⁻)/(T_sB0) − p⁻], where p⁻ is the held pressure minus the feed-forward.
     The step is that of `Implicit` with ξ = 0, and the pressure is that of this step minus d. In
-    `quakedesign.laws.sampled_controller`, `followed` gives the estimate and `compensation_answered` the pressure, here
+    `quakedesign.laws.sampled_controller`, `followed` gives the estimate and `compensating_pressure` the pressure, here
     and in guarantees. Certificates in
     continuous time do not cover this scheme. Near the origin, where the step ends at e1⁺ = 0, the loop is linear and
     stable for 4a/((a + 1)(a + 2)) < β/β0 < 4/(a + 2): since friction lets β vary by a factor of 1.425 on faults of the
@@ -109,7 +109,7 @@ class Compensated(Sampled):
         estimate = ca.if_else(follows, followed(rate_error, before, pushed, estimate, weight, gain), 0)
         solved = inclusion(pull).solve(values)
         ahead, share = discrete_law.values((feed_forward, slope), solved)
-        commanded = compensation_answered(rate_error, solved[end_rate], estimate, gain) + ahead
+        commanded = compensating_pressure(rate_error, solved[end_rate], estimate, gain) + ahead
         reference = values[discrete_law.slip] - values[discrete_law.slip_error]
         passing = dict(zip(_LIMIT, (commanded, values[discrete_law.slip], reference, *limit), strict=True))
         pressure, *passed = discrete_law.values(_CUT, passing)

@@ -8,7 +8,7 @@ import sympy as sp
 
 from quakedesign.errors import ParameterError
 from quakedesign.files import Json
-from quakedesign.laws.sampled_controller import compensation_answered
+from quakedesign.laws.sampled_controller import compensating_pressure
 from quakedesign.laws.stick_slip_controller import level_after
 from quakedesign.loop import discrete_law
 from quakedesign.loop.discrete_law import DiscreteLaw, Values
@@ -92,7 +92,7 @@ class StickSlip(Sampled):
         solved = inclusion(pull).solve(values)
         ahead, share = discrete_law.values((feed_forward, slope), solved)
         rate, rate_error = values[discrete_law.rate], values[discrete_law.rate_error]
-        pressure = compensation_answered(rate_error, solved[end_rate], level, gain) + ahead
+        pressure = compensating_pressure(rate_error, solved[end_rate], level, gain) + ahead
         predicted = ca.fmax(rate - rate_error + solved[end_rate], 0)
         after = [ca.SX(0) if slope == 0 else -level / share for _ in law.integrals]
         numbers = [weight, slip_weight, rest_slip]

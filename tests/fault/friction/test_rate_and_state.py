@@ -175,7 +175,10 @@ def test_a_missing_state_is_refused(law):
 
 @pytest.mark.parametrize("law", ALL, ids=identity)
 def test_the_reference_rate_lies_in_the_working_range(law):
-    with pytest.raises(ParameterError, match=r"reference_rate must lie between .*Received 1e-05, 1e-06, 0.01 m/s"):
+    with pytest.raises(
+        ParameterError,
+        match=r"reference_rate must lie between slowest_rate, 1e-05 m/s, and fastest_rate.*Received 1e-06 m/s",
+    ):
         type(law)(**QUANTITIES | {"slowest_rate": 1e-5})
 
 

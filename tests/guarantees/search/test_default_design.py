@@ -93,7 +93,7 @@ def test_a_fault_sampled_too_slowly_gets_a_design_for_the_longest_step_that_work
     assert "even the nominal loop is not stable" in design.details["reason"]
     found = premises(design)["sampling_time"]
     assert (found.holds, found.certified) == (False, step)
-    assert design.other_step == f"NOT for the fault's T_s = 0.1 s: it runs once every {float(step):.4g} s"
+    assert design.other_step == f"NOT for the fault's T_s = 0.1 s: it the law runs every {float(step):.4g} s"
     said = f"not guaranteed at T_s = 0.1 s; designed for T_s = {float(step):.4g} s"
     assert f": {said}: proved; gains" in repr(design)
     assert f": {said}: proved</b>" in design._repr_html_()

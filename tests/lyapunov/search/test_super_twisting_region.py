@@ -49,7 +49,7 @@ def test_an_uncertain_coefficient_is_worst_at_its_ends():
 
 
 def test_without_disturbance_all_positive_gains_do():
-    # Levant (1993); the undisturbed loop contracts by exp(−π·cot) a turn
+    # Levant (1993); the signals_delayed loop contracts by exp(−π·cot) a turn
     for k1, k2 in np.exp(np.random.default_rng(1).uniform(-3, 3, (50, 2))):
         assert region.stable(k1, k2, 0)
 
