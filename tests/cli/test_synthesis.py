@@ -159,7 +159,11 @@ def found(unit, value, *, beta=None):
             "-",
             2.0,
             None,
-            ["proved: cta with k1 = 3/2, k2 = 1 for |h'| <= 2", "gains decay norm improvement factor", "synthesised 2 1.8"],
+            [
+                "proved: cta with k1 = 3/2, k2 = 1 for |h'| <= 2",
+                "gains decay norm improvement factor",
+                "synthesised 2 1.8",
+            ],
         ),
         (
             "1/s",
