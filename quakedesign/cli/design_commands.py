@@ -49,8 +49,8 @@ class DesignOptions(WellOptions):
         Control law to design: cta, dia, elqr or all. For several blocks: centralised, or decentralised, which computes
         the pressure of each well from its own measurements.
     objective
-        peak: the smallest certified slip-rate error. tracking: a smaller slip error under a drifting disturbance, with
-        a somewhat larger slip-rate error.
+        peak: the smallest certified slip rate (plant without stick: slip-rate error). tracking: a smaller slip error
+        under a drifting disturbance, with a somewhat larger slip rate.
     continuous
         Design in continuous time, as in the paper, instead of a sampled loop with a guarantee.
     measured

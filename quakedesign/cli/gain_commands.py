@@ -53,9 +53,9 @@ def synthesise(
     fault
         Objective sampled: preset or path of a .toml file.
     objective
-        norm: smallest norm of the gains after scaling to |h'| <= 1. decay: shortest certified settling time from
-        all |e_i| ≤ L̄ (the value of --lipschitz). beta: widest certified range of the input gain β. sampled: smallest
-        simulated error of proved gains on a fault.
+        norm: smallest norm of the gains after scaling to |h'| <= 1 m/s^3. decay: shortest certified settling time from
+        all |e_i| ≤ L̄ (the value of --lipschitz; numbers in SI units). beta: widest certified range of the input gain
+        β. sampled: smallest simulated error of proved gains on a fault.
     lipschitz
         Bound on |h'|, the rate of change of the matched perturbation h, in the unit of the control ν per second; by
         default 1, for sampled 1.1 times the largest |h'| of the fault.
@@ -221,8 +221,8 @@ def gain_map(
         Four numbers: both ends of the first gain, then of the second; by default 0.25 and 4 times the gain's value in
         --gains.
     lipschitz
-        One or more bounds on |h'|, the rate of change of the matched perturbation h; by default 25, 50, 75, 90 and 99 %
-        of the largest |h'| for which any proof can exist.
+        One or more bounds on |h'|, the rate of change of the matched perturbation h, in the unit of the control ν per
+        second; by default 25, 50, 75, 90 and 99 % of the largest |h'| for which any proof can exist.
     gain_range
         b_m and b_M, the range of the input gain β.
     points

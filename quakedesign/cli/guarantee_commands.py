@@ -79,8 +79,8 @@ def guarantee(
     controller
         elqr, or a sliding mode: cta, dia. For several blocks: centralised (default) or decentralised.
     objective
-        Of a design. peak: the smallest certified slip-rate error. tracking: a smaller slip error under a drifting
-        disturbance, with a somewhat larger slip-rate error.
+        Of a design. peak: the smallest certified slip rate (plant without stick: slip-rate error). tracking: a smaller
+        slip error under a drifting disturbance, with a somewhat larger slip rate.
     gains
         k1 to k4 of an e-LQR, whose integral is a sum over the samples; by default a law is designed that estimates the
         disturbance instead of integral action. Of a sliding mode: base gains (λ = 1); the command chooses λ.

@@ -239,9 +239,10 @@ class LawOptions:
     controller
         cta, dia or elqr, or your own law as module:Class; none (not for export): a run without control.
     gains
-        published, designed (for the T_s, delay, lag and diffusion of the command), continuous (designed in continuous
-        time), or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min
-        the smallest N̂ of the box). Rate-and-state faults: designed.
+        published, designed (for the T_s of the command and, for an e-LQR, its delay, lag and diffusion), continuous
+        (designed in continuous time), or the numbers of the gains in SI units (of a sliding mode: with scale λ = 1 and
+        control ν = p·μ_res·N̂_min, N̂_min the smallest N̂ of the box). Rate-and-state faults: designed, for T_s and
+        diffusion alone.
     scale
         Scale λ of a sliding mode, decimal or p/q; replaces that of --gains.
     feedforward

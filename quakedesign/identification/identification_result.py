@@ -103,9 +103,9 @@ class Identification:
     used : ndarray of bool
         Samples of the record in the fit.
     estimates : dict of ParameterEstimate
-        By name: quantities of the law, and the stiffness if fitted.
+        By name: quantities of the law, and, if fitted, the stiffness, delays, initial rate and trend.
     difference : ParameterEstimate or None
-        Direct minus evolution effect, for laws that have both.
+        Direct minus evolution effect, or minus both evolution effects, for laws that have them.
     law : FrictionLaw
         Law with the best values.
     notes : tuple of str
@@ -258,8 +258,9 @@ def _with_unit(estimate: ParameterEstimate, value: float) -> str:
 
 
 def _one_sided(estimate: ParameterEstimate) -> str:
-    if math.isfinite(estimate.high):
-        return f"at most {_with_unit(estimate, estimate.high)}, without a lower end"
-    if math.isfinite(estimate.low):
-        return f"at least {_with_unit(estimate, estimate.low)}, without an upper end"
+    """The end of the joint interval that exists."""
+    if math.isfinite(estimate.most):
+        return f"at most {_with_unit(estimate, estimate.most)}, without a lower end"
+    if math.isfinite(estimate.least):
+        return f"at least {_with_unit(estimate, estimate.least)}, without an upper end"
     return "any value fits equally well"

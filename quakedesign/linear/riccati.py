@@ -116,8 +116,8 @@ def _propose(a: Matrix, g: Matrix, q: Matrix) -> np.ndarray:
         solution = control.care(A, vectors[:, significant], Q, np.diag(1 / values[significant]), method=METHOD)[0]
     except (np.linalg.LinAlgError, ValueError, control.ControlArgument) as error:
         raise ParameterError(
-            f"the Riccati equation has no stabilising solution that can be found ({error}). A stabilisable pair and a "
-            "Q that sees every mode on the imaginary axis are expected. Change Q0."
+            "the Riccati equation must have a stabilising solution. Received one for which none was found "
+            f"({error}). Give a stabilisable pair, and a Q that sees every mode on the imaginary axis."
         ) from None
     return np.asarray(solution)
 
@@ -154,7 +154,8 @@ def relative_residual(a: Matrix, g: Matrix, q: Matrix, x: Matrix) -> Fraction:
 # ----------------------------------------------------------------------
 # The Riccati design in nondimensional variables: cost, split of W, and the weight that meets a bandwidth.
 
-LIGHTEST = -14.0
+LIGHTEST = -14.0  # decimal logarithm of the smallest weight R; `_HEAVIEST`: of the largest
+
 _HEAVIEST, _ROUNDS = 0.0, 5
 COST = diagonal((Fraction(1), Fraction(1, 100), Fraction(1), Fraction(1)))
 """Q0 on x1, x2, ξ1, ξ2."""
@@ -200,8 +201,8 @@ class ScaledDesign:
             raise ParameterError(
                 "the Riccati equation of the fault must be solvable in floating point. Received one that is not "
                 f"({error}), with damping {float(max(map(abs, ranges.rate))):.2g} and softening "
-                f"{float(max(map(abs, ranges.slip))):.2g} in units of the natural frequency. Check the units of the "
-                "damping, the shear modulus and the lengths."
+                f"{float(max(map(abs, ranges.slip))):.2g} in units of the natural frequency and its square. Check the "
+                "units of the damping, the shear modulus and the lengths."
             ) from None
         return (*solution, used)
 
@@ -408,7 +409,7 @@ class SmallestGain:
     # slip, rate: k1 [Pa/m] and k2 [Pa·s/m] with the smallest k1² + (ω_n·k2)²
     slip: float
     rate: float
-    split: float  # Its w
+    split: float  # w of W = diag(g1²/w, g2²/(1−w), 0, 0) for these gains [-]
 
 
 def limiting_gains(problem: LinearProblem, split: float) -> tuple[float, float]:

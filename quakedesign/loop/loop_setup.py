@@ -206,7 +206,7 @@ class LoopSetup:
     )
     withdrawal: Fraction | None = quantity(
         "Pa",
-        "Largest decrease of the pressure; 0 for a pump that only injects.",
+        "Largest withdrawal below the initial pressure; 0 for a pump that only injects.",
         None,
     )
     rate_limit: Fraction | None = quantity(

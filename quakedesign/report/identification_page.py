@@ -243,8 +243,8 @@ def identification_figure(identification: Identification) -> "Figure":
         _profile(axis, each, fit)
         axis.tick_params(labelleft=i == 0)
         axis.set_ylabel("" if i else "distance [standard deviations]", fontsize=SMALL)
-    note = f"residual: dashed at twice the noise of {fit.noise:.3g}, crosses at the edge beyond eight times; profiles: "
-    note += "dashed at the 95 % threshold of one parameter, dotted at that of all jointly"
+    note = f"residual: dashed at twice the noise of {fit.noise:.3g}; crosses: outliers, drawn at eight times the noise "
+    note += "if larger; profiles: dashed at the 95 % threshold of one parameter, dotted at that of all jointly"
     title = f"{record.name}: {identification.law.name} {identification.assessment}"
     return finish(drawing, title, [], note, legend=axes["friction"])
 

@@ -211,8 +211,8 @@ def _at_samples(entry: "Entry") -> list[str]:
     root = " (within the proved errors, where the implicit step of the sliding mode is deadbeat)" if law.pull else ""
     return [
         f"the equations with the index k are the implemented law{root}: x and y are the measured slip [m] and slip "
-        "rate [m/s], r the reference, v the target slip rate, i the innovation of the slip, D the estimate of the "
-        "disturbance [Pa]; D, v+, x and y are 0 before the first sample"
+        "rate [m/s], r the reference [m], v the target slip rate [m/s], i the innovation of the slip [m], D the "
+        "estimate of the disturbance [Pa]; D, v+, x and y are 0 before the first sample"
     ]
 
 
@@ -349,7 +349,7 @@ class Reproduction:
 
     date: str  # UTC; that of SOURCE_DATE_EPOCH if set, for pages that are reproducible bitwise
     command: str  # Command as typed; empty if no command made the report
-    versions: Mapping[str, str]  # Versions of the package, of all libraries that affect numbers, and of Python
+    versions: Mapping[str, str]  # Of the package, libraries that affect numbers, Python; and the machine
     scenario: list[str]  # Lines of the fault as TOML
 
 

@@ -556,7 +556,7 @@ def operation(code: int, arguments: Sequence[Value], named: Callable[[int], str 
         return Value(f"{arguments[0].condition} ? {numbers[1]} : 0.0")
     if code in _WRITTEN:
         return Value(_WRITTEN[code].format(*numbers))
-    raise NotPortableError(f"operation {code}")
+    raise NotPortableError(f"a CasADi operation must have portable C code. Received operation {code}.")
 
 
 def constant(value: float) -> str:

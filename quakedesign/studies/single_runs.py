@@ -383,7 +383,7 @@ def sensor(
             "bandwidth": bandwidth != math.inf,
             "averaging": averaging != 1,
             "quantum of the slip": quantum != 0,
-            "number of steps": inner_steps != 1,
+            "number of inner steps": inner_steps != 1,
         }
         for name in (name for name, there in entered.items() if there):
             raise ParameterError(
@@ -407,8 +407,8 @@ def sensor(
 def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, *, scheme: str = "explicit") -> Premise:
     """Premise: λ_d satisfies the joint condition of slip, law and sampling period (ERRATA 21).
 
-    The largest |x1''| comes from a run with exact states over 4000 sampling periods. The condition is sufficient for
-    the differentiator to converge, not necessary for the loop to work. If this run diverges, nothing is certified.
+    The largest |x1''| [m/s²] comes from `largest_acceleration`. The condition is sufficient for the differentiator to
+    converge, not necessary for the loop to work. If one of its two runs diverges, nothing is certified.
     With n_d of 2 or more a bound of the next derivative is needed, which does not exist with zero-order hold: the
     requirement is infinite.
     """
@@ -442,7 +442,7 @@ def _note(order: int, reached: float, condition: JointCondition) -> str:
 
 
 def largest_acceleration(fault: Fault, law: Controller, *, scheme: str, step: float) -> tuple[float, float | None]:
-    """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states over 4000 periods, on both plants.
+    """Largest |Δx2|/T_s [m/s²] of the sampled loop with exact states in 4000 periods of the task, on both plants.
 
     The second entry is the time [s] of the first divergence, up to which values count, or None.
     """
@@ -491,12 +491,12 @@ def certified_choice(fault: Fault, path: str | Path) -> Choice:
     if claim.kind == UNCERTAIN_PLANT:
         raise CertificateError(
             f"the certificate of a law must be about a fault. Received {path}, about an uncertain plant. Give a "
-            f"file of guarantee {fault.name} --out FILE."
+            f"file that `guarantee {fault.name} --out FILE` writes."
         )
     if not claim.sampled or claim.slides != (fault.friction.equilibrium is STEADY_SLIDING):
         raise CertificateError(
             "the certificate must be of a sampled law, and for friction with a state if and only if the fault has such "
-            f"friction. Received {path} and {fault.name}. Give a file of guarantee {fault.name} --out FILE."
+            f"friction. Received {path} and {fault.name}. Give a file that `guarantee {fault.name} --out FILE` writes."
         )
     if differences := _differences(fault, claim):
         raise CertificateError(
@@ -521,7 +521,7 @@ def _differences(fault: Fault, claim: Any) -> list[str]:
         task, covered = claim.beside_healing(task, rational(fault.friction.rest_excess))
         if covered is not None:  # less than the healing of the fault
             healing = UpperBound(rational(fault.friction.rest_excess))
-            return [f"healing of the fault {healing:.3g}, covered with its disturbance at most {covered:.3g}"]
+            return [f"healing {healing:.3g}; with the disturbance of this fault, at most {covered:.3g} is covered"]
     differences: list[str] = claim.task.differences(task)
     return differences
 
@@ -596,7 +596,8 @@ def _with_gains(
         laws = published(fault.name)
         if name not in laws:
             raise UnknownNameError(
-                f"published gains exist for real-fault and lab-fault. Received {fault.name!r}. "
+                f"published gains exist for the laws of the paper, on real-fault and lab-fault. Received {name} on "
+                f"{fault.name!r}. "
                 "Give --gains designed, or the gains of the law."
             )
         return laws[name], None

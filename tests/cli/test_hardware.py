@@ -74,7 +74,7 @@ def test_jitter_steps_of_a_reading_and_of_a_differentiator_are_those_of_python(r
     for alone, said in (
         (("--jitter", "1"), "jitter needs delay"),
         (("--slip-quantum", "1 um"), "the quantum of the slip needs a differentiator"),
-        (("--differentiator-steps", "2"), "the number of steps needs a differentiator"),
+        (("--differentiator-steps", "2"), "the number of inner steps needs a differentiator"),
     ):
         code, _, err = run(*SHORT, *alone)
         assert code == 2

@@ -141,15 +141,17 @@ def test_outliers_are_told_at_their_times_largest_first():
 def test_what_is_not_told_is_said_with_the_end_that_is():
     ends = {"low": -math.inf, "high": math.inf}
     estimates = {
-        "a": told("a", high=math.inf),
+        "a": told("a", high=math.inf, most=math.inf),
         "b": told("b", low=0.0, least=-math.inf, unit="m"),
         "c": told("c", **ends),
         "d": told("d"),
     }
     above, below, nothing = identification(estimates=estimates).undetermined()
-    assert above == "a is not identifiable from this record: at least 1, without an upper end"
-    assert below == "b is not identifiable from this record: at most 3 m, without a lower end"
+    assert above == "a is not identifiable from this record: at least 0.5, without an upper end"
+    assert below == "b is not identifiable from this record: at most 4 m, without a lower end"
     assert nothing == "c is not identifiable from this record: any value fits equally well"
+    (joint,) = identification(estimates={"e": told("e", most=math.inf)}).undetermined()  # alone it lies in (1, 3)
+    assert joint == "e is not identifiable from this record: at least 0.5, without an upper end"
     between = told("a - b", unit="m")
     (both, other) = identification(estimates=estimates, difference=between).undetermined()
     assert both == "a and b are not identifiable from this record: only a - b = 2 m (1 to 3) is"

@@ -116,7 +116,7 @@ def test_a_solution_of_another_equation_has_a_large_residual():
 
 def test_without_a_stabilising_solution_it_is_one_clear_message():
     # x' = 0·x + u with Q = 0: the closed loop stays on the imaginary axis
-    with pytest.raises(ParameterError, match="no stabilising solution"):
+    with pytest.raises(ParameterError, match="must have a stabilising solution"):
         solve_care([[1.0, 0], [0, 1.0]], [[1.0, 0], [0, 0]], [[1.0, 0], [0, 0]])
 
 

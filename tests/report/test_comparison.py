@@ -200,7 +200,7 @@ def test_the_overview_has_lines_at_the_proved_bound_the_worst_case_and_the_limit
     assert bounds == [float(answer.proof.peak_slip_rate)]
     worst = [v for label, v in levels.items() if "worst case of slip-rate error" in label]
     assert worst == [answer.worst.slip_rate_error]
-    limits = [v for label, v in levels.items() if "limit of slip-rate error of every" in label]
+    limits = [v for label, v in levels.items() if "performance limit of slip-rate error" in label]
     assert limits == [float(answer.limit.slip_rate_error)]
     assert rate.get_yscale() == slip.get_xscale() == "log"
     run = next(line for line in rate.lines if line.get_label() == designed.label)

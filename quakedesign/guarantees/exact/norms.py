@@ -1,8 +1,9 @@
 """Upper bounds of L1 norms and free responses of periodic and continuous linear loops.
 
-A bound is computed in ball arithmetic, from rational matrices to rational numbers. Each chapter states and proves its
-bound: continuous loops, one segment of a periodic loop, separation of the slowest mode, free response, and periodic
-loops. The algorithms for periodic loops also give estimates for a search, with other number types (`Arithmetic`).
+A bound is computed in ball arithmetic, from rational matrices to rational numbers. Chapters: continuous
+loops, one segment of a periodic loop, separation of the slowest mode, free response, and periodic loops; the first and
+the last two state and prove their bounds.
+ The algorithms for periodic loops also give estimates for a search, with other number types (`Arithmetic`).
 """
 
 from abc import ABC, abstractmethod
@@ -57,7 +58,7 @@ def majorant(flow: arb_mat) -> arb_mat:
 
 
 def absolute(matrix: arb_mat) -> arb_mat:
-    """Exact upper bounds of the absolute values of all entries."""
+    """Upper bounds of the absolute values of all entries, as balls of radius 0."""
     return arb_mat([[v.abs_upper() for v in row] for row in matrix.tolist()])
 
 
@@ -105,7 +106,10 @@ def not_above(one: arb_mat, other: arb_mat) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlowestMode:
-    """Estimated slowest mode of a loop: both eigenvectors, and the sum of its remainder after 2^doublings periods."""
+    """Estimated slowest mode of a loop: both eigenvectors, and its remainder.
+
+    With K = 2^doublings and the eigenvalue λ of the mode, the remainder is Σ_{k ≥ K} |λ|^k.
+    """
 
     doublings: int
     left_eigenvector: arb_mat
@@ -398,8 +402,8 @@ class _Faded(_Response):
 class _Pulsed(_Response):
     """Response to a pulse near a jump, which begins this segment (`here`) or the next one (`ahead`).
 
-    e^{A(τ − σ)}b is within σ·|A·…| of e^{Aτ}b. The larger of the parts before and after the jump counts: max(|x|, |y|)
-    = |x + y|/2 + |x − y|/2.
+    For the proof see `norms`, "Pulses". The larger of the responses to the parts of the pulse before and after the jump
+    counts: max(|x|, |y|) = |x + y|/2 + |x − y|/2.
     """
 
     pulse: Pulse
@@ -692,13 +696,15 @@ def _but(column: arb_mat, place: int) -> arb_mat:
 # hE(λα)·min(1/λ, ℓ) + fℓ and Ω′ = hE(λα)·min(1/λ², ℓ²/2) + fℓ²/2 on a piece of length ℓ.
 #
 # **Pulses.** Let w vanish except from `early` before a jump J to `late` after it. After the jump, an impulse of w at −σ
-# or σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area before the jump
-# over `before` plus the area after it over `after` is at most ŵ. So both together give at most the larger of the
+# or σ has become Je^{Aσ}b or e^{−Aσ}b, within σ·max|JAe^{A·}b| of Jb or σ·max|Ae^{−A·}b| of b. The area of |w|
+# before the jump, divided by `before`, plus that after it, divided by `after`, is at most ŵ.
+# So both together give at most the larger of the
 # responses to `before`·Jb and `after`·b, and of these remainders. With x and y for the two that is |x + y|/2 + |x −
 # y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added
 # to the outputs of the pieces within `early`.
 #
-# **Direct feedthrough.** The direct effect of an input of size 1 on an output is added to the gain, for every weight.
+# **Direct feedthrough.** The direct effect of an input of size 1 on an output is added to its gain in every part of
+# the period.
 
 _MOST_SUMS = 5 * 10**7  # products for one input: half the limit of the standalone checker
 _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # enlargement of a solution of y + Dx = x

@@ -157,7 +157,8 @@ def _path(sampled_loop: SampledLoop) -> str:
 def _along(task: SlidingPlant) -> str:
     """Part of the statement on the references, if there is more than one."""
     slow, fast = UpperBound(1 - task.swing), LowerBound(1 + task.swing)
-    return f"every reference whose rate stays between {slow:.6g} V and {fast:.6g} V, " if task.swing else ""
+    text = f"for every reference whose rate stays between {slow:.6g} V and {fast:.6g} V, "
+    return text if task.swing else ""
 
 
 def _friction(task: SlidingPlant) -> list[str]:

@@ -39,9 +39,9 @@ _COURSES, _LEAST_COURSES = 24, 8  # trajectories for each of the two outputs; le
 _CLIMBING, _CLIMBS = 48, 8  # trajectories improved from the best of those, and number of improvements
 _CHANGED = 0.15, 0.4, 1.0  # probabilities of replacing the inputs of a piece by those of the adjoint, used in turn
 _BLOCK = 8  # pieces that change together, at most
-_RESTING, _ROUNDS = 96, 9  # trajectories of 128 periods that rest, then accelerate; rounds of variation
+_RESTING, _ROUNDS = 96, 9  # pairs of trajectories of 128 periods that push, rest and push again; rounds
 _FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest start and longest duration of the first acceleration, in periods
-_NEAR = np.array([[2], [2], [_PIECES]])  # pieces by which start, length and end of the rest change from round to round
+_NEAR = np.array([[2], [2], [_PIECES]])  # changes per round, in pieces: start and length of the first push, end of rest
 _MOST_RESTED = 128  # periods
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are also evaluated for a loop with initial errors
 _SLOW = 0.05  # rate of a slow reference as a fraction of its largest rate
@@ -141,7 +141,7 @@ def _resting(claim: TrackingProof, like: "_CourseSearch") -> "_CourseSearch":
 
 @dataclass(frozen=True, slots=True)
 class _Event:
-    """A jump and the time after it.
+    """A jump and the time after it [s].
 
     `soon`: the jump may be postponed to the next event; `late`: it occurs here unless it occurred before.
     `samples`: the law measures at the jump. `free`: the duration is anything from 0 to `duration`.
@@ -166,7 +166,7 @@ class _EventPieces:
     length: float
 
     def moved_on(self, vertex: int = 0) -> np.ndarray:
-        """Map over the whole event."""
+        """Map over the time after the jump of the event."""
         return np.linalg.matrix_power(self.steps[vertex], _PIECES)
 
 
@@ -174,7 +174,7 @@ _ON_TIME: dict[str, Any] = dict.fromkeys(("jitter", "delay_jitter", "averaging",
 
 
 def _on_time(sampled_loop: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction]:
-    """Loop without jitter, largest shift of its samples, largest lead of its pressures.
+    """Loop without jitter, largest shift [s] of its samples, largest lead [s] of its pressures.
 
     A pressure that arrives at a sample shifts with it. Events keep their order. A first sample without jitter counts as
     the earliest one.
@@ -197,7 +197,8 @@ def _on_time(sampled_loop: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction
 def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction = Fraction(0)) -> list[_Event]:
     """Events of one period from the earliest sample on, shifted by timing errors.
 
-    Samples shift by up to `off`, pressures lead by `early`; aperiodic sampling lengthens a period by up to `more`.
+    Samples shift by up to `off` [s], pressures lead by `early` [s]; aperiodic sampling lengthens a period by up to
+    `more` [s].
     """
     sample, *others = loop.segments
     waits = sample.duration - early - off if others else sample.duration - 2 * off
@@ -215,6 +216,11 @@ class _Limit:
     """Limit at rest of the commanded pressure, as b·(p − p*) [m/s²]; b·p* is `rest`.
 
     A trajectory may start anywhere in the task: p* begins at its initial value or at either end of its range.
+
+    `place` is the index of the commanded pressure in the state, `correction` the response of the state to a unit
+    command. If the slip error [m] grows by at most `rests` between samples, the pressure is at most `width` below its
+    `highest`; if by at most `faster`, it is `within` a range. `moved` is the largest change of b·p* in a period, `ends`
+    the range of b·p*, and `last` the slip error [m] at the last sample.
     """
 
     place: int
@@ -372,13 +378,13 @@ class _CourseSearch:
         self.ends = self.steps - 1 - turn % (self.steps // self.periods)
 
     def best(self, count: int) -> np.ndarray:
-        """Indices of the best trajectories of the last sweep, a quarter of each kind."""
+        """Indices of the best trajectories of the last sweep, count/4 of each of the four kinds."""
         reached = self.marks.max(axis=0)
         kinds = [np.flatnonzero(self.kinds == kind) for kind in range(4)]
         return np.concatenate([kind[np.argsort(-reached[kind])[: count // 4]] for kind in kinds])
 
     def ascend(self, costates: np.ndarray) -> None:
-        """Replace the inputs of some pieces by those of the adjoint where the error grows.
+        """Replace the inputs of some pieces by those of the adjoint; keep this in trajectories whose error grows.
 
         While the fault is at rest, the maximum principle for all pieces at once makes no progress. The adjoint is that
         of the largest error, at the time at which it occurs.
@@ -523,7 +529,7 @@ class _CourseSearch:
         )
 
     def _projected(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
-        """Project every state onto the admissible slip rates; mask of states at rest."""
+        """Project every state onto admissible slip rates and disturbances; mask of the entries that this changes."""
         mask = np.zeros(state.shape, dtype=bool)
         if self.back is not None:
             mask[:, 1] = stuck = state[:, 1] < -self.back

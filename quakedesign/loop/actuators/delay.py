@@ -36,8 +36,8 @@ class Delay(SampledStage):
         Option(
             name="jitter",
             unit="",
-            help="Largest random addition to the delay, in steps, drawn at every sample: with --delay '1 ms', steps of "
-            "1 ms and --jitter 1, the delay is 1 or 2 ms.",
+            help="Largest random addition to the delay, in sampling periods, drawn at every sample: with "
+            "--delay '1 ms', T_s = 1 ms and --jitter 1, the delay is 1 or 2 ms.",
         ),
     )
 

@@ -107,10 +107,14 @@ class Saturation(SampledStage):
         Option(
             name="saturation",
             unit="Pa",
-            help="Largest increase of the pressure, such as '20 MPa'; also the largest decrease unless --withdrawal "
-            "is given.",
+            help="Largest injection pressure above the initial pressure, such as '20 MPa'; also the largest withdrawal "
+            "unless --withdrawal is given.",
         ),
-        Option(name="withdrawal", unit="Pa", help="Largest decrease of the pressure; 0 for a pump that only injects."),
+        Option(
+            name="withdrawal",
+            unit="Pa",
+            help="Largest withdrawal below the initial pressure; 0 for a pump that only injects.",
+        ),
     )
 
     lowest: float

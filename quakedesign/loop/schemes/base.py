@@ -258,7 +258,10 @@ class AperiodicClock:
 
     @classmethod
     def of(cls, shortest: Fraction, longest: Fraction) -> Self:
-        """Aperiodic sampling with 8 to 100 steps in the shortest interval [s]; the longest is rounded down."""
+        """Aperiodic sampling with 8 to 100 steps in the shortest interval [s]; the longest is rounded down.
+
+        The longest interval has at most 1000 steps.
+        """
         ratio = longest / shortest
         grain = max(GRAINS, key=lambda count: (Fraction(int(count * ratio), count), -count))
         return cls(shortest=grain, longest=min(int(grain * ratio), MOST_STEPS))
@@ -304,8 +307,9 @@ class ControlSample:
 class Sampled(Scheme, Decided):
     """A controller that measures every T_s and holds its pressure in between (zero-order hold).
 
-    The entries of the memory are: the numbers of law, actuator and measurement, B0, the scheme's own memory, the last
-    held pressure, and the memories of the actuator, the sensor and the aperiodic sampling.
+    The entries of the memory are, in this order: the numbers of the law, B0, the numbers of actuator and measurement,
+    the scheme's own memory, the last held pressure, the memories of the sampled stages, the sensor and the aperiodic
+    sampling, and the states of the flowing stages.
 
     Attributes
     ----------

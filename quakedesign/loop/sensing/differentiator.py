@@ -220,7 +220,8 @@ class Differentiator:
         if not math.log(sys.float_info.min) < size < math.log(sys.float_info.max):
             raise ParameterError(
                 f"bound·(step/inner_steps)^{self.size + 1} must be representable in double precision. Received "
-                f"{self.bound!r}, {self.step!r} s and inner_steps {self.inner_steps}. Take another order or step."
+                f"{self.bound!r} m/s^{self.order + 1}, {self.step!r} s and inner_steps {self.inner_steps}. Take "
+                "another order or step."
             )
 
     @property

@@ -43,7 +43,7 @@ def certify(
     gains : tuple of number or text
         Exact numbers (decimal, scientific notation or p/q) in the order of the law.
     lipschitz : number or text
-        Bound L̄ on |ḣ| [unit of ν per s], not negative.
+        Bound L̄ on |ḣ| [unit of ν per s], not negative; ν is the control input that the law computes.
     gain_range : tuple of two numbers or texts
         Range [b_m, b_M] of β [-], positive.
 
@@ -128,8 +128,8 @@ def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fra
             wrong = [v for v in values if getattr(v, f"is_{kind}") != declared]
             if wrong:
                 raise ParameterError(
-                    f"{symbol} is declared {'' if declared else 'not '}{kind} in the loop, but equals {wrong[0]}. "
-                    "Declare it with real=True only."
+                    f"{symbol} must be {'' if declared else 'not '}{kind}, as declared in the loop. Received a gain "
+                    f"or range with the value {wrong[0]}. Declare the symbol with real=True only."
                 )
 
 
@@ -267,7 +267,7 @@ def last_success(
     Returns
     -------
     Bracket
-        Without `low` if the search fails even at the floor.
+        Without `low` if the search fails even at the floor, or at `first` with `only_above`.
     """
     bracket, x = Bracket(), first
     for _ in range(_MOST):
@@ -365,7 +365,10 @@ class CertifiedLimit:
         """
         needed = rational(lipschitz, "lipschitz")
         if needed <= 0 or self.quantity != "lipschitz":
-            raise ParameterError(f"a scale needs the limit of lipschitz and a positive bound. Received {needed}.")
+            raise ParameterError(
+                "a scale needs the limit of lipschitz and a positive bound. Received the limit of "
+                f"{self.quantity} and the bound {needed}."
+            )
         return needed / self.value if self.value else None
 
 
@@ -440,7 +443,7 @@ def largest_gain_range(
     lipschitz : number or text
         Bound L̄ on |d| [unit of ν per s].
     nominal : number or text
-        Lower end b of the range, or its geometric middle if symmetric.
+        Lower end b [-] of the range, or its geometric middle if symmetric.
     symmetric : bool
         Compute the largest f with range [b/f, b·f] instead of the largest b_M with range [b, b_M].
 
@@ -477,7 +480,7 @@ def largest_gain_range(
 
 
 def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
-    """Smallest known bound on |d| without a proof, from the law or a refuting equilibrium; None if unknown."""
+    """Smallest known bound on |d| for which no proof exists, from the law or an equilibrium; None if unknown."""
     chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
     limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
     limits = [] if limit is None else [max(Fraction(0), limit)]

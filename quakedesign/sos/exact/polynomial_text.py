@@ -256,7 +256,7 @@ def parse_constraint(
     Parameters
     ----------
     text : str
-        Two polynomials joined by ``>=``, ``<=`` or ``==``; for example ``x^2 + y^2 == 1``.
+        Two polynomials joined by ``>=``, ``<=``, ``==`` or ``=``; for example ``x^2 + y^2 == 1``.
     variables : sequence of str, optional
         As in `parse`.
 
@@ -295,9 +295,7 @@ def names_in_text(*texts: str) -> tuple[str, ...]:
     """
     names = dict.fromkeys(name for text in texts for name in _order(text, _tokens(text), None))
     if len(names) > VARIABLES:
-        raise PolynomialError(
-            f"at most {VARIABLES} different variables are read. Received {len(names)}. Use fewer, or rename them."
-        )
+        raise PolynomialError(f"different variables must be at most {VARIABLES}. Received {len(names)}. Use fewer.")
     return tuple(names)
 
 
@@ -349,7 +347,8 @@ def _checked(variables: Sequence[str]) -> tuple[str, ...]:
     good = all(isinstance(name, str) and re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{,31}", name) for name in order)
     if not good or len(set(order)) != len(order) or len(order) > VARIABLES:
         raise PolynomialError(
-            f"variables must be at most {VARIABLES} different names of ASCII letters, digits and underscores. "
+            f"variables must be at most {VARIABLES} different names of at most {_NAME} ASCII letters, digits and "
+            "underscores, without a digit in front. "
             f"Received {str(order)[:60]}. Rename them."
         )
     return order

@@ -174,20 +174,20 @@ def test_a_number_that_a_declaration_excludes_is_refused():
     sure = sp.Symbol("k", positive=True)
     loop = replace(PLAIN, field={x: -sp.sqrt(sure**2) * SignedPower(x, 0) + d}, gains=(sure,))
     assert certify(loop, (2,), lipschitz=1)[0] is Verdict.PROVED
-    with pytest.raises(ParameterError, match=r"k is declared .* in the loop, but equals -2"):
+    with pytest.raises(ParameterError, match=r"k must be not .*, as declared in the loop.* the value -2"):
         certify(loop, (-2,), lipschitz=1)
 
 
 def test_a_declaration_that_only_the_ends_of_a_range_meet_is_refused():
     whole = sp.Symbol("d", integer=True)
     rate = -2 * k * SignedPower(x, 0) + whole + 100 * sp.sin(sp.pi * whole) * SignedPower(x, 0)
-    with pytest.raises(ParameterError, match="d is declared integer"):
+    with pytest.raises(ParameterError, match="d must be integer, as declared"):
         certify(replace(PLAIN, field={x: rate}, uncertain=(whole,)), (1,), lipschitz=1)
 
 
 def test_a_root_that_is_declared_negative_is_refused():
     below = sp.Symbol("r", negative=True)
-    with pytest.raises(ParameterError, match="r is declared"):
+    with pytest.raises(ParameterError, match="r must be extended_negative"):
         certify(replace(PLAIN, field={x: 2 * sp.sign(below * x) + d}, roots={below: k}), (4,), lipschitz=1)
 
 
