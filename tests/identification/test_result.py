@@ -139,7 +139,7 @@ def test_outliers_are_told_at_their_times_largest_first():
 
 
 def test_what_is_not_told_is_said_with_the_end_that_is():
-    ends = {"low": -math.inf, "high": math.inf}
+    ends = {"low": -math.inf, "high": math.inf, "least": -math.inf, "most": math.inf}
     estimates = {
         "a": told("a", high=math.inf, most=math.inf),
         "b": told("b", low=0.0, least=-math.inf, unit="m"),
