@@ -178,3 +178,22 @@ def test_a_refuted_period_is_rounded_up_only_if_the_rounded_one_is_refuted(searc
     answers["unstable"] = lambda step: "corner" if step == F("0.123456") else None
     assert module._refuted(corners, F("0.123456")) == UpperBound(F("0.123456"))
     assert module._short(F("0.123456")) == F("0.1234")
+
+
+def test_results_for_a_period_are_plain_values_and_none_where_nothing_is_known():
+    witness = (F(1), F(1, 2), F(3))
+    longest = LargestVaryingStep(proved=LowerBound(F(1, 2)), refuted=UpperBound(F(3, 4)), proofs=())
+    verdict = module.VaryingVerdict(verdict=Verdict.REFUTED, step=F(1), witness=witness)
+    known = module.SampledStability(verdict_at_step=verdict, longest=longest, radius=1.5)
+    assert known.to_dict() == {
+        "step": 1.0,
+        "verdict": str(Verdict.REFUTED),
+        "varying": str(Verdict.REFUTED),
+        "radius": 1.5,
+        "witness": [1.0, 0.5, 3.0],
+        "largest_step": 0.5,
+        "refuted_step": 0.75,
+    }
+    undecided = module.VaryingVerdict(verdict=Verdict.UNDECIDED, step=F(1))
+    unknown = module.SampledStability(verdict_at_step=undecided, longest=None, radius=float("nan")).to_dict()
+    assert [unknown[key] for key in ("radius", "witness", "largest_step", "refuted_step")] == [None] * 4
