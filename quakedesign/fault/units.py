@@ -144,7 +144,7 @@ def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fract
     ------
     ParameterError
         For a number that is not finite, or an object that is neither a number nor a text.
-        UnitError
+    UnitError
         As in `si_value`, for a text that is not a number.
     """
     try:

@@ -347,7 +347,7 @@ def columns_by_name(columns: Sequence[Column], wanted: str) -> tuple[dict[str, n
     """Columns in SI units by name, and remarks on how their headings were read."""
     given: dict[str, ndarray] = {}
     headings: dict[str, str] = {}
-    named = _unlimited_pressure(columns, wanted)
+    named = _assigned(columns, wanted)
     unknown: list[Column] = []
     for column in columns:
         name, column = named.get(column.heading, (_meant(column.name), column))
@@ -393,7 +393,7 @@ def _meant(name: str) -> str:
     return _MEANT.get(_squeezed(name), "")
 
 
-def _unlimited_pressure(columns: Sequence[Column], wanted: str) -> dict[str, tuple[str, Column]]:
+def _assigned(columns: Sequence[Column], wanted: str) -> dict[str, tuple[str, Column]]:
     """Names that the user assigns to headings, with the columns in the units given."""
     by_name = {place: column for i, column in enumerate(columns, start=1) for place in (str(i), column.name)}
     by_name |= {column.heading: column for column in columns}

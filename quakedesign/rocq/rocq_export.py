@@ -79,7 +79,7 @@ def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> d
     ------
     OutputError
         If a file exists or cannot be written, or two certificates would have the same file NAME.v.
-        CertificateError
+    CertificateError
         If a certificate cannot be read, or violates a rule of FORMAT.md.
     """
     targets: dict[Path, Path] = {}

@@ -110,7 +110,7 @@ def simulate_state(
             f"Received {travelled:.6g} m. Shorten the duration."
         )
     problem = SmoothProblem(slider.rates, scales, 2, math.log(level) if level > 0 else math.inf)
-    history = _History(slider, problem, pieces, course, _unlimited_pressure(times, pieces), method, rtol)
+    history = _History(slider, problem, pieces, course, _output_times(times, pieces), method, rtol)
     return _trajectory(subject, slider, history, level, start)
 
 
@@ -168,7 +168,7 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
     return [(float(length), float(speed)) for length, speed in pieces]
 
 
-def _unlimited_pressure(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":
+def _output_times(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":
     if times is None:
         return None
     wanted, end = np.asarray(times, dtype=float), math.fsum(length for length, _ in pieces)

@@ -3,7 +3,7 @@
 A bound is computed in ball arithmetic, from rational matrices to rational numbers. Chapters: continuous
 loops, one segment of a periodic loop, separation of the slowest mode, free response, and periodic loops; the first and
 the last two state and prove their bounds.
- The algorithms for periodic loops also give estimates for a search, with other number types (`Arithmetic`).
+The algorithms for periodic loops also give estimates for a search, with other number types (`Arithmetic`).
 """
 
 from abc import ABC, abstractmethod

@@ -283,9 +283,9 @@ def run_campaign(
     ------
     ParameterError
         If the number of samples or the metric is not valid.
-        OutputError
+    OutputError
         If the folder contains other files, or cannot be written.
-        SimulationError
+    SimulationError
         If the folder contains another campaign, or the workers cannot be reached.
     """
     require_count(samples)
