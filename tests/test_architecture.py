@@ -467,7 +467,7 @@ BUDGETS = {
     "laws": 3131,
     "loop": 4202,
     "plant": 1477,
-    "guarantees": 13565,
+    "guarantees": 13566,
     "lyapunov": 7063,
     "linear": 2411,
     "synthesis": 1975,

@@ -5,9 +5,9 @@
 
     y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
 
-exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1 has the slope −κ − N̂μ′(σ′ − p). While the fault
-rests, its state is constant. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is
-checked.
+with S⁻ ≤ 0 ≤ S⁺ (the range is widened to contain 0), exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1
+has the slope −κ − N̂μ′(σ′ − p). While the fault rests, its state is constant. Backward slip is excluded while the shear
+stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
 
 **Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is
 one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block
@@ -33,22 +33,22 @@ both ends of the range of r′ suffice.
 **Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. It may be 0 for r′ up to max|r″|T/2. So
 where a facet function n_l·z after the period decreases with this increment, the end r′ = 0 covers all these r′.
 
-**Input gain.** Let m1 be the factor of ξ in a facet function after a slide, M·ξ the bound used for m1·ξ, X1 the slip
-due to a constant unit force, and J the contribution of the ranges of slope and damping to the factor of H − bβU
-(FORMAT.md, *Sliding map*). For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ +
-(|n3·s|ψ/b)·ξ, with M the chord of m1 and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1
-the chord of β·m1 may replace β·M if the term −bβU·X1 of the ξ in (|n3·s|ψ/b)·ξ is omitted; the same holds for J. Where
-U < 0 replace m1 by the chord of β·m1, divided by β: all terms with U are convex in β, and |n3·s|ψ/b enters the terms
-with y and H alone.
+**Input gain.** Let n3 be the third entry of a facet's normal, s the chord slope of G in the period, m1 the factor of ξ
+in the facet function after a slide, which contains −n3·s/(bβ), M·ξ the bound used for m1·ξ, X1 the slip due to a
+constant unit force, and J the contribution of the ranges of slope and damping to the factor of H − bβU (FORMAT.md,
+*Sliding map*). For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ + (|n3·s|ψ/b)·ξ,
+with M the chord of m1 and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1 the chord of β·m1
+may replace β·M if the term −bβU·X1 of the ξ in (|n3·s|ψ/b)·ξ is omitted; the same holds for J. Where U < 0 replace m1
+by the chord of β·m1, divided by β: all terms with U are convex in β, and |n3·s|ψ/b enters the terms with y and H alone.
 
 **Sliding mode.** The target rate is r′ + ω, ω the solution of the implicit step. That step is shown to be deadbeat, ω =
 −e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
 1/T, whose states stay in the polytope.
 
 **Law.** The law is `StickSlipLaw`, D its level. In a period d = D + p*(x1) changes by the law's update of D and, as p*
-changes with the slip, by −σξ [Pa], σ = S_chord/(bβ). State at the samples: z = (e1, y, d). A polytope {z: n_l·z ≤ 1, y
-≥ 0} is invariant if no facet function exceeds 1 after either map. A facet function after a map is linear on a polytope;
-its maximum is bounded by multipliers of three or four constraints, which a file names.
+changes with the slip, by −σξ [Pa], σ = s/(bβ). State at the samples: z = (e1, y, d). A polytope {z: n_l·z ≤ 1, y ≥ 0}
+is invariant if no facet function exceeds 1 after either map. A facet function after a map is linear on a polytope; its
+maximum is bounded by multipliers of three or four constraints, which a file names.
 
 **Noise.** The measured slip is x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is measured exactly, including whether it
 is 0. Let e1 be the slip minus the reference plus N, and let d exclude the noise term m·n of the same sample; m is
@@ -68,7 +68,7 @@ period that ends at rest can be extended to T_m, as nothing releases the block i
 of the slip until a stop covers it.
 
 **Peaks.** Between samples y is at most the larger of its initial value and its final value under the largest force, as
-y″ = −wy′ + Sy admits no interior maximum where S ≥ 0; e1 lies within max r′·T of its values at the samples.
+y″ = −wy′ + Sy admits no interior maximum where S ≥ 0, and S⁺ ≥ 0; e1 lies within max r′·T of its values at the samples.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -115,6 +115,7 @@ COMBINATIONS = (
 )
 LEAST = (0, 0, 2, 2, 4, 5, 5)
 """The combination with the least r′ of the same slice and sign, whose condition of rest stands for all r′."""
+# the rest map also needs the largest r′ of (1, v ≤ 0), c·e1
 _AT_REST = (*zip(LEAST, COMBINATIONS, strict=True), (4, (1, False, 1, 0)))
 Basis = tuple[int, ...]
 
@@ -949,7 +950,7 @@ def _bounds(task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: Sti
 
 
 def _bracket(task: FaultPlant, sampled_loop: SampledStickSlip, plant: Ranges, feedback: Fraction) -> Fraction:
-    """Largest decrease [m/s²] of the bound H + δS·ξ + δw·y of |a| if ξ, y and U belong to different β.
+    """Largest decrease [m/s²] of the bound H + δS·ξ + δw·y of |a| if ξ, y and U belong to different β (*Input gain*).
 
     If this decrease is below H, the bound of |a| is not negative at either end of β, also where the response of a facet
     changes sign between them. For aperiodic sampling all of U counts, over the longest interval.
