@@ -5,8 +5,8 @@
 
     y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
 
-with S⁻ ≤ 0 ≤ S⁺ (the range is widened to contain 0), exactly, as G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1 with κ = k̂ − φ1
-has the slope −κ − N̂μ′(σ′ − p). While the fault rests, its state is constant. Backward slip is excluded while the shear
+with S⁻ ≤ 0 ≤ S⁺ (the range is widened to contain 0). This is exact: G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1, κ = k̂ − φ1, has
+the slope −κ − N̂μ′(σ′ − p). While the fault rests, its state is constant. Backward slip is excluded while the shear
 stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
 
 **Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is
