@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# Conversion of decimal text and floats to `fractions.Fraction`, in this module only.
+# Conversion of decimal text and floats to `fractions.Fraction`, for all numbers that are input.
 
 _DIGITS = 308  # so that float() of the number neither overflows nor vanishes
 _NUMBER = re.compile(r"[+-]?(\d+(/\d+)?|(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?)", re.ASCII)
@@ -41,7 +41,7 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     Raises
     ------
     ParameterError
-        When the value is not a finite number of at most 300 characters and 308 digits, or when it has a real type
+        When the value, unless a `Fraction`, is not finite, in at most 300 characters and 308 digits, or has a real type
         that is not rational (such as a long double) and no float equals it.
     """
     if isinstance(value, Fraction):

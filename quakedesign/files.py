@@ -37,7 +37,7 @@ def parse_toml(text: str) -> Json:
     Raises
     ------
     ValueError
-        When it is not TOML, is nested too deeply, or has a key of more than 400 parts.
+        When it is not TOML, is nested too deeply, or has a line of more than 400 dots, in a key or elsewhere.
     """
     for number, line in enumerate(text.split("\n"), start=1):
         if line.count(".") > _MOST_DOTS:
@@ -106,7 +106,7 @@ _mine: set[Path] = set()
 
 @contextmanager
 def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
-    """Private folder, removed when the block ends, or at the next start if the process is killed.
+    """Private folder, removed when the block ends; if the process is killed, by the next `sweep` of its parent folder.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def lock_of(target: Path) -> tuple[Path, int | None]:
 
 
 def unlock(folder: Path, lock: int | None) -> None:
-    """Release a lock from `lock_of`."""
+    """Release a lock from `lock_of`, and remove its folder; files in its `ASIDE` move back."""
     _discard(folder)
     if lock is not None:
         os.close(lock)
@@ -329,7 +329,7 @@ def sole_writer(folder: Path, *, make: bool = False) -> Iterator[None]:
 
 
 def number_placed() -> int:
-    """Number of files and folders that this process has written, including the one that it is writing."""
+    """Number of files and folders that this process has placed outside its temporary folders, or is placing."""
     return _placed[0]
 
 

@@ -43,7 +43,7 @@ from quakedesign.text import nearest_name
 # Where descriptions of faults come from: presets, and files of the user.
 
 LARGEST_FILE = 1 << 16
-"""Largest file size in bytes; the time to parse a dotted key grows with the square of its length."""
+"""Largest file in bytes, text in characters; the time to parse a dotted key grows with the square of its length."""
 _PRESETS = Path(__file__).parent / "presets"
 
 
@@ -208,7 +208,7 @@ def _target(fault: Fault, assumed: list[str]) -> float:
 def _step_of_sliding(fault: Fault, task: Reference, assumed: list[str]) -> float:
     step = sliding_step(fault.friction, task)
     assumed.append(
-        f"{_STEP} {step:g} s, near D_c/({SAMPLES_PER_STATE_TIME:g} V) in slow sliding at the task's mean rate V"
+        f"{_STEP} {step:g} s, at most D_c/({SAMPLES_PER_STATE_TIME:g} V) in slow sliding at the task's mean rate V"
     )
     return step
 
@@ -299,7 +299,9 @@ def load_fault(
 def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
     """Fault from the text of a TOML file; `name` is its name in messages. See `load_fault`."""
     if len(text) > LARGEST_FILE:
-        raise ScenarioError(f"{name}: a fault file must be at most 64 KiB. Received {len(text)} characters.")
+        raise ScenarioError(
+            f"{name}: a fault file must have at most {LARGEST_FILE} characters. Received {len(text)}. Shorten it."
+        )
     try:
         raw = parse_toml(text)
     except ValueError as error:
@@ -440,7 +442,7 @@ def _values(part: object, entries: Mapping[str, FileEntry]) -> Json:
 
 
 def _stresses(fault: Fault) -> dict[str, str]:
-    """Stresses [Pa] of parts given as a stress: smallest floats that accelerate at least as much as stored."""
+    """Stresses [Pa] of disturbance entries given as a stress: least floats that reach the stored acceleration."""
     stresses = {}
     for name in fault.disturbance.stresses:
         size = abs(getattr(fault.disturbance, name))

@@ -270,7 +270,7 @@ def _finite(slopes: ndarray) -> ndarray:
 
 
 def settled(fit: Fit) -> Fit:
-    """A fit on a finer simulation and without outliers, repeated until neither changes.
+    """A fit on a finer simulation and without outliers, repeated until neither changes, at most 6 times.
 
     Simulation steps are retained while every coordinate moves by at most one standard deviation.
     """
@@ -291,7 +291,8 @@ def settled(fit: Fit) -> Fit:
 def outliers(residuals: ndarray) -> ndarray:
     """Samples so far off that noise alone gives one such sample with a probability of 5 %, in runs of at most two.
 
-    The size of the noise is that of the median residual. A peak whose neighbours deviate too is no outlier.
+    The size of the noise follows from the median absolute deviation from the median residual.
+    A peak whose neighbours deviate too is no outlier.
     """
     off = residuals - np.median(residuals)
     size = np.median(np.abs(off)) / stats.norm.ppf(0.75)
@@ -308,7 +309,8 @@ def outliers(residuals: ndarray) -> ndarray:
 def advantage(one: Fit, other: Fit) -> tuple[float, float]:
     """Ratio of the sum of squares of another fit to that of this one, and the increase of its AIC.
 
-    On the samples of both fits. For equal parameter counts, the AIC increases by n·ln(ratio), n independent samples.
+    On the samples that both fits use, or for correlated noise on those that each uses.
+    For equal parameter counts, the AIC increases by n·ln(ratio), n independent samples.
     """
     both = one.used & other.used
     if one.correlated is not None or other.correlated is not None:

@@ -285,8 +285,8 @@ class SampledLaw(SampledController):
             named = {name: pid.pop(name) for name in ("kp", "ki", "kd", "N") if name in pid}
             if pid or entries or "kp" not in named:
                 raise ScenarioError(
-                    f"pid of law {path} must have the key kp and may have ki, kd and N; the file has only step, pid "
-                    'and label. Write {"step": "50 ms", "pid": {"kp": 4e8, "ki": 1e8, "kd": 3e8, "N": 50}}.'
+                    f"pid of law {path} must have the key kp and may have ki, kd and N; the file may have only step, "
+                    'pid and label. Write {"step": "50 ms", "pid": {"kp": 4e8, "ki": 1e8, "kd": 3e8, "N": 50}}.'
                 )
             return cls.from_pid(**named, step=step, label=label)
         if set(entries) in ({"gains"}, {"gains", "inputs"}):
@@ -390,7 +390,7 @@ def _of_json(content: bytes, path: str | Path) -> Json:
     try:
         entries = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"law {path} must be JSON. Received {str(error)[:80]}.") from None
+        raise ScenarioError(f"law {path} must be JSON. Received other text ({str(error)[:80]}).") from None
     if not isinstance(entries, dict):
         raise ScenarioError(f"law {path} must be an object with keys. Received {type(entries).__name__}.")
     return entries
@@ -405,4 +405,6 @@ def _of_npz(content: bytes, path: str | Path) -> Json:
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return {name: arrays[name].tolist() for name in arrays.files}
     except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError) as error:
-        raise ScenarioError(f"law {path} must be a .npz file without pickles. Received {str(error)[:80]}.") from None
+        raise ScenarioError(
+            f"law {path} must be a .npz file without pickles. Received another ({str(error)[:80]})."
+        ) from None

@@ -137,7 +137,7 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
 
 
 def proposed(programme: Callable[..., list[Rows]], *question: object) -> list[Rows]:
-    """Solution proposed by a programme, from the cache if possible; within `stated_problems` it is solved anew."""
+    """Solution proposed by a programme, from the cache; solved anew in a block `conic.stated_problems`."""
     if collecting():
         return programme(*question)
     return list(search_once(lambda: programme(*question), programme.__module__, *question))
@@ -359,9 +359,9 @@ def poles(problem: LinearProblem, gains: Sequence[Fraction], step: Fraction, ver
     problem : LinearProblem
         In units in which its numbers are near 1.
     step : Fraction
-        T_s.
+        T_s, in the unit of time of `problem`.
     vertex : (Fraction, Fraction, Fraction)
-        β, s, w.
+        β, s, w, in the units of `problem`.
     """
     beta, s, w = vertex
     flow = ((_ZERO, _ONE, _ZERO), (s, -w, beta * problem.sectors.authority), (_ZERO,) * 3)

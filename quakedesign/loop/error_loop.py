@@ -444,7 +444,8 @@ def sliding_loop(
     dp*/dt [Pa/s], and ``reference`` g [-], the relative excess of the reference rate over V, in x′ = … − Vg.
     Outputs: ``slip_error`` x [m], ``log_rate`` y, ``log_state`` z, ``ageing`` c_y·y + c_z·z, ``strength`` a·y + b·z,
     ``push`` q [Pa], ``asked`` [Pa], valve pressure minus p*, and with a diffusion path ``left_out`` [Pa].
-    The outputs of y and q exclude the direct feedthrough of e and of the truncation error (`at_once`).
+    ``log_rate``, ``ageing`` and ``strength`` exclude the direct feedthrough of e and of the truncation error
+    (`at_once`); ``push`` excludes the truncation error.
 
     Raises
     ------

@@ -33,7 +33,7 @@ class Integrator:
     order : int
         Order of convergence on smooth problems.
     nodes, matrix, weights
-    Butcher tableau c, A and b; row i of A contains the weights of the stages before i.
+        Butcher tableau c, A and b; row i of A contains the weights of the stages before i.
     """
 
     name: ClassVar[str]

@@ -152,7 +152,7 @@ class Trajectory(ABC):
         if not 0 < duration / intervals * (1 - 1e-9) <= dt <= duration:
             raise ParameterError(
                 f"dt must be between {duration / intervals:.4g} s, the mean interval of the stored instants, and "
-                f"{duration:.4g} s, the run. Received {dt!r}. Increase samples in simulate."
+                f"{duration:.4g} s, the run. Received {dt!r} s. Change dt, or increase samples in simulate."
             )
         count = int(duration / dt * (1 + 1e-12)) + 1
         return self.to_xarray().interp(time=self.time[0] + dt * np.arange(count))
@@ -230,7 +230,9 @@ class OutcomeCriterion:
       errors count), and its slip rate never exceeds the largest of the reference by more than 1 % of the natural peak
       (over the whole run);
     - an ``earthquake``, if its slip rate ever exceeds the largest of the reference by 10 % of the natural peak or more;
-    - ``slow slip`` otherwise, or ``diverged`` if the numbers of its law overflow, since the rest of the run is unknown.
+    - ``slow slip`` otherwise.
+
+    A ``tracked`` or ``slow slip`` run is ``diverged`` if the numbers of its law overflow: its rest is then unknown.
 
     A stable fault has no natural earthquake: its natural peak is replaced by ω_n·d_max, the peak slip rate of a
     harmonic oscillation with the target slip as amplitude. For friction with a state it is always `dynamic_rate`.
@@ -279,7 +281,8 @@ class OutcomeCriterion:
             [m]; None for a run that ends before errors are evaluated; the slip rate alone then decides.
         events : mapping of str to float
             Time of first occurrence [s].
-        controlled : bool
+        followed : bool
+
             Whether there was a controller, and therefore a reference.
         """
         if peak_slip_rate is None:

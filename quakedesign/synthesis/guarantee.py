@@ -126,11 +126,12 @@ def guarantee(
         User-defined law, as with `controller`. A ``StateSpace`` in discrete time is for an `UncertainPlant`, from its
         measurements to its controls.
     objective : str
-        Of a design. ``peak``: the smallest proved slip-rate error. ``tracking``: a smaller slip error under a drifting
-        disturbance, with a somewhat larger slip-rate error.
+        Of a design. ``peak``: nearly the smallest slip-rate error, as estimated in the search. ``tracking``: a smaller
+        slip error under a drifting disturbance, with a somewhat larger slip-rate error.
     gains : sequence or array of str, float or Fraction, optional
-        k1 to k4 of an e-LQR whose integrals are summed once per sample, run by the scheme ``explicit``; base gains of a
-        sliding mode. A matrix of one row, as the K of ``control.dlqr``, is accepted.
+        k1 to k4 [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)] of an e-LQR whose integrals are summed once per sample, run by the
+        scheme ``explicit``; base gains of a sliding mode.
+        A matrix of one row, as the K of ``control.dlqr``, is accepted.
     scheme : str, optional
         Of a sliding mode: ``stick-slip`` unless given, or ``compensated`` on the plant without stick; no other has a
         guarantee. Of the e-LQR ``explicit``.

@@ -146,7 +146,7 @@ def test_with_a_state_the_sampling_time_is_a_twentieth_of_the_ageing_time():
         task = f'[task]\ntarget_slip = "5 cm"\noperation_time = "{days} days"\n'
         fault = parse_fault(f"{head}{RATE}{task}", "own.toml")
         assert fault.sampling_time == floored(expected or 86.4 * days, 2)
-        assert any("near D_c/(20 V) in slow sliding" in said for said in fault.assumed)
+        assert any("at most D_c/(20 V) in slow sliding" in said for said in fault.assumed)
 
 
 def test_symbols_are_names():

@@ -290,7 +290,9 @@ def test_friction_with_a_state_brings_its_sampling_time_unless_the_fault_has_one
     quick = replace(aged, law=replace(patch.friction, critical_slip=2e-5))
     assert identified_fault(quick, lab).sampling_time == 0.50  # 0.507 s rounded down
     assert identified_fault(quick, patch).sampling_time == patch.sampling_time
-    assumed = replace(patch, assumed=("sampling time 41 s, near D_c/(20 V) in slow sliding at the task's mean rate V",))
+    assumed = replace(
+        patch, assumed=("sampling time 41 s, at most D_c/(20 V) in slow sliding at the task's mean rate V",)
+    )
     assert identified_fault(quick, assumed).sampling_time == 1.0  # 20 µm/(20 · 1 µm/s)
     assert other_parts(quick, assumed) == "normal stress, size, task, disturbance, reference rate, working range"
     assert step_assumed(load_fault(written)) != step_assumed(patch)

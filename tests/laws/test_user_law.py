@@ -165,7 +165,7 @@ MATRICES = {"A": [[1]], "B": [[1, 0]], "C": [[1]], "D": [[0, 0]], "inputs": ERRO
         (json.dumps(MATRICES | {"more": 1}), "either A, B, C, D and inputs, or gains"),
         (json.dumps({"step": 1, "pid": {"ki": 1}}), "must have the key kp"),
         (json.dumps({"step": 1, "pid": [1, 2, 3]}), "must have the key kp"),
-        (json.dumps({"step": 1, "pid": {"kp": 1}, "N": 50}), "the file has only step, pid and label"),
+        (json.dumps({"step": 1, "pid": {"kp": 1}, "N": 50}), "the file may have only step, pid and label"),
         (json.dumps({"step": 1, "pid": {"kp": 1, "K": 2}}), "must have the key kp"),
         (json.dumps({"step": [1], "gains": [1]}), "step of .* must be a string or a number"),
         (json.dumps({"step": 0, "gains": [1]}), "step of a law must be positive"),

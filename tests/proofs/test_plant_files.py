@@ -172,7 +172,7 @@ WIDE = {"A": [["0"] * 49] * 49, "B": [["0"] * 2] * 49, "C": [["0"] * 49]}
     [
         (("plant", "loads", 0, "shift"), ["1", "0"], "a shift that is not measured"),
         (("plant", "loads", 0, "rate"), "-1", "a rate of 0 or more"),
-        (("plant", "loads", 0, "more"), "1", "plant.loads.0.*must be a known key"),
+        (("plant", "loads", 0, "more"), "1", "plant.loads.0.*is an unknown key"),
         (("plant", "B"), [["0", "1"], ["1"]], "rows and columns of a plant must fit"),
         (("plant", "B"), [[], []], "1 to 40 controls"),
         (("plant", "A", 1), ["1"], "rows and columns of a plant must fit"),

@@ -407,7 +407,7 @@ def test_an_uncontrolled_fault_with_a_state_is_loaded_at_its_operating_rate():
 
 
 def test_a_fault_without_a_state_has_no_tide():
-    with pytest.raises(ParameterError, match="needs friction with a state"):
+    with pytest.raises(ParameterError, match="apply only to friction with a state"):
         simulate(load_fault("real-fault"), tide=Tide(amplitude=1.0))
 
 

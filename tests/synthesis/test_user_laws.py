@@ -426,7 +426,7 @@ def test_the_command_line_takes_the_file_of_a_law(stuck, tmp_path, capsys):
     assert (tmp_path / "c" / "controller.c").exists()
     capsys.readouterr()
     assert run("simulate", "real-fault", "--law", path, "--controller", "cta") == 2
-    assert "Omit these options" in capsys.readouterr().err
+    assert "Omit the other options" in capsys.readouterr().err
     assert run("guarantee", "real-fault", "--law", tmp_path / "none.json") == 2
 
 

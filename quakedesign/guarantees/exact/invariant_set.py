@@ -15,7 +15,8 @@ are functions of time, and for these functions the inputs are linear in the stat
 solution of this loop obeys all bounds of the inputs for all t, hence |y| ≤ Y_y for all t. So no input saturates, and
 this is the unique solution of the original loop. ∎
 
-**What is verified.** For r independent facets l ∈ L, |gξ| ≤ |gH_L⁻¹|·1 on X. A file names r facets for every row g at
+**What is verified.** Let ξ have r entries, L name r independent facets, H_L have the rows h_l, l ∈ L, and 1 be a column
+of ones. Then |gξ| ≤ |gH_L⁻¹|·1 on X for every row g. A file names r facets for every row g at
 every end of a piece. For c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) = |ce^{Aθ}(Cξ + Σ j·n)| + Σ
 W_i∫₀^θ|ce^{Aσ}b_i|dσ. On a piece [α, β] the first term exceeds the linear interpolation of its two end values by at
 most (β − α)²/8·max|cA²e^{Aσ}||x(0)|, and the second by at most (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i|: f is at most the
@@ -115,7 +116,7 @@ class InvariantPolytope:
                 "" if not outside else f"{outside[0]}",
             ),
             (
-                "inputs must be given, 0 or more each",
+                "bounds of the inputs must be given, and each must be 0 or more,",
                 bool(self.inputs) and not negative,
                 shortly(negative[0]) if negative else "none",
             ),
@@ -241,7 +242,7 @@ class _SampleMap:
         return [upper(self._largest(arb_mat([row]), ends, bases)) for row, bases in rows]
 
     def _largest(self, row: arb_mat, ends: list[Fraction], bases: tuple[Basis, ...]) -> arb:
-        """Bound of |c·x(θ)| from the end of a piece that belongs to the first basis to the last end."""
+        """Bound of |c·x(θ)| from the end to which the first of `bases` belongs, up to the last end."""
         places = self.flow.along(row, ends, len(ends) - len(bases), self._largest_state, self.bounds)
         pieces = [
             (self._height(now, basis) + area[0, 0], more[0, 0])

@@ -5,9 +5,10 @@
 
     y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
 
-with S⁻ ≤ 0 ≤ S⁺ (the range is widened to contain 0). This is exact: G(ξ) = N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1, κ = k̂ − φ1, has
-the slope −κ − N̂μ′(σ′ − p). While the fault rests, its state is constant. Backward slip is excluded while the shear
-stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
+with w the damping, φ the disturbance, |φ| ≤ H, λ the reaction of the fault at rest, and S⁻ ≤ 0 ≤ S⁺ (the range is
+widened to contain 0); k̂, N̂, b, β, φ1 and μ* are those of `quakedesign.plant.fault_plant`. This is exact: G(ξ) =
+N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1, κ = k̂ − φ1, has the slope −κ − N̂μ′(σ′ − p). While the fault rests, its state is
+constant. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
 
 **Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is
 one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block
@@ -18,13 +19,13 @@ before the next sample, and the period ends with y = 0. So each period follows e
 linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
 bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
-**Rest map.** Let μ = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(μ−t)})/w. As y
+**Rest map.** Let τ = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(τ−t)})/w. As y
 = 0 at the stop, integration by parts gives δ = f(0)y + ∫f·(G + φ)dt up to the stop. Before the stop G ≤ −H + |S⁻|(δ −
 ξ), and this bound minus G decreases with the slip. So
 
     δ·(1 − |S⁻|T²/2 − ε) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
 
-with ε the width of the range of the damping times (e^{wx} − 1)/w. Moreover, G(δ) ≤ −H gives the condition of rest,
+with ε = (w⁺ − w⁻)·(e^{wx} − 1)/w, [w⁻, w⁺] the range of the damping. Moreover, G(δ) ≤ −H gives the condition of rest,
 b·β_max·U ≥ H − |S⁻|δ.
 
 The possible δ and U depend on r′ at the sample. The condition of rest is taken at the least r′, where it is weakest; so
@@ -55,8 +56,8 @@ is 0. Let e1 be the slip minus the reference plus N, and let d exclude the noise
 slip_gain and c is return_rate. Then this noise acts in one period alone: v is the target rate for r′ + c(N − n) in
 place of r′, a value in [0, max r′ + 2cN]; the reference moves up to 2cNT less than T times this value; U is m·n larger.
 Where the innovation is limited, it adds between −mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, and never less than the
-unlimited innovation would; otherwise d contains no noise. Initially e1 = N and d = 0, as x⁻ = 0 and the first
-innovation, n, is not limited. All d from 0 to m·N are required to lie in the polytope.
+unlimited innovation would; otherwise d contains no noise. Initially e1 = N and d = 0, as x⁻ (the slip measured one
+sample before) = 0 and the first innovation, n, is not limited. All d from 0 to m·N are required to lie in the polytope.
 
 **Aperiodic sampling.** Each interval between samples is any h from T to T_m; T is a constant of the law. The bound of a
 facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|A(h − s)ds over [0, h]. Here g is its
@@ -164,7 +165,7 @@ class StickSlipPolytope:
                 for row, (index, sign) in zip(self.facets, axes, strict=False)
             ),
             "have 5 multipliers for each facet": [len(row) for row in self.multipliers] == [5] * count,
-            "have multipliers >= 0, 0 or 1, of any sign, 0 or 1, and from 0 to 1": all(
+            "have a first multiplier of 0 or more, a second and fourth of 0 or 1, and a fifth from 0 to 1": all(
                 len(row) == 5 and row[0] >= 0 <= row[4] <= 1 and row[1] in (0, 1) and row[3] in (0, 1)
                 for row in self.multipliers
             ),
@@ -224,8 +225,8 @@ class SampledStickSlip:
             )
         if not 0 <= 2 * self.slip_noise <= self.law.rest_slip:
             raise ParameterError(
-                f"slip_noise must be from 0 to half of rest_slip, {shortly(self.law.rest_slip)} m, "
-                f"got {shortly(self.slip_noise)} m"
+                f"slip_noise must be from 0 to half of rest_slip, {shortly(self.law.rest_slip / 2)} m. "
+                f"Received {shortly(self.slip_noise)} m. Increase rest_slip."
             )
         deadbeat = self.law.rate_gain == self.law.target_gain and self.law.return_rate * self.step == 1
         if self.law.pull and not deadbeat:
@@ -484,7 +485,8 @@ class Period:
     of_force: tuple[Any, Any]  # and per constant force
     impulses: tuple[np.ndarray, np.ndarray]  # ξ and y after an impulse, at the nodes
     weights: np.ndarray  # integrals of the hat functions of the nodes times t^j, j = 0 to 3
-    bent: tuple[Any, Any]
+    bent: tuple[Any, Any]  # bounds of the second derivatives of the impulse responses of ξ and y
+
     margin: tuple[Any, ...]  # for factors of ξ and y: excess of a bound between two checked intervals
 
     @classmethod
@@ -642,7 +644,7 @@ class _Carried:
     of_error: np.ndarray
     constant: np.ndarray
     rising: np.ndarray  # factor of r′ itself
-    standstill: np.ndarray  # largest r′ at which r may stand still, for r′ = 0 and n1 > 0; 0 otherwise
+    standstill: np.ndarray  # largest r′ at which r may stand still, if the end r′ = 0 is taken and n1 > 0; else 0
 
     def moved(self, pushed: np.ndarray | int, which: np.ndarray) -> np.ndarray:
         """Contribution of r′ where the reference may stand still; `pushed` is the plant's factor of −r′."""
@@ -769,7 +771,7 @@ Constraint = tuple[tuple[Fraction, ...], Fraction]
 
 
 def slices(task: FaultPlant, sampled_loop: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
-    """Ends of the three slices: e1 up to 0, from there to max r′/c, and above."""
+    """Ends of the three slices: e1 up to 0, from there to max r′/c, r′ with noise, and above."""
     threshold, one = (task.reference_rates[0] + sampled_loop.target_noise) / sampled_loop.law.return_rate, Fraction(1)
     up, down = (one, _ZERO, _ZERO), (-one, _ZERO, _ZERO)
     return ((up, _ZERO),), ((down, _ZERO), (up, threshold)), ((down, -threshold),)
@@ -778,7 +780,7 @@ def slices(task: FaultPlant, sampled_loop: SampledStickSlip) -> tuple[tuple[Cons
 def polytopes(
     task: FaultPlant, sampled_loop: SampledStickSlip, facets: Sequence[tuple[Fraction, ...]], plant: Ranges | None
 ) -> list[list[Constraint]]:
-    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, δ) if ranges exist.
+    """Constraints of the 3 slices, and of the 7 combinations in (e1, y, d, δ) if `plant` is given.
 
     The condition of rest depends on r′. The condition at the least r′ holds wherever that at another r′ does, so that
     on its polytope the ends of r′ suffice.
@@ -817,7 +819,7 @@ class Verifier:
     ) -> None:
         count = len(constraints)
         if any(place >= count for basis in bases for place in basis):
-            raise ParameterError(f"bases of a polytope must name {count} constraints by their numbers, from 0")
+            raise ParameterError(f"bases of a polytope must name constraints by their numbers, from 0 to {count - 1}")
         slice_number = place if place < SLICES else COMBINATIONS[place - SLICES][0]
         self.sizes, self.sign = _exact_array(list(sizes)), -1 if slice_number == 0 else 1  # of e1
         self.rows = _exact_array([list(row) for row, _ in constraints])
@@ -851,7 +853,7 @@ class Verifier:
         return bases, shares
 
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
-        """Upper bounds of c·z + k, or of 1 + (c − n)·z + k where `which` names facets.
+        """Upper bounds of c·z + k; where `which` names facets, of the smaller of this and 1 + (c − n)·z + k.
 
         The second bound decides where a period changes nothing, as at rest: there the entries of c − n have signs
         opposite to those of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of its slice.
@@ -965,7 +967,7 @@ def _bracket(task: FaultPlant, sampled_loop: SampledStickSlip, plant: Ranges, fe
 def verifiers(
     task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: StickSlipPolytope, plant: Ranges | None
 ) -> list[Verifier]:
-    """Verifiers of the 3 slices, and of the 7 combinations if ranges exist."""
+    """Verifiers of the 3 slices, and of the 7 combinations if `plant` is given."""
     ahead, rate, up, lag, down = invariant_set.box
     sizes, longest = [max(ahead, lag), rate, max(up, down)], _ZERO
     if plant:

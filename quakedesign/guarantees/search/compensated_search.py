@@ -208,8 +208,8 @@ class Compensation:
             deadbeat = "; within the proved errors its implicit step is deadbeat, e1 + T_s·w = 0"
             return f"{deadbeat}: its pressures are those of every law with a deadbeat step"
         return (
-            f"; its implicit step ends at w = -γ·e1/T_s with γ from {low:.3g} to {high:.3g}, up to "
-            f"{UpperBound(implicit_step.remainder):.2g} m/s, within the proved errors"
+            f"; within the proved errors its implicit step ends within "
+            f"{UpperBound(implicit_step.remainder):.2g} m/s of w = -γ·e1/T_s, with γ from {low:.3g} to {high:.3g}"
         )
 
     def to_dict(self) -> Json:
@@ -237,7 +237,7 @@ def compensated(
     Raises
     ------
     ParameterError
-        For a weight outside (0, 1], an authority or times that are not positive.
+        For a weight outside (0, 1], an authority or T_s that is not positive, or another time that is negative.
     """
     try:
         pull = implicit_pull(controller, step, authority)
@@ -344,7 +344,7 @@ class Deadbeat(LawSearch):
         return _sampled(_DEADBEAT, *_settled(task, numbers), step, setup)
 
     def proved(self, task: FaultPlant, candidate: Closest) -> TrackingProof | NoProof:
-        """Proof for the smallest λ for which the step is deadbeat."""
+        """Proof for the smallest tried λ for which the step is nearly deadbeat."""
         return self.made(
             task, candidate.sampled_loop.step, candidate.numbers, setup=candidate.sampled_loop.setup
         ).without_stick
@@ -358,7 +358,7 @@ class Deadbeat(LawSearch):
         return _made(task, self.controller, step, (weight, authority, errors), setup)
 
     def low_pressure_loop(self, task: FaultPlant, step: Fraction, setup: ExactSetup = PLAIN) -> SampledLoop | None:
-        """Loop with the smallest peak."""
+        """Loop with the smallest estimated slip-rate error; None if no deadbeat step has estimated bounds."""
         weight, authority, errors = _deadbeat(task, step, "peak", WEIGHTS, setup=setup)
         law = _made(task, self.controller, step, (weight, authority, errors), setup).controller
         implicit_step = ImplicitStep(pull=implicit_pull(law, step, authority))
@@ -548,7 +548,7 @@ def _settings(law: SlidingMode) -> dict[str, Fraction]:
 def _deadbeat(
     task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup = PLAIN
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
-    """Weight, authority and remaining errors of a deadbeat step with a guarantee."""
+    """Weight, B0 [m²/kg] and bounds of the measured errors [m], [m/s] of a deadbeat step, as estimated; else None."""
     require_known(objective, OBJECTIVES, "objective")
     question = "deadbeat", task, step, objective, weights, setup
     search = partial(_deadbeat_search, task, step, objective, weights, setup)
@@ -591,7 +591,7 @@ def _smallest_scale(
     errors: tuple[Fraction, Fraction],
     slopes: tuple[Fraction, ...],
 ) -> Fraction | None:
-    """Smallest λ of `_ROOTS`⁶ for which γ lies in [slope, 1], for the first slope that any λ satisfies; else None."""
+    """Smallest λ of `_ROOTS`⁶ with γ in [slope, 1] at 1.05 times the errors, for the first feasible slope, or None."""
     slip, rate = (_MARGIN * v for v in errors)
 
     def deadbeat(slope: Fraction, root: Fraction) -> bool:

@@ -200,14 +200,14 @@ def design_sampled_law(
     measured: str = MEASURED[0],
     setup: ExactSetup = PLAIN,
 ) -> TrackingProof | NoProof:
-    """Feedback with a disturbance estimate; gains and weight minimise certified bounds.
+    """Feedback with a disturbance estimate; gains and weight minimise estimated bounds, which are then proved.
 
     If the slip alone is measured, the law has a steady-state Kalman observer of slip, slip rate and disturbance; its
     gains and process noise are chosen in the same way.
 
-    ``peak``: the smallest certified slip-rate error. ``tracking``: the smallest slip error under a drifting
-    disturbance, among laws whose certified slip-rate error is at most `allowance` times the smallest. With a lag or a
-    diffusion path the law contains a model of the path.
+    ``peak``: the smallest estimated bound of slip-rate error + 0.1·slip error/T_s. ``tracking``: the smallest slip
+    error under a drifting disturbance, among laws whose estimated slip-rate error is at most `allowance` times that of
+    ``peak``. With a lag or a diffusion path the law contains a model of the path.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def design_sampled_law(
     if step <= 0 or not 0 <= delay <= MOST_DELAY * step or lag < 0:
         raise ParameterError(
             f"step must be positive, delay 0 to {MOST_DELAY} steps, and lag 0 or more. Received the step "
-            f"{float(step):.4g} s, the delay {float(delay):.4g} s and the lag {float(lag):.4g} s. Shorten the delay."
+            f"{float(step):.4g} s, the delay {float(delay):.4g} s and the lag {float(lag):.4g} s. Correct these times."
         )
     laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
@@ -757,13 +757,13 @@ def _farthest(
     ----------
     laws : LawSearch
     problem_with : callable
-        Plant, T_s and setup of the design for a time [s].
+        Plant, T_s and setup of the design for a value: a time [s], or a factor of the half-widths of the box [-].
     first : Fraction
-        Time to try first [s].
+        Value to try first.
     most : Fraction, optional
-        Longest time to try [s].
+        Largest value to try.
     unit : Fraction
-        Time to try after 0 [s].
+        Value to try after 0.
     attempts : int
         Largest number of attempts.
     """
@@ -836,17 +836,18 @@ def _time_between(
 def reached(
     attempt: Attempt, first: Fraction, *, most: Fraction | None = None, attempts: int = _ATTEMPTS
 ) -> tuple[TrackingProof, ...]:
-    """Guarantees at increasing times: the first time is halved or doubled, then the limit is bisected.
+    """Guarantees at increasing values: the first value is halved or doubled, then the limit is bisected.
 
-    The search ends without a guarantee if halving the time reduces the small gain too little.
+    The search ends without a guarantee if halving the value reduces the small gain too little.
 
     Parameters
     ----------
     attempt : callable
+        Proof for a value: a time [s], or an amplitude [m/s²].
     first : Fraction
-        Time to try first [s].
+        Value to try first.
     most : Fraction, optional
-        Longest time to try [s].
+        Largest value to try.
     attempts : int
         Largest number of attempts.
     """

@@ -249,7 +249,8 @@ def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
     top = degree(polynomial)
     if top % 2 or amount < 0:
         raise PolynomialError(
-            f"a margin needs a polynomial of even degree and must be positive. Received {top}, {margin}."
+            "a margin must be positive, and needs a polynomial of even degree. "
+            f"Received the margin {margin} and the degree {top}."
         )
     powers = {tuple(top * (i == j) for j in range(size)): Fraction(1) for i in range(size)}
     if any(sum(e) != top for e in polynomial):

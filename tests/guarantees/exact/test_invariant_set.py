@@ -522,8 +522,11 @@ _ROW = (F(1),) * 7
             lambda s: {"between": (((len(s.facets), *s.between[0][0][1:]), *s.between[0][1:]), *s.between[1:])},
             r"a basis must be \d indices of facets, each at least 0 and below \d+ .* Received \(",
         ),
-        (lambda s: {"inputs": (F(-1), *s.inputs[1:])}, "inputs must be given, 0 or more each .* Received -1"),
-        (lambda s: {"inputs": ()}, "inputs must be given, 0 or more each .* Received none"),
+        (
+            lambda s: {"inputs": (F(-1), *s.inputs[1:])},
+            "bounds of the inputs must be given, and each must be 0 or more, .* Received -1",
+        ),
+        (lambda s: {"inputs": ()}, "bounds of the inputs must be given, and each must be 0 or more, .* Received none"),
     ],
 )
 def test_the_condition_that_a_set_misses_is_named(wrong, said):

@@ -380,7 +380,7 @@ STARTED = replace(STARTED, law=replace(STARTED.law, first=((Fraction(1), Fractio
         (lambda: qd.guarantee(bearing()[0], "cta", gains=[[1, 1]], step="1"), "do not apply to an uncertain plant"),
         (lambda: qd.UncertainPlant(A=[[1, 2]], B=[[1]]), "matrix A of a plant must be 1 x 1"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"v": (1, 2)}), "gains of a plant must be of u1"),
-        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"u1": (2, 1)}), "least, then the largest"),
+        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"u1": (2, 1)}), r"\(least, largest\)"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], noise={"y1": -1}), "noise and start must be 0 or more"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], disturbances={"d": ([1], -1)}), "must be 0 or more"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], loads={"l": ([1], [1], 1)}), "a shift that is not measured"),

@@ -69,8 +69,8 @@ ROWS = {"cta": (3e-4, 4.2e-5), "dia": (3e-4, 4.2e-5), "1/10": (3.6e-4, 5e-5), "1
     ("slopes", "remainder", "end"),
     [
         ((F(1), F(1)), F(0), "its implicit step is deadbeat, e1 + T_s·w = 0: its pressures"),
-        ((F(1), F(1)), F(1, 9), "its implicit step ends at w = -γ·e1/T_s with γ from 1 to 1, up to 0.12 m/s"),
-        ((F(1, 2), F(1)), F(0), "its implicit step ends at w = -γ·e1/T_s with γ from 0.5 to 1, up to 0 m/s"),
+        ((F(1), F(1)), F(1, 9), "its implicit step ends within 0.12 m/s of w = -γ·e1/T_s, with γ from 1 to 1"),
+        ((F(1, 2), F(1)), F(0), "its implicit step ends within 0 m/s of w = -γ·e1/T_s, with γ from 0.5 to 1"),
     ],
 )
 def test_an_implicit_step_is_deadbeat_with_slopes_1_and_no_remainder(slopes, remainder, end):
