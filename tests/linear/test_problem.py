@@ -133,6 +133,10 @@ def unit_problem(**ranges):
     return LinearProblem(stiffness=F(1), damping=F(1), sectors=sectors)
 
 
+def test_the_nominal_plant_has_both_integrals_and_no_feedback():
+    assert unit_problem().nominal() == ((0, 1, 0, 0), (-1, -1, 0, 0), (1, 0, 0, 0), (0, 0, 1, 0))
+
+
 def exact_form(problem, gains, vertex):
     """Θ with AᵀΘ + ΘA = −1 at a vertex, rounded."""
     A = np.array(problem.loop(vertex, gains), dtype=float)
