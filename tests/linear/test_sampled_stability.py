@@ -197,3 +197,22 @@ def test_results_for_a_period_are_plain_values_and_none_where_nothing_is_known()
     undecided = module.VaryingVerdict(verdict=Verdict.UNDECIDED, step=F(1))
     unknown = module.SampledStability(verdict_at_step=undecided, longest=None, radius=float("nan")).to_dict()
     assert [unknown[key] for key in ("radius", "witness", "largest_step", "refuted_step")] == [None] * 4
+
+
+@pytest.mark.parametrize("valid", [True, False])
+@pytest.mark.parametrize("search", ["delay", "clock"])
+def test_what_a_solver_proposes_is_a_proof_only_if_it_holds_exactly(search, valid, monkeypatch):
+    asked = []
+    monkeypatch.setattr(module, "proposed", lambda *_: [PLUS[:4], PLUS[:3]] if search == "delay" else [PLUS, PLUS])
+    monkeypatch.setattr(module, "rounded", lambda matrix, bits: tuple(row[: len(matrix)] for row in matrix))
+    for kind in (DelayProof, ClockProof):
+        monkeypatch.setattr(kind, "holds", lambda self, *_: asked.append(self) or valid)
+    if search == "delay":
+        found = module.delay_proof(PROBLEM, GAINS, F(1, 2))
+        ends = [(proof.longest,) for proof in asked]
+    else:
+        found = module.clock_proof(PROBLEM, GAINS, (F(1, 3), F(1, 2)))
+        ends = [(proof.shortest, proof.longest) for proof in asked]
+    tried = 1 if valid else len(module.BITS)
+    assert ends == [(F(1, 2),) if search == "delay" else (F(1, 3), F(1, 2))] * tried
+    assert found == (asked[0] if valid else None)
