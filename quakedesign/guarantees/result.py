@@ -160,7 +160,7 @@ class PlantGuarantee(Guarantee):
     compensation: None = None
 
     def lines(self) -> list[str]:
-        """Lines of text: the guarantee, then changes of the law."""
+        """Lines of text: the guarantee, then the notes of its proof."""
         return self.proof.statement() if self.proof.available else super().lines()
 
     @property

@@ -300,7 +300,7 @@ class Controller(Law):
 
     @property
     def feedforward(self) -> FeedForward:
-        """Feed-forward of the nominal plant, added to ν."""
+        """Feed-forward from a plant model, added to ν [m/s²]."""
         return NONE
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Feed-forward terms of ν from the nominal plant."""
+"""Feed-forward terms of ν from the nominal plant or the uncertainty box."""
 
 from dataclasses import dataclass
 from fractions import Fraction

@@ -59,7 +59,7 @@ def sound_states(states: Mapping[sp.Symbol, int], domain: str) -> dict[sp.Symbol
 def sound_field(
     field: Mapping[sp.Symbol, sp.Expr], symbols: Iterable[sp.Symbol], states: Iterable[sp.Symbol]
 ) -> dict[sp.Symbol, sp.Expr]:
-    """Rate of every state, in the order of the states; SymPy's own signs and absolute values as signed powers.
+    """Rate of every state, in the order of the states; SymPy's own signs and absolute values become power functions.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class LoopField:
     domain : str
         ``"cells"`` for signed powers, ``"reals"`` for polynomials.
     roots : mapping of Symbol to Symbol
-        Symbols that stand for the positive square root of a gain.
+        Symbols that stand for the positive square root of a gain or constant.
     units : mapping of Symbol to Expr
         Factor by which a state is multiplied to give its error, in gains, constants and roots; 1 if omitted.
 
@@ -171,8 +171,9 @@ class LoopField:
     ------
     ParameterError
         For duplicate names or names that a certificate file does not admit, an unknown domain, states declared with a
-        sign, weights that are not integers from 1 to 12, a rate that is missing, inexact or contains an unknown symbol,
-        a root of anything but a gain or constant, a unit of anything but a state.
+        sign, none or more than 6 of them, weights outside 1 to 12 (other than 1 on `reals`), a rate that is missing,
+        superfluous, inexact or contains an unknown symbol, a root of anything but a gain or constant, a unit of
+        anything but a state or with symbols other than gains, constants and roots.
     """
 
     states: dict[sp.Symbol, int]

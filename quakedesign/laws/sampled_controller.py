@@ -207,11 +207,11 @@ class SampledController(Controller):
         return ("-",) * len(self.law.states) + (RestLimit.UNITS if self.rest_limit else ())
 
     def pressure(self, signals: Signals) -> sp.Expr:
-        """Cz + Dy, at rest within the limit [Pa]."""
+        """Cz + Dy plus the terms in r and r′, at rest within the limit [Pa]."""
         return self._decided(signals)[0]
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
-        """(Fz + Gy − z)/T_s plus the law's response to the limit, and the rates of the limit's states."""
+        """(Fz + Gy − z)/T_s, with terms in r and r′ and the response to the limit; then rates of the limit's states."""
         cut, after = self._decided(signals)[1:]
         z, seen, period = signals.integrals, self._read(signals), to_sympy(self.step)
         applied = self.law.applied or (Fraction(0),) * len(self.law.states)
@@ -221,7 +221,7 @@ class SampledController(Controller):
         return (*rates, *((new - old) / period for new, old in zip(after, z[len(rates) :], strict=True)))
 
     def _decided(self, signals: Signals) -> tuple[sp.Expr, sp.Expr, tuple[sp.Expr, ...]]:
-        """Applied pressure, its excess over the commanded one divided by T_s, and the next states of the limit."""
+        """Applied pressure [Pa], its excess over the commanded one per T_s [Pa/s], next states of the limit."""
         commanded = _combined((*self.law.output, *self.law.feedback), self._read(signals))
         commanded += self._of_reference(signals)[-1]
         if self.rest_limit is None:

@@ -38,7 +38,7 @@ class SlidingMode(Controller):
     divisor : Fraction
         μ0N̂0 of eq. ps [m²/kg].
     feedforward : FeedForward
-        Terms of the nominal plant that are added to ν; none by default.
+        Terms from a plant model that are added to ν [m/s²]; none by default.
     sampling : Sampling, optional
         Sampling of a sampled law; None for the law in continuous time, which may run under any scheme.
     """

@@ -221,7 +221,10 @@ class LinearProblem:
         return self.sectors.row_bounds
 
     def scales(self, slip: Fraction | float | str = 1) -> ProblemScales:
-        """Units that make ω_n and the authority 1: time 1/ω_n, a slip [m], pressure slip·ω_n²/b."""
+        """Units that make ω_n and the authority 1: time 1/ω_n, a slip [m], pressure slip·ω_n²/b.
+
+        Without a positive stiffness the larger of |η̂| and max √|s| replaces ω_n.
+        """
         k, eta = float(self.stiffness), float(self.damping)
         pace = math.sqrt(k) if k > 0 else max(abs(eta), math.sqrt(max(map(abs, map(float, self.sectors.slip)))), 1e-300)
         time, size = rational(f"{1 / pace:.13e}"), rational(slip, "slip")

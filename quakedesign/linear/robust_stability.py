@@ -46,7 +46,7 @@ class QuadraticProposal:
 
 
 class CommonQuadratic:
-    """Search for one V for all vertices of a polytope, in modal coordinates; modelled once for every decay rate."""
+    """Search for one V for all vertices of a polytope, in modal coordinates; one model serves all decay rates."""
 
     def __init__(self, polytope: Polytope) -> None:
         import cvxpy as cp
@@ -197,7 +197,7 @@ class SlopeMargin:
     # A constant s of limit·s_max, with β = `limit_beta`, is not asymptotically stable (Routh–Hurwitz, exact)
     limit: UpperBound
     limit_beta: Fraction
-    circle: float  # What the circle criterion allows for time-varying s at `limit_beta`, in floats
+    circle: float  # What the circle criterion allows for time-varying s at `limit_beta`, over s_max [-], in floats
     slope: Fraction  # s_max [1/s²], see `nominal_slope`
     # The same with the largest effective stress on the way to the target slip (ERRATA 8) [1/s²]
     working_slope: Fraction
@@ -280,7 +280,7 @@ def _largest(prove: Callable[[Fraction], Certificate | None], limit: Fraction) -
 
 
 def _decimal(value: Fraction) -> Fraction:
-    """Value with six digits, at most 4e-6 of it higher: what is then proved is the result itself."""
+    """Value rounded to six digits, at most 4e-6 of it higher; the proof is then attempted for the rounded number."""
     digits = f"{float(value) * (1 - 1e-6):.5e}"
     return Fraction(digits)
 

@@ -80,13 +80,14 @@ class Layer:
 # Effect of the fast modes of a layer on the slip rate at each pressure step: a known jump, and a remainder.
 #
 # **Statement.** Let R be the error of truncating the series after the modes n < N (previous section), E that of a unit
-# step, and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly. With F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k) over the past
-# steps, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is equivalent to
+# step, and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly. With F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k) over the
+# past steps, and e2 = x2 + β0·b·Y, the loop e1′ = e2, e2′ = s0·e1 − w0·e2 + β0·b·(v/b + R) + a is equivalent to
 #
 #     e1′ = x2 + β0·bY,   x2′ = s0·e1 − w0·x2 + β0·v + a − w0·β0·bY,   x2 ← x2 − β0·A·bΔu_k at every step.
 #
 # *Proof.* ∫₀^∞ Σ c_n·e^{−λ_n·t}dt = τ/2, since 1/cosh √(sτ) = 1 − sτ/2 + …; so F(0) = A, and R − Y′ = −A·Σ_k Δu_k·δ(t −
-# t_k). ∎ Y, the future effect of the past steps, is as unknown as R, but λ_N times smaller and not differentiated.
+# t_k). ∎ Y, the future effect of the past steps, is unknown like R, but its bound is that of R over λ_N, and no
+# derivative of Y occurs in the loop.
 #
 # **Bounds.** |F(t)| ≤ |ĉ_N|/λ̂_N·e^{−λ̂_N·t} + 6Nδτ·e^{−λ̂_0·t/2}: the terms c_n/λ_n·e^{−λ_n·t} alternate and decrease
 # as those of E, and the errors of ĉ_n and λ̂_n add at most 6Nδ·e^{−λ̂_0·t/2} to |E|, 2/λ̂_0 < τ.
@@ -99,9 +100,9 @@ class Layer:
 def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
     """A loop of `sampled_error_loop` through a layer, with x2 in place of e2, and Y in place of β0·R.
 
-    The input ``awaited`` is bY divided by the ratio of its bound to that of bR, so that it is at most the output
-    ``left_out`` (times its weight, with zero-order hold at the well). The sampled input ``awaited_told`` is its share
-    in the measurements of the law.
+    The input ``awaited`` [m/s²] is bY divided by a time, the bound of |bY| over that of |bR|. So it has the same bound
+    as bR: the output ``left_out``, with zero-order hold at the well times its decaying weight. The sampled input
+    ``awaited_told`` is the part of bY in the measurements of the law, divided by the same time.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
 
 
 def _share_and_fading(loop: PeriodicLoop, layer: Layer) -> tuple[Fraction, Fading]:
-    """Largest |bY| over the bound of |b·R|, and its decay."""
+    """Bound of |bY| divided by that of |bR| [s], and the decay of |bY|."""
     (own,) = loop.fading.values()
     height, rate, floor = layer.truncation_bound(loop.period)
     awaited = height / rate, floor * layer.time

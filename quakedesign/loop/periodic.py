@@ -26,7 +26,8 @@ class Segment:
     duration : Fraction
         [s], positive.
     ends, past_ends : tuple of Fraction
-        Ends of the pieces of the flow, for bounds of outputs and for past responses: fractions of the duration.
+        Instants, as fractions of the duration, that divide the flow into pieces: `ends` for the bounds of outputs,
+        `past_ends` for the responses to inputs of earlier periods.
     """
 
     jump: Matrix
@@ -41,7 +42,7 @@ class Segment:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Fading:
-    """An input b·w that decays after a jump: |w| ≤ W·(height·e^{−rate·θ} + floor) at a time θ after it.
+    """An input b·w that decays after a jump: |w| ≤ W·(height·e^{−rate·θ} + floor) a time θ after it, W its amplitude.
 
     Attributes
     ----------
@@ -69,7 +70,7 @@ class Fading:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Pulse:
-    """An input b·w that acts only near the jump of a segment, before or after it: |w| ≤ W.
+    """An input b·w of amplitude W, |w| ≤ W, that acts only near the jump of a segment, before or after it.
 
     With I₋ and I₊ the integrals of |w| before and after the jump, I₋/`before` + I₊/`after` ≤ W.
 

@@ -34,7 +34,7 @@ class Friction:
     Attributes
     ----------
     weakening, strengthening : Fraction
-        Largest fall and rise of μ per slip [1/m], both positive.
+        Largest fall and rise of μ per slip [1/m], both 0 or more.
     rate_slope : Fraction
         Largest |Δμ/Δrate| [s/m].
     """

@@ -1,6 +1,7 @@
 """Coupled blocks with rate-and-state friction: seismic cycles, controlled runs, pressure diffusion.
 
-Let ζ be the slip minus the displacement of the far end, N = σ' − p, and S the stiffness matrix. For each block
+Let ζ be the slip minus the displacement of the far end, N = σ' − p, and S the stiffness matrix; τ_0 is the initial
+shear stress, s a further shear stress that depends on time, H the damping. For each block
 
     ζ' = v − v_∞,    mv' = τ_0 − Sζ + s − Nμ(v, θ) − Hv,    θ' as given by the friction law.
 
@@ -240,7 +241,7 @@ class SlidersRun:
     onset_rate, loading_rate : float
         [m/s].
     evaluations : int
-        Number of evaluations of the right-hand side. {undocumented}
+        Number of evaluations of the right-hand side.
     """
 
     times: "np.ndarray"
@@ -392,7 +393,8 @@ def natural_cycles(
     chain : BlockChain
         With rate-and-state friction.
     duration : float, optional
-        [s]; by default until three events have begun, or until the load reaches 640 aσ' of the first block.
+        [s]; by default the shortest for which three events have begun, of those with a load of 10, 20, 40 … 640 aσ' of
+        the first block; else the longest of these.
     loading_rate : float, optional
         v_∞ [m/s]; the reference rate of the friction of the first block unless given.
     inertia : bool

@@ -59,7 +59,8 @@ def natural_earthquake(
     -------
     LoopTrajectory
         Over 90 e-foldings of the unstable eigenvalue, or 30 of them and 10 natural periods if that is longer, or 100
-        natural periods of a stable fault, which stays at rest. The step is at most 2e-3/ω_n. Its metrics are only
+        natural periods of a stable fault, which at pressure 0 stays at rest. The step is at most 2e-3/ω_n. Its metrics
+        are only
         `peak_slip_rate`, `settled_from`, `steps`, `seconds` and, on the stick–slip plant, `time_at_rest_fraction`.
 
     Raises
@@ -67,7 +68,7 @@ def natural_earthquake(
     ParameterError
         If the absolute value of the pressure is not below the effective normal stress.
     SimulationError
-        If the fault is unstable but does not move.
+        If the pressure is 0 and the fault is unstable but does not move.
     """
     fault.require_memoryless("the natural earthquake")
     if not abs(pressure) < fault.effective_normal_stress:

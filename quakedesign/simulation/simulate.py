@@ -83,9 +83,10 @@ def simulate(
         recorded. Friction with a state is stiff: under a controller ``"cvodes"`` (default) or ``"idas"``; without one
         ``"radau"`` is the default.
     duration : float, optional
-        [s]; the operation time unless given, rounded down to whole steps.
+        [s]; the operation time unless given, rounded down to whole steps; for slow sliding under a controller, up.
     samples : int
-        Approximate number of stored instants; metrics are computed from every step.
+        Approximate number of stored instants; metrics are computed from every step. Without a controller and with a
+        friction state: exact number, equidistant, metrics from these alone; every step of the solver if 2000.
     settled_from : float, optional
         Time [s] from which errors are evaluated; by default a quarter of the shorter of operation time and duration.
     progress : callable, optional
@@ -126,7 +127,7 @@ def simulate(
     -------
     Trajectory
         A `LoopTrajectory`; with a friction state a `SlidingRun`, or a `StateTrajectory` without a controller.
-        A run that diverges ends there, with the time in `events` and without metrics.
+        A run that diverges ends there, with the time in `events` and with no metric but, at most, the peak slip rate.
 
     Raises
     ------

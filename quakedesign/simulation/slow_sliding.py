@@ -24,13 +24,13 @@ from quakedesign.simulation.state_plant import Instruments, PressurePath, Slidin
 from quakedesign.simulation.stick_slip import dynamic_rate
 from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion, signal
 
-_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a period, at which a run is recorded
+_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a section of constant held pressure, at which a run is recorded
 PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class SlidingRun(LoopTrajectory):
-    """One controlled run in slow sliding, with four instants per sampling period and without an energy budget.
+    """One controlled run in slow sliding, with four instants per section of constant held pressure, no energy budget.
 
     Attributes
     ----------

@@ -186,7 +186,8 @@ class SmoothProblem:
             stiff problems, with a step end at each instant), or ``"cvodes"`` or ``"idas"`` (implicit, orders 1 to 5;
             nearly linear pieces replace the accepted steps).
         rtol : float
-            Tolerance of one step, relative to variables larger than `scales`, absolute below.
+            Tolerance of one step, relative to variables larger than `scales`, absolute below; with CVODES and IDAS the
+            limit is `FLOOR` times `scales`.
 
         Raises
         ------

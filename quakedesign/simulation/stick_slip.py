@@ -79,7 +79,7 @@ def simulate_state(
         ``"radau"`` (stiff problems, as with inertia), ``"dop853"`` (usually faster without inertia), or ``"cvodes"``,
         ``"idas"`` (stiff problems; independent implementations).
     rtol : float
-        Tolerance of one step, 1e-13 … 1e-3; absolute for the logarithms of rate and state.
+        Tolerance of one step, 1e-13 … 1e-3; relative to variables that exceed their scale, which is 1 for logarithms.
 
     Raises
     ------
@@ -422,7 +422,7 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> I
 
 
 def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
-    """Run at a loading rate [m/s], initially near steady sliding, until three events have begun.
+    """Run at a loading rate [m/s], initially near steady sliding, doubled in duration until three events have begun.
 
     Without repeated events the run ends at a load of at most 1000 aσ'; the run of a stable fault ends at 10 aσ'.
     `settings` as in `locked`.

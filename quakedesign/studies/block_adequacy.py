@@ -89,7 +89,7 @@ def one_block(
     coupling : number, optional
         As in `UncertainPlant.from_blocks` [1/s²].
     step : str, float or Fraction, optional
-        T_s; by default the fault's.
+        T_s [s]; by default the fault's.
     """
     setup = LoopSetup(step=rational(fault.sampling_time) if step is None else step)
     proofs: dict[int, PlantProof | NoProof] = {}

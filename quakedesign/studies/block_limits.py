@@ -1,15 +1,21 @@
 """Performance limits of a fault of several blocks: unstable modes that no well reaches.
 
 **Limit.** Let every block weaken at its steepest slope, with its least damping, and let ℓ be a left eigenvector of an
-unstable pole p of this linear plant: z = ℓ·(x, x′) obeys z′ = pz + ℓ·(φ + βbS(P − P*)). Let φ be constant, of size H
+unstable pole p of this linear plant: z = ℓ·(x, x′), x the slips, obeys z′ = pz + ℓ·(φ + βbS(P − P*)), where ℓ· takes
+the entries of ℓ that belong to x′. Here φ are the disturbing accelerations, βb the input gains of the blocks, S the
+shares of the wells in the block pressures, P the well pressures and P* those of balance. Let φ be constant, of size H
 and with the signs of ℓ. Then, as long as friction weakens at this slope, z grows from 0 unless Σ_j|ℓ·βb_j||P_j − P*_j|
 reaches HΣ|ℓ_i|: every controller needs pressures this far from balance, with the largest β. A mode that no well reaches
 grows. For diffusing pressures q, q′ = Fq + G(P − P*) from q = 0, S(p) = (pI − F)⁻¹G replaces S: z grows
 unless the integral of e^{−pt}ℓ·(φ + βbq) is 0; the integral of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
 
 Blocks in slow sliding are linearised like a single block (`limit_theorems`): S_iy_i = −ΣK_ijx_j − W_iz_i +
-μ_iΣs_ijq_j + d_i, s the shares, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i). Theorem 2 there holds for ζ = ℓ·(x, z) of each
-mode with a real pole, with Σ_i|ℓ·e_i| and Σ_j|ℓ·b_j| in place of the gains of stress and pressure, if all wells act
+μ_iΣs_ijq_j + d_i, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i), where x_i is the slip error, y_i = ln(v_i/V), z_i the
+logarithm of the friction state over its steady value, S_i the direct strength, W_i the weakening, K the stiffness, μ_i
+the friction coefficient, s the shares, q_j the pressures, d_i the stress, ρ_i the rate of the state.
+Theorem 2 there holds for ζ = ℓ·(x, z) of each
+mode with a real pole, with Σ_i|ℓ·e_i| and Σ_j|ℓ·b_j| in place of the gains of stress and pressure, e_i and b_j being
+the vectors by which the stress d_i and the pressure q_j enter (x, z)′, if all wells act
 through diffusion paths of one diffusion time; theorem 1 holds for each y_i, with stresses that change sign on all
 blocks.
 """

@@ -76,11 +76,11 @@ def certified(
     name : str
         Control law.
     lipschitz : number or text, optional
-        L̄. Not needed to maximise it; if given nevertheless, the smallest scale λ for it is reported.
+        L̄ [m/s³]. Not needed to maximise it; if given nevertheless, the smallest scale λ for it is reported.
     maximize : str, optional
         One of `MAXIMIZE`: L̄; the upper end b_M of the range of β; f in [b/f, b·f]; κ of the decay.
     gain_range : tuple of two
-        b_m and b_M; one value b twice to maximise the range.
+        b_m and b_M [-]; one value b twice to maximise the range.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _at(name: str, gains: tuple[Number, ...], lipschitz: str, ends: Ends, *, dec
 
 
 def _excluded(loop: Loop) -> list[int]:
-    """Degrees for which an exact dual excludes every V that is a sum of even signed monomials; without gaps.
+    """Degrees, up to the first failure, for which an exact dual excludes every V of even signed monomials.
 
     Only families that take a few seconds.
     """
@@ -275,7 +275,7 @@ _HALVINGS = 6
 
 
 def on_trajectory(lipschitz: float, run: Trajectory) -> Premise | None:
-    """Largest |Δh/Δt| of a run against the certified bound; None for a run that diverged."""
+    """Largest |Δh/Δt| of a run against the certified bound [m/s³]; None for a run that diverged."""
     measured = run.metrics.max_h_rate
     if measured is None:
         return None
@@ -290,9 +290,9 @@ def on_trajectory(lipschitz: float, run: Trajectory) -> Premise | None:
 
 
 def largest_sampling_time(fault: Fault, controller: Controller, lipschitz: float) -> float | None:
-    """Largest T_s [s] for which a run stays inside |Δh/Δt| ≤ lipschitz, by bisection on a window of 4000 T_s.
+    """Largest T_s [s], at most the fault's, for which a run stays inside |Δh/Δt| ≤ lipschitz [m/s³], by bisection.
 
-    Measured only on the first part of the task, so an indication; None if even a thousandth of T_s is too long.
+    Measured only on the first 4000 of the fault's T_s, so an indication; None if even 1/256 of that T_s is too long.
     """
     window = min(_WINDOW * fault.sampling_time, fault.reference.operation_time)
 

@@ -106,7 +106,10 @@ class Entry:
         return proof if proof is not None and proof.available else None
 
     def to_dict(self) -> Json:
-        """JSON-able facts: exact quantities as strings, measured ones as numbers, SI; None if a report fills it."""
+        """JSON-able facts: exact quantities as strings, measured ones as numbers, SI.
+
+        None also for entries that a report fills later.
+        """
         design = self.design
         return {
             "guarantee": self.guarantee.to_dict() | {"certificate": None} if self.guarantee else None,

@@ -105,7 +105,7 @@ def printed(comparison: Compared) -> list[Json]:
 # Trade-off between certified peak and tracking error of designs for the sampled loop.
 
 ROOMS = (1.2, 1.4, 1.6, 2.2)
-"""Slip-rate errors admitted for tracking, over the smallest certified one; the default design uses 1.6."""
+"""Slip-rate errors admitted for tracking, as multiples of the smallest certified one; the default design uses 1.6."""
 _PERIODS = 32  # duration of a run in natural periods; errors are evaluated in its second half
 
 

@@ -174,7 +174,7 @@ class Limits:
     slip_error : UpperBound or None
         Bound of the slip error for the smallest slip-rate error [m]; None for any bounded slip error.
     peak_slip_rate_error, largest_step, largest_delay, largest_diffusion_time, farthest_well, smallest_pressure : Limit
-        Limits; the last three and the delay are for the fault's T_s.
+        Limits; all but `largest_step` are for the fault's T_s.
     proved : tuple of TrackingProof
         Guarantees of the designs without delay, ordered by T_s.
     sensing : Sensing

@@ -19,7 +19,7 @@ from quakedesign.synthesis import Design
 
 PUBLISHED_SCHEMES = ("continuous", "explicit", "compensated")
 DECADES = 3
-PERIODS = 650  # duration of the runs for the orders, in the longest T_s
+PERIODS = 650  # duration of the runs that measure the orders, as a multiple of the longest T_s
 SHARE = 1 / 16  # duration of a run for the sensitivity to noise, as a share of the task
 UNCERTAIN = "ten-percent"
 Tell = Callable[[str, float], None]

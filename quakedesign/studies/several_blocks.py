@@ -109,7 +109,8 @@ def _growth(chain: BlockChain) -> float | None:
 def natural_peak(chain: BlockChain) -> float | None:
     """Largest slip rate of blocks without control [m/s], released as by `natural_earthquake`.
 
-    None if no mode is unstable, for friction with a state, and for healing friction, which runs of blocks do not model.
+    None if no mode is unstable or its modes are not resolved, if the peak is only that due to the small acceleration,
+    for friction with a state, and for healing friction, which runs of blocks do not model.
     """
     beyond = chain.has_state or any(block.friction.rest_excess for block in chain.blocks)
     pole = None if beyond else _growth(chain)
@@ -141,7 +142,7 @@ class ChainRun:
         return self.run is not None and not self.run.reversed and not self.run.opened
 
     def row(self) -> list[str]:
-        """Table row, largest values of all blocks: law, proved slip rate and slip, those of the run, pressures."""
+        """Table row, largest values of all blocks: law, proved rate and slip errors, those of the run, pressures."""
         if self.run is None:
             return [self.controller, "none", *[""] * 5]
         outputs, N = self.proof.claims.outputs, len(self.chain.blocks)

@@ -249,7 +249,7 @@ def design(
         method or derived from one of these.
     setup : LoopSetup
         T_s in place of the fault's; delay, lag, diffusion path and measured signals of an e-LQR; bounds of measurement
-        errors. Rate-and-state friction: by default a diffusion path of 0.1 D_c/V.
+        errors. Rate-and-state friction: by default a diffusion path with L²/D = 0.1 D_c/V [s], V the sliding rate.
     feedforward : str
         Feed-forward of a sliding mode from a plant model: ``"none"``, ``"nominal"`` or ``"centred"``, see
         `quakedesign.laws.feed_forward`. It enlarges the certified domain in continuous time and has no sampled
@@ -370,7 +370,7 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **ent
     fault : Fault
     controller : Controller
     setup : LoopSetup
-        Loop setup of a sampled linear law; not used for a sliding mode.
+        Loop setup of a sampled linear law; not used for a sampled sliding mode, rejected for a law in continuous time.
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 

@@ -339,7 +339,7 @@ class Samples(DesignMethod[SampledController]):
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingProof | NoProof:
-        """Guarantee at the law's T_s, with each of its delay, lag and diffusion that the loop setup does not give."""
+        """Guarantee at the law's T_s; delay, lag and diffusion are those of the law unless the setup gives them."""
         law, step = controller.law, controller.step
         if setup.step is not None and setup.step != step:
             own, requested = apart(step, setup.step)

@@ -40,7 +40,7 @@ class TrialSampling:
     fault : Fault
     law : type of Controller
     gain_range : tuple of two
-        b_m and b_M of the required proof.
+        Smallest and largest β [-] of the required proof.
     scale, divisor : Fraction
         λ and μ0N̂0 [m²/kg] of the controller; λ scales |h'| ≤ 1 of the base gains to the required bound.
     metric, scheme : str
@@ -99,7 +99,7 @@ def sampling(
     lipschitz : number or text, optional
         L̄ [m/s³]; by default 1.1 times the requirement of the fault's reference and disturbance.
     gain_range : tuple of two, optional
-        b_m and b_M; those of the fault's box unless given.
+        Smallest and largest β [-]; those of the fault's box unless given.
     metric : str
         One of `Metrics`, to be minimised.
     scheme : str

@@ -237,7 +237,7 @@ def _of_riccati(loop: Loop, designed: RiccatiDesign) -> Certificate | None:
 
 
 def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certificate | None:
-    """Quadratic V for a linear loop: search in two scalings, then V = xᵀΘx, decided exactly.
+    """Quadratic V for a linear loop, decided exactly: two searches with different scalings, then V = xᵀΘx.
 
     Parameters
     ----------

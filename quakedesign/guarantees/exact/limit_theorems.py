@@ -91,7 +91,7 @@ class SlidingPush:
         return ball(self.model.state_rate) * (ball(trace) + ball(trace**2 - 4 * kappa).sqrt()) / 2
 
     def smallest_rate_error(self, step: Fraction) -> LowerBound:
-        """V·D·h [m/s] of theorem 1 for samples a step [s] apart, h at the end of a period where it is larger."""
+        """V·D·h [m/s] of theorem 1 for samples a step [s] apart, with the larger of h(0) and h(T)."""
         kappa, beta = self._ratios
         flow = ((-kappa, -beta, _ONE), (kappa, beta - 1, -_ONE), (_ZERO, _ZERO, _ZERO))
         with ctx.workprec(_BITS):
@@ -173,7 +173,7 @@ _IMPOSSIBILITY_ZERO = Fraction(0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SmallestPeak:
-    """Lower bounds of both errors for every controller.
+    """Lower bound X of the slip-rate error under every controller that keeps the slip error within E.
 
     Attributes
     ----------
@@ -319,7 +319,10 @@ def smallest_stick_slip_rate(task: FaultPlant, step: Fraction) -> LowerBound | N
 
 
 def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
-    """T + θ [s] beyond which every controller fails, without a diffusion path; None without a limit."""
+    """T + θ [s] beyond which every controller fails, without a diffusion path; None without a limit.
+
+    `withdrawal` is P [Pa].
+    """
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
     def longest(plant: _DisturbedPlant | SlidingPush) -> arb:
@@ -330,7 +333,10 @@ def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> Up
 
 
 def longest_diffusion(task: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
-    """L²/D [s] beyond which every controller with samples T apart fails; None without a limit."""
+    """L²/D [s] beyond which every controller with samples T apart fails; None without a limit.
+
+    `withdrawal` is P [Pa], `step` is T [s].
+    """
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
     def longest(plant: _DisturbedPlant | SlidingPush) -> arb:
@@ -356,7 +362,7 @@ def nearest_proved_well(diffusion_time: LowerBound, diffusivity: Fraction) -> Lo
 
 
 def smallest_withdrawal(task: FaultPlant | SlidingPush, step: Fraction) -> LowerBound | None:
-    """P [Pa] below which every controller with samples T apart fails; None without a limit."""
+    """P [Pa] below which every controller with samples T = `step` [s] apart fails; None without a limit."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
         needed = (ball(task.amplitude / plant.authority) * (plant.pole * ball(step)).exp() for plant in _pushed(task))

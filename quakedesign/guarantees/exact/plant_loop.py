@@ -42,7 +42,7 @@ MOST_LOOP_STATES = 96
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MatrixLaw:
-    """Sampled law u = Cz + Dy, z⁺ = Az + By with z = 0 initially; u acts `delay` later."""
+    """Sampled law u = Cz + Dy, z⁺ = Az + By with z = 0 initially, period `step` [s]; u acts `delay` [s] later."""
 
     step: Fraction
     delay: Fraction

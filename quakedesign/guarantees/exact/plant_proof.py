@@ -68,7 +68,7 @@ class PlantProof(Proof[Row]):
     remarks : mapping of str to str
         As in `UncertainPlant`.
     notes : tuple of str
-        Changes of the law by rounding to exact numbers.
+        Changes of the law by rounding to exact numbers, or for blocks in slow sliding the bound of their slip rates.
     """
 
     kind: ClassVar[str] = UNCERTAIN_PLANT
@@ -113,7 +113,7 @@ class PlantProof(Proof[Row]):
         return all(a <= b for a, b in zip(bounds, (*self.claims.outputs, *self.claims.controls), strict=True))
 
     def statement(self) -> list[str]:
-        """Lines of text: the statement, then the changes of the law."""
+        """Lines of text: the statement, then the notes."""
         return [f"proved: {self.sentence()}", *self.notes]
 
     def sentence(self) -> str:

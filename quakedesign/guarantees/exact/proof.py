@@ -19,10 +19,11 @@ class Proof(ABC, Generic[B]):
     """Claims about one loop with their check; abstract base, with one subclass for each theorem.
 
     **Principle.** A theorem bounds the claimed quantities for all t, and the claims follow if each bound is at most its
-    claim. Two theorems assume the claims up to time t: that of slow sliding bounds all inputs by them, on every cell of
-    its box of constants, that of tracking an implicit step or a slowly varying input gain. Then each bound must be
-    below its claim, or at most equal to it where the input depends on earlier samples alone. As the quantities are
-    continuous and initially within the claims, they stay within them.
+    claim. Two theorems assume the claims up to time t. The theorem of slow sliding bounds all inputs by them, on every
+    cell of its box of constants. The theorem of tracking bounds by them the effect of an implicit step or of a slowly
+    varying input gain, if there is one. Then each bound must be below its claim, or at most equal to it where the
+    input depends on earlier samples alone. As the quantities are continuous and initially within the claims, they
+    stay within them.
 
     Attributes
     ----------
@@ -125,7 +126,7 @@ class NoProof:
     reason : str
         Names the quantity that fails.
     small_gain : UpperBound or None
-        Small gain, at least 1; None where something else fails, such as the stability of the nominal loop.
+        Small gain [-], usually at least 1; None where something else fails, such as the stability of the nominal loop.
     required_change : Fraction, optional
         Pressure change between samples that the pump would have to make [Pa].
     only_pressure_fails : bool

@@ -1,7 +1,8 @@
 """Robust small-gain theorem for slow sliding with rate-and-state friction: v ≤ Ve^Y.
 
-**Plant.** Per unit of area, with v = Ve^y, θ = (D/V)e^z, the slip error x, the pressure error q = p − p* and N = σ′ −
-p,
+**Plant.** Per unit of area, with v = Ve^y, θ = (D/V)e^z, the slip error x, the pressure error q = p − p*, N = σ′ − p
+and a shear stress disturbance s, |s| ≤ S,
+
 
     mVe^y·y′ = s − ŝ,    ŝ = N(ay + bz) + HV(e^y − 1) + Kx − μ*q,    x′ = V(f − ω),    z′ = −ρ(f + g),
 

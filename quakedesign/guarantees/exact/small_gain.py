@@ -156,7 +156,8 @@ class Bounds:
     stepped : Fraction, optional
         b times the change of the commanded pressure between samples [m/s²]; None where it is not needed.
     small_gain : Fraction
-        Upper bound of the spectral radius of M [-], below 1; for aperiodic sampling the largest Σ c·Y/W, at most 1.
+        Upper bound of the spectral radius of M [-], below 1; for aperiodic sampling the
+        largest Σ c·Y/W over the inputs, at most 1, with bounds Y of the outputs and W of the input.
     """
 
     available: ClassVar[Literal[True]] = True

@@ -1,4 +1,4 @@
-"""Files of proofs on the stick–slip plant (proofs/FORMAT.md)."""
+"""Files of proofs on the stick–slip plant (proofs/FORMAT.md); numbers are in SI units."""
 
 from fractions import Fraction
 

@@ -122,7 +122,10 @@ class StickSlipProof(Proof[StickSlipClaims]):
         return LowerBound((most - disturbance) / self._per_healing)
 
     def beside_healing(self, task: FaultPlant, healing: Fraction) -> tuple[FaultPlant, LowerBound | None]:
-        """Task with the disturbance of the claims, and the covered healing if it is too small."""
+        """Task with the disturbance of the claims, and the covered healing if it is too small.
+
+        A task with a larger disturbance is returned unchanged, with None.
+        """
         if task.amplitude > self.task.amplitude:
             return task, None
         covered = self.covered_healing(task.amplitude)

@@ -66,7 +66,7 @@ class _Floats:
     """A loop from sample to sample, as in `quakedesign.guarantees.exact.invariant_set`.
 
     `inputs` are continuous-time inputs and `sampled` inputs at samples, both in the order of the channels, else zeros.
-    `force` is the size of the acceleration for a rate-limited disturbance, which has no acceleration input, else 0.
+    `force` is the bound of a rate-limited disturbance [m/s²], which is not part of the input ``acceleration``; else 0.
     """
 
     flow: np.ndarray
@@ -238,7 +238,7 @@ def _rounded_set(task: FaultPlant, sampled_loop: SampledLoop, raised: float) -> 
             reason = f"small gain {gain:.3g} for the given range of intervals, must be below 1"
             return NoProof(reason=reason, small_gain=gain)
         bounds = np.maximum(more, loop.own) * raised
-        again = loop.force and turn < _ANEW  # enough turns for the inputs' effects on each other's sets
+        again = loop.force and turn < _ANEW  # new normals in the first turns, while ratios of bounds change
         following = loop.sides(bounds, _MANY, raised) if again else _Sides.still(loop, sides.facets, bounds, raised)
         if following is None:
             break

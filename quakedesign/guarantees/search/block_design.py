@@ -165,9 +165,11 @@ def rounded(values: np.ndarray, digits: int = _DIGITS) -> tuple[Row, ...]:
 def estimate(
     part: LinearPart, law: MatrixLaw, slowest: float = _SLOWEST, forget: int = _FORGET
 ) -> tuple[float, np.ndarray | None]:
-    """Small gain and bounds of a loop without delay, in floats; None if a condition of the theorem fails.
+    """Small gain and bounds of a loop without delay, noise and initial states, in floats.
 
-    Also None if an eigenvalue of the map of a period exceeds `slowest` in magnitude. Responses are summed over at most
+    Bounds are None if the small gain is 1 or more; the conditions `within` of sectors are not checked. They are also
+    None if an eigenvalue of the map of a period exceeds `slowest` in magnitude; 100 times this magnitude then replaces
+    the small gain. Responses are summed over at most
     `forget` periods.
     """
     loop = part.loop(law)

@@ -214,7 +214,7 @@ def sliding_mode(
     gains : tuple of str
         Base gains (λ = 1); empty for the first ones that a design tries.
     scheme : str
-        Discretisation scheme; only ``compensated`` has a guarantee.
+        Discretisation scheme; this function finds a guarantee for ``compensated`` alone.
     objective : str
         ``tracking`` or ``peak``.
     setup : ExactSetup

@@ -42,7 +42,7 @@ _FEW = 2
 
 @dataclass(frozen=True, slots=True)
 class BoundsEstimate:
-    """Estimated bounds, and the slip error [m] per drift of p* [m/s³]."""
+    """Estimated bounds, and the slip error [m] per drift b·dp*/dt [m/s³]."""
 
     bounds: Bounds | NoProof
     drift_gain: float
@@ -223,7 +223,7 @@ _FORGOTTEN_POLE = 100  # a trajectory ends when the initial state has decayed by
 
 
 def own_poles(law: LinearLaw) -> np.ndarray:
-    """Eigenvalues of F, the integral's first: poles of the law while the fault is at rest."""
+    """Eigenvalues of the law's `update`, nearest to 1 (integral) first: its poles while the fault is at rest."""
     poles = np.linalg.eigvals(np.array(law.update, dtype=float).reshape((len(law.states),) * 2))
     return np.asarray(poles[np.argsort(np.abs(poles - 1), kind="stable")])
 

@@ -365,7 +365,9 @@ FAVOURED = Weights(slip=4.4e-3, state=5.5e-3, pressure=344.0, slip_noise=5.9e3, 
 def sliding_law(
     model: SlidingModel, step: Fraction, *, diffusion: Fraction = _ZERO, weights: Weights = FAVOURED
 ) -> LinearLaw:
-    """LQG compensator of the slip error with zero-order hold and a diffusion path.
+    """LQG compensator of the slip error with zero-order hold over `step` [s].
+
+    It contains a diffusion path of L²/D = `diffusion` [s], unless that is 0.
 
     The pressure is relative to the equilibrium pressure of the reference. States: predicted x, z, the modes of the path
     and the level, all scaled.

@@ -80,9 +80,9 @@ def sliding_block_guarantee(
 def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Fraction, UpperBound, PlantProof]:
     """Lag [s], largest shear stress [Pa] and bound of |ln(v/V)| of a guarantee for blocks.
 
-    The last result is the guarantee with the names of these blocks. The claims Z (log state) and W (pressure) follow
-    from the sectors of its plant, and Q (pressure change) from the bounds of its pressures; for a smaller Q its sectors
-    and disturbances still cover the blocks.
+    The last result is the guarantee with the names of these blocks. The claims Z (log state) and W (shear stress by
+    springs and wells) follow from the sectors of its plant, and Q (pressure minus the plan) from the bounds of its
+    pressures; for a smaller Q its sectors and disturbances still cover the blocks.
 
     Raises
     ------

@@ -181,8 +181,10 @@ def searched_sliding(
     Parameters
     ----------
     task : SlidingPlant
-    step, log_rate, setup
-        As in `designed_sliding`.
+    step, log_rate : Fraction
+        T_s [s], and the bound of |ln(v/V)| [-].
+    setup : ExactSetup
+        With a lag or a diffusion path.
     near : array, optional
         Further start of the search.
     enough : float

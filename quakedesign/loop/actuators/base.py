@@ -44,7 +44,8 @@ class Stage(ABC):
     options : tuple of Option
         Command-line options; the first, if not at its default, adds the stage. Empty: a stage for Python only.
     rank : int
-        Rank in the signal order on the command line, among the sampled or among the dynamic stages.
+        Position in the signal order, lower first, of a stage that options or `Actuator.completed` add; sampled stages
+        precede dynamic ones whatever their rank.
     """
 
     name: ClassVar[str]

@@ -30,7 +30,8 @@ class Actuator:
     Raises
     ------
     ParameterError
-        For an entry that is no stage, or another order.
+        For an entry that is no stage, a dynamic stage before a sampled one, or more than one stage that stores fluid or
+        that acts between samples.
     """
 
     stages: tuple[Stage, ...] = ()

@@ -80,7 +80,7 @@ class Inclusion:
     free : Expr
         e2 [m/s], the part that does not depend on the end of the step.
     pull : Expr
-        T_s·B0·p [m/s], non-increasing in `end_slip` and `end_rate`.
+        T_s·B0·(p − p_f) [m/s], see `backward_euler`; non-increasing in `end_slip` and `end_rate`.
     slip_error, step : Symbol
         e1 [m], T_s [s].
 

@@ -128,16 +128,17 @@ def _function(unit: Differentiator) -> ca.Function:
 # Joint condition on λ_d, the sampling period and a law.
 #
 # A differentiator of order n_d = 1 needs |x1''| < λ_d, while the errors ε1, ε2 of its estimates, which grow with λ_d,
-# act through the law on x1'' itself. With A the largest |x1''| of the loop with exact states and B the largest input
-# gain,
+# act through the law on x1'' itself. With A the largest |x1''| [m/s²] of the loop with exact states and B the largest
+# input gain [m²/kg],
 #
 #     A + B·max |p(e1 + ε1, e2 + ε2) − p(e1, e2)| < λ_d
 #
-# is self-consistent. For signed powers up to 1 the difference is largest across the origin, at e = −ε/2. For a
-# linear law the left-hand side grows with λ_d as ε does, so that the sampling period decides; for a sliding mode it
-# grows more slowly, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and with
-# zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs no such bound for a fault
-# initially at rest, and its estimates are then proved for a linear law (`quakedesign.loop.sensing.differentiator`).
+# is the self-consistent condition on λ_d. For signed powers up to 1 the difference is largest across the origin, at e =
+# −ε/2. For a linear law the left-hand side grows with λ_d as ε does, so that the sampling period decides; for a sliding
+# mode it grows more slowly, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and
+# with zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs no such bound for a
+# fault initially at rest, and its estimates are then proved for a linear law
+# (`quakedesign.loop.sensing.differentiator`).
 #
 # The condition is a premise of the differentiator. It does not prove that the loop with estimates is stable, and loops
 # may work without it. It neglects the stages before the differentiator; a mean of N readings lags by (N − 1)T/2 more.
@@ -156,7 +157,7 @@ class JointCondition:
     required : float
         Value that λ_d, the `certified` value, must exceed [m/s² for n_d = 1]; infinite for n_d ≥ 2.
     certified : float
-        λ_d.
+        λ_d [m/s^(n_d+1)].
     ratio : float
         required/certified; the premise is violated from 1 on.
     holds : bool

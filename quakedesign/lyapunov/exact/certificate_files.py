@@ -96,7 +96,7 @@ class LoopEntries(Entries):
 
 
 def terms_of(entries: tuple[TermEntries, ...], loop: Loop, powers: Sequence[str]) -> tuple[Term, ...]:
-    """Sum of terms with powers of the given names; all other names of the loop are parameters."""
+    """Sum of terms in powers of the given names; gains, constants, uncertain parameters and roots are parameters."""
     parameters = {*loop.gains, *loop.constants, *loop.ranges}
     for coefficient, names, factors in entries:
         need(coefficient != 0, "a term must not be zero")
@@ -362,7 +362,7 @@ def _entry(value: object) -> str:
 
 
 def _leaves(value: object) -> int:
-    """Number of entries of nested lists; an empty list counts as one."""
+    """Number of plain entries of nested lists and objects; an empty list counts as one."""
     match value:
         case dict():
             return sum(map(_leaves, value.values()))

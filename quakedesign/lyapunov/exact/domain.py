@@ -54,8 +54,9 @@ class Domain:
     start_slip_rate_error: LowerBound
     start_perturbation: LowerBound
     method: str  # ``"whole"`` or ``"split"`` (part of h in e3); empty for an empty set
-    # Cause that limits the level set: the largest part of h' that grows with the errors; for an empty set, the largest
-    # part at zero errors
+    # Cause that limits the level set: for ``"whole"`` the largest part of h' that grows with the errors, for
+    # ``"split"`` the error that cancels most of the decrease; for an empty set, the range of β or the largest part of
+    # h' at zero errors
     limited_by: str
     feedforward: str  # Name of the feed-forward of the law
 

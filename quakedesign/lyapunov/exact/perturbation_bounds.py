@@ -299,7 +299,7 @@ _drift = sp.Symbol("drift", nonnegative=True)
 
 @cache
 def _net_stress() -> sp.Expr:
-    """σ' − p* at rest at r0, for friction μ, a disturbance that grows with slip, and a drift k̂v∞t."""
+    """σ' − p* [Pa] at rest at r0 [m], for friction μ, a disturbance that grows with slip, and a drift k̂v∞t [m/s²]."""
     balance = plant.shifted_acceleration().replace(plant.disturbance, lambda x, *_: _growth * x + _drift)
     balance = balance.replace(plant.mu, lambda *_: _mu).subs({plant.x1: _r, plant.x2: 0})
     balance = sp.expand(balance)  # linear in p
@@ -307,7 +307,7 @@ def _net_stress() -> sp.Expr:
 
 
 def _rest(fault: Fault, nominal: bool) -> tuple[sp.Expr, dict[sp.Symbol, Range]]:
-    """p* in symbols, with few repetitions for tight enclosures, and the ranges of the symbols."""
+    """p* [Pa] in symbols, with few repetitions for tight enclosures, and the ranges of the symbols."""
     values = {
         _growth: to_sympy(rational(fault.disturbance.slip_growth)),
         plant.mu_star: to_sympy(static_friction(fault)),

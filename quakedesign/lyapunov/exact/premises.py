@@ -54,7 +54,8 @@ class Premise:
     certified: Fraction | float  # Value covered by the certificate, in `unit`
     unit: str
     measured: bool = False  # True if `required` was measured in a simulation
-    # False if `certified` is only an upper limit for every certificate; the premise then never holds
+    # False if `certified` is only an upper limit for every certificate, or if another end of the certified ranges does
+    # not cover the loop; the premise then never holds
     proved: bool = True
     note: str = ""  # Assumptions of the required value
 
@@ -71,7 +72,7 @@ class Premise:
 
     @property
     def holds(self) -> bool:
-        """Whether the ratio is at most 1 and a certificate exists."""
+        """Whether `proved` is true and the ratio at most 1."""
         return self.proved and self.ratio is not None and self.ratio <= 1
 
     @property

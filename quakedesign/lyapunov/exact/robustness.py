@@ -153,7 +153,7 @@ def _against_decrease(cells: _Cells, slope: tuple[Term, ...], index: int) -> lis
 
 
 def _against_function(cells: _Cells, slope: tuple[Term, ...], index: int) -> list[Problem]:
-    """Quotients β|∂V/∂e2||e_i| / V^{1 + …} on every cell, with the largest β."""
+    """Quotients β|∂V/∂e2||e_i| / V^{1 + (r_i − r_2)/m} on every cell, with the largest β."""
     beta = cells.loop.uncertain["beta"][1]
     return [
         ((term, function), (Fraction(1), -Fraction(term.degree, cells.m)))
@@ -198,7 +198,7 @@ class LevelSets:
         return end_of(enclose(from_terms(self.certificate.lyapunov, loop.symbols), box).upper())
 
     def errors(self, level: Fraction) -> Errors:
-        """Bounds on e1, e2 and e2' on {V ≤ level}, from V ≥ γ_i u_i^m."""
+        """Bounds on |e1| [m], |e2| [m/s] and |e2'| [m/s²] on {V ≤ level}, from V ≥ γ_i|x_i|^{m/r_i} for all i."""
         loop = self.certificate.loop
         sizes: dict[str, Fraction] = {}
         for state, weight in loop.states.items():

@@ -170,7 +170,7 @@ class Campaign:
         return {f"{level:g}": _finite(way * ordered[place]) for level, place in places.items()}
 
     def worst(self, metric: str, count: int = SHOWN) -> list[int]:
-        """Indices of the samples that are worst in one metric, worst first; diverged samples precede all others."""
+        """Indices of the worst samples in one metric, worst first; those that diverged or have no value come first."""
         require_metric(metric, self.metrics)
         known = [(-severity(result, metric), i) for i, result in enumerate(self.results) if result]
         return [i for _, i in sorted(known)[:count]]
