@@ -50,7 +50,7 @@ class ContinuousTwisting(SlidingMode):
     def counterexample(
         cls, gains: Mapping[str, Fraction], uncertain: Mapping[str, tuple[Fraction, Fraction]]
     ) -> Mapping[str, Mapping[str, Fraction]] | None:
-        """For the constant h' = max(0, k3 − |k4|) every point with e2 = 0, e3 = k1⌈e1⌋^⅓, e1 > 0 is an equilibrium."""
+        """For h' = max(0, k3 − |k4|) and k3 ≥ −|k4| all points e2 = 0, e3 = k1⌈e1⌋^⅓, e1 > 0 are equilibria."""
         k1, _, k3, k4 = gains.values()
         pull = max(Fraction(0), k3 - abs(k4))
         if not k1 or not uncertain["d"][0] <= pull <= uncertain["d"][1] or (not k4 and pull != k3):
