@@ -41,8 +41,8 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     Raises
     ------
     ParameterError
-        When the value, unless a `Fraction`, is not finite, in at most 300 characters and 308 digits, or has a real type
-        that is not rational (such as a long double) and no float equals it.
+        When the value is not finite; has more than 300 characters or 308 digits (a `Fraction` may have any length); or
+        has a real type that is not rational (such as a long double) and no float equals it.
     """
     if isinstance(value, Fraction):
         return value if type(value) is Fraction else Fraction(value)

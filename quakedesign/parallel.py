@@ -584,8 +584,8 @@ class Cluster(UserExecutor):
         except (KilledWorker, CancelledError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
             raise SimulationError(
-                f"workers of the cluster must live until their tasks are done. Received: {said}. Give them more "
-                "memory, or omit scheduler to use processes of this machine."
+                f"workers of the cluster must live until their tasks are done. Received: {said.rstrip('.')}. Give "
+                "them more memory, or omit scheduler to use processes of this machine."
             ) from None
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

@@ -761,7 +761,7 @@ class SpreadOptions:
         """Law of a campaign and, for friction with a state, spread [-] and stress [Pa] of the samples.
 
         For friction with a state the law is that of the certificate or, without one, the law that `design` gives for
-        the nominal normal stress, stiffness and damping, whatever the box of the campaign.
+        the nominal normal stress, stiffness and damping, for every box of the campaign.
         """
 
         def tracking(fault: "Fault") -> tuple["Choice | None", dict[str, Any]]:

@@ -487,7 +487,7 @@ def _print(problem: "CampaignProblem", done: "Campaign", result: Json, written: 
     for search in (result["search"],) if result["search"] else ():
         value = "diverges" if search["value"] is None else f"{search['value']:.6g} {Metrics.unit(search['metric'])}"
         out.print(
-            f"search: largest {search['metric']} = {value}, in sample {search['index']}; "
+            f"search: worst {search['metric']} = {value}, in sample {search['index']}; "
             f"{search['looked_at']} samples evaluated"
         )
     for failure in result["failures"]:

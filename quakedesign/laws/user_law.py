@@ -390,7 +390,7 @@ def _of_json(content: bytes, path: str | Path) -> Json:
     try:
         entries = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"law {path} must be JSON. Received other text ({str(error)[:80]}).") from None
+        raise ScenarioError(f"law {path} must be JSON. Received text that is not ({str(error)[:80]}).") from None
     if not isinstance(entries, dict):
         raise ScenarioError(f"law {path} must be an object with keys. Received {type(entries).__name__}.")
     return entries
@@ -406,5 +406,5 @@ def _of_npz(content: bytes, path: str | Path) -> Json:
             return {name: arrays[name].tolist() for name in arrays.files}
     except (ValueError, OSError, EOFError, KeyError, zipfile.BadZipFile, NotImplementedError) as error:
         raise ScenarioError(
-            f"law {path} must be a .npz file without pickles. Received another ({str(error)[:80]})."
+            f"law {path} must be a .npz file without pickles. Received an unreadable file ({str(error)[:80]})."
         ) from None

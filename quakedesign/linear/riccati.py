@@ -155,7 +155,6 @@ def relative_residual(a: Matrix, g: Matrix, q: Matrix, x: Matrix) -> Fraction:
 # The Riccati design in nondimensional variables: cost, split of W, and the weight that meets a bandwidth.
 
 LIGHTEST = -14.0  # decimal logarithm of the smallest weight R; `_HEAVIEST`: of the largest
-
 _HEAVIEST, _ROUNDS = 0.0, 5
 COST = diagonal((Fraction(1), Fraction(1, 100), Fraction(1), Fraction(1)))
 """Q0 on x1, x2, ξ1, ξ2."""

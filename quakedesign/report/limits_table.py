@@ -73,7 +73,7 @@ def _meaning(limits: Limits) -> list[str]:
     if limits.largest_step.impossible_beyond is None:
         return [
             *lines,
-            "other rows: no limit is known, as the weakening of friction does not make this fault unstable",
+            "other rows: no limit is known, as the weakening of friction alone does not make this fault unstable",
         ]
     return [
         *lines,

@@ -201,7 +201,7 @@ def _parted(x: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def exponent_and_mantissa(x: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """n and m such that x = m·2ⁿ and √½ ≤ m < √2, for x ≥ 2⁻¹⁰²²; exact whatever the rounding of the C logarithm.
+    """n and m such that x = m·2ⁿ and √½ ≤ m < √2, for x ≥ 2⁻¹⁰²²; exact for every rounding of the C logarithm.
 
     The logarithm only selects a whole number, the exponent of a power of two near x; where its rounding decides between
     two exponents, both give the same result.

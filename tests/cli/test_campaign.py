@@ -137,7 +137,7 @@ def test_people_are_told_outcomes_quantiles_search_and_failures(capsys):
         "outcomes (samples): 3 tracked, 1 diverged",
         "events (samples): 1 peak rate",
         *TABLE,
-        "search: largest max_slip_error = 1.23457e-05 m, in sample search-9; 40 samples evaluated",
+        "search: worst max_slip_error = 1.23457e-05 m, in sample search-9; 40 samples evaluated",
         "failed: samples 4 … 6: MemoryError: full",
         "written: out/ (a, b)",
     ]
@@ -158,7 +158,7 @@ def test_a_narrow_terminal_wraps_samples_alone(capsys, monkeypatch):
 
 def test_people_are_told_that_there_is_nothing(capsys):
     search = {"metric": "max_slip_error", "value": None, "index": "search-9", "looked_at": 40}
-    diverged = "search: largest max_slip_error = diverges, in sample search-9; 40 samples evaluated"
+    diverged = "search: worst max_slip_error = diverges, in sample search-9; 40 samples evaluated"
     for found, said in ((None, []), (search, [diverged])):
         assert printed(capsys, shown(search=found, failures=[])) == [
             "lab-fault, no control: 8 samples, 5 of them from an earlier run",

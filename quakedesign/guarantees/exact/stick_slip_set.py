@@ -486,7 +486,6 @@ class Period:
     impulses: tuple[np.ndarray, np.ndarray]  # ξ and y after an impulse, at the nodes
     weights: np.ndarray  # integrals of the hat functions of the nodes times t^j, j = 0 to 3
     bent: tuple[Any, Any]  # bounds of the second derivatives of the impulse responses of ξ and y
-
     margin: tuple[Any, ...]  # for factors of ξ and y: excess of a bound between two checked intervals
 
     @classmethod

@@ -45,7 +45,7 @@ class Stage(ABC):
         Command-line options; the first, if not at its default, adds the stage. Empty: a stage for Python only.
     rank : int
         Position in the signal order, lower first, of a stage that options or `Actuator.completed` add; sampled stages
-        precede dynamic ones whatever their rank.
+        precede dynamic ones for any rank.
     """
 
     name: ClassVar[str]

@@ -221,7 +221,8 @@ def control_coefficient(fault: Fault, divisor: Fraction, certified: Range) -> Pr
         required=worst * certified[1],
         certified=certified[1],
         unit="-",
-        note=f"β in {Enclosure.of(low, high):.6g}; certified for β >= {UpperBound(certified[0]):.6g}",
+        note=f"β from {Enclosure.of(low, high):.6g}; certified from {UpperBound(certified[0]):.6g} to "
+        f"{LowerBound(certified[1]):.6g}",
     )
 
 

@@ -215,8 +215,7 @@ def test_both_ends_of_beta_count(real, certified, required):
     found = control_coefficient(real, 2 * least_authority(real), certified)
     assert (found.required, found.certified, found.ratio) == (required, certified[1], required / certified[1])
     assert found.holds is (certified[0] <= F(1, 2))
-    assert found.note.startswith("β in 0.5 to 0.712495; certified for β >= 0.")
-    assert found.note.endswith(f"certified for β >= {float(certified[0])}")
+    assert found.note == f"β from 0.5 to 0.712495; certified from {float(certified[0])} to {int(certified[1])}"
 
 
 def law_of(fault, name="none", scale=F(1)):
