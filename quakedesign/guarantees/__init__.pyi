@@ -37,7 +37,7 @@ from .search.linear_design import design_sampled_law as design_sampled_law
 from .search.linear_design import longest_delay as longest_delay
 from .search.linear_design import longest_diffusion_time as longest_diffusion_time
 from .search.linear_design import longest_step as longest_step
-from .search.linear_design import tightened as tightened
+from .search.linear_design import with_varying_gain as with_varying_gain
 from .search.worst_case import WorstCase as WorstCase
 from .search.worst_case import worst_tracking as worst_tracking
 from .sliding_result import guarantee_sliding as guarantee_sliding

@@ -167,8 +167,8 @@ def guarantee_sliding(
 def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
     """Reason why the diffusion path is infeasible under a stress [Pa]; empty if not proved."""
     most = rational(fault.effective_normal_stress)
-    push = SlidingPush(model=sliding_model(fault), amplitude=stress)
-    far = longest_diffusion(push, most, Fraction(0))
+    limit = SlidingPush(model=sliding_model(fault), amplitude=stress)
+    far = longest_diffusion(limit, most, Fraction(0))
     if far is None or setup.diffusion <= far:
         return ""
     return (

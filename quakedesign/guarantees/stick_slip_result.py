@@ -135,11 +135,11 @@ def guarantee_stick_slip(
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)
     tell = progress or (lambda what, done: None)
     healing = rational(fault.friction.rest_excess)
-    wanted: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "tell": tell}
-    wanted["longest_step"] = setup.longest_step
+    options: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "tell": tell}
+    options["longest_step"] = setup.longest_step
     if sliding is None:
-        return stick_slip_with_worst_case(fault, design_stick_slip(task, step, **wanted))
-    made = design_sticking(task, sliding, step, **wanted)
+        return stick_slip_with_worst_case(fault, design_stick_slip(task, step, **options))
+    made = design_sticking(task, sliding, step, **options)
     if isinstance(made, NoProof):
         return stick_slip_with_worst_case(fault, made)
     assert isinstance(made.proof, StickSlipProof)

@@ -348,7 +348,7 @@ def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGua
     seen = TrackingGuarantee(
         fault=fault, proof=proof, worst=worst_tracking(proof), stick_search=worst_tracking(proof, sticks=True)
     )
-    return seen if proof.varying_gain is None or not seen.exceeded_on_stick_slip else _with_room(seen, proof)
+    return seen if proof.varying_gain is None or not seen.exceeded_on_stick_slip else _with_margin(seen, proof)
 
 
 def given_law_with_worst_case(
@@ -359,7 +359,7 @@ def given_law_with_worst_case(
     return TrackingGuarantee(fault=fault, proof=proof, worst=worst, notes=notes, given=True)
 
 
-def _with_room(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
+def _with_margin(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
     arbitrary, worst = guarantee(proof.task, proof.sampled_loop), seen.worst_with_stick
     if not arbitrary.available or worst is None:
         return seen

@@ -61,10 +61,10 @@ class ExtendedLQR(Controller):
 
     def pressure(self, signals: Signals) -> sp.Expr:
         """Return p [Pa] = offset − Kx_a, eq. u, inside the limits if there are any."""
-        wanted = self._unlimited_pressure(signals)
+        unlimited = self._unlimited_pressure(signals)
         if self.limits is None:
-            return wanted
-        return sp.Min(sp.Max(wanted, to_sympy(self.limits.lowest)), to_sympy(self.limits.highest))
+            return unlimited
+        return sp.Min(sp.Max(unlimited, to_sympy(self.limits.lowest)), to_sympy(self.limits.highest))
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:
         """ξ1' = x1 − r and ξ2' = ξ1; at a limit, back-calculation gives both the double pole −1/recovery_time."""

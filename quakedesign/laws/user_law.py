@@ -320,13 +320,13 @@ def exact_matrix(part: Any, name: str) -> Matrix:
     return tuple(tuple(rational(v, f"an entry of {name}") for v in row) for row in rows)
 
 
-def _require_shapes(wanted: Mapping[str, tuple[Matrix, int, int]]) -> None:
-    for name, (matrix, height, width) in wanted.items():
+def _require_shapes(shapes: Mapping[str, tuple[Matrix, int, int]]) -> None:
+    for name, (matrix, height, width) in shapes.items():
         if [len(row) for row in matrix] != [width] * height and not (height * width == 0 and not any(matrix)):
             sizes = sorted({len(row) for row in matrix})
             raise ParameterError(
-                f"matrix {name} of a law must be {height} x {width}, as A has {wanted['A'][1]} rows and inputs "
-                f"{wanted['B'][2]} names. Received {len(matrix)} rows of {', '.join(map(str, sizes)) or 'no'} entries."
+                f"matrix {name} of a law must be {height} x {width}, as A has {shapes['A'][1]} rows and inputs "
+                f"{shapes['B'][2]} names. Received {len(matrix)} rows of {', '.join(map(str, sizes)) or 'no'} entries."
             )
 
 

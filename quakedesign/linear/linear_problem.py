@@ -289,11 +289,11 @@ class FeedbackLoop:
 def loop_matrix(vertex: Vertex, authority: Fraction, gains: Sequence[Fraction]) -> Matrix:
     """Matrix (4 × 4) of x1' = x2, x2' = s·x1 − w·x2 − β·b·Kx, ξ1' = x1, ξ2' = ξ1."""
     beta, s, w = vertex
-    push = [-beta * authority * k for k in gains]
+    feedback = [-beta * authority * k for k in gains]
     zero, one = Fraction(0), Fraction(1)
     return (
         (zero, one, zero, zero),
-        (push[0] + s, push[1] - w, push[2], push[3]),
+        (feedback[0] + s, feedback[1] - w, feedback[2], feedback[3]),
         (one, zero, zero, zero),
         (zero, zero, one, zero),
     )

@@ -95,17 +95,17 @@ def decrease_form(
     rate = (motion[0], motion[2], *matrix_product((tuple(K),), motion))
     fall = (*matrix_product(P, motion), *((_ZERO,) * 7 for _ in range(3)))
     corner = ((_ZERO,) * 7,) * 4 + tuple((_ZERO,) * 4 + tuple(row) for row in W)
-    gained = matrix_product(transpose(rate), W, rate)
-    return total(times(-1, fall), times(-1, transpose(fall)), times(-FOUR_OVER_PI_SQUARED * step**2, gained), corner)
+    rate_term = matrix_product(transpose(rate), W, rate)
+    return total(times(-1, fall), times(-1, transpose(fall)), times(-FOUR_OVER_PI_SQUARED * step**2, rate_term), corner)
 
 
 def _motion(problem: LinearProblem, K: Sequence[Fraction], vertex: Vertex) -> Matrix:
     """ẋ of (x, δ), 4 × 7."""
     first, second, third, fourth = problem.loop(vertex, K)
-    push = vertex[0] * problem.sectors.authority
+    gain = vertex[0] * problem.sectors.authority
     return (
         (*first, _ZERO, _ZERO, _ZERO),
-        (*second, _ZERO, _ZERO, -push),
+        (*second, _ZERO, _ZERO, -gain),
         (*third, _ONE, _ZERO, _ZERO),
         (*fourth, _ZERO, _ONE, _ZERO),
     )
@@ -123,8 +123,8 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
     """
     period, scales = rational(step, "step"), problem.scales()
     inside, K = problem.nondimensional(scales), scales.gains_inside(gains)
-    question = inside, K, period / scales.time
-    proposal = proposed(_propose, *question) if any(K) else []
+    arguments = inside, K, period / scales.time
+    proposal = proposed(_propose, *arguments) if any(K) else []
     for bits in BITS if proposal else ():
         P, W = (rounded(matrix, bits) for matrix in proposal)
         units = (scales.states[0], scales.states[2], scales.pressure)  # of x1, ξ1 and p, in which W is
@@ -136,11 +136,11 @@ def delay_proof(problem: LinearProblem, gains: Sequence[Fraction], step: float |
     return None
 
 
-def proposed(programme: Callable[..., list[Rows]], *question: object) -> list[Rows]:
+def proposed(programme: Callable[..., list[Rows]], *arguments: object) -> list[Rows]:
     """Solution proposed by a programme, from the cache; solved anew in a block `conic.stated_problems`."""
     if collecting():
-        return programme(*question)
-    return list(search_once(lambda: programme(*question), programme.__module__, *question))
+        return programme(*arguments)
+    return list(search_once(lambda: programme(*arguments), programme.__module__, *arguments))
 
 
 def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> list[Rows]:
@@ -157,8 +157,8 @@ def _propose(problem: LinearProblem, K: Sequence[Fraction], step: Fraction) -> l
         A, R = scaled(motion, units, (*units, *outer)), scaled(rate, outer, (*units, *outer))
         fall = np.vstack([np.eye(4), np.zeros((3, 4))]) @ P @ A
         selection = np.hstack([np.zeros((3, 4)), np.eye(3)])
-        gained = float(FOUR_OVER_PI_SQUARED * step**2) * R.T @ W @ R
-        constraints.append(selection.T @ W @ selection - fall - fall.T - gained - margin * np.eye(7) >> 0)
+        rate_term = float(FOUR_OVER_PI_SQUARED * step**2) * R.T @ W @ R
+        constraints.append(selection.T @ W @ selection - fall - fall.T - rate_term - margin * np.eye(7) >> 0)
     if not solved(cp.Problem(cp.Maximize(margin), constraints), margin):
         return []
     return [
@@ -305,8 +305,8 @@ def clock_proof(
     scales = problem.scales()
     inside, K = problem.nondimensional(scales), scales.gains_inside(gains)
     lengths = tuple(dict.fromkeys(step / scales.time for step in steps))
-    question = inside, K, lengths, degree
-    proposal = proposed(_propose_clock_dependent, *question) if any(K) else []
+    arguments = inside, K, lengths, degree
+    proposal = proposed(_propose_clock_dependent, *arguments) if any(K) else []
     outside = [1 / u for u in (*scales.states, scales.pressure)]
     for bits in BITS if proposal else ():
         P = tuple(congruent(rounded(matrix, bits), outside) for matrix in proposal)
@@ -325,15 +325,15 @@ def _propose_clock_dependent(
     own = balanced_units(K)
     units = (*own, law_unit(K, own))
     P, margin = [cp.Variable((5, 5), symmetric=True) for _ in range(degree + 1)], cp.Variable()
-    room = margin * np.eye(5)
+    slack = margin * np.eye(5)
     constraints = [P[0] >> 1e-6 * np.eye(5), cp.trace(P[0]) <= 1, margin <= 1]
     for length in lengths:
         jump = scaled(_jump(K, length), units, units)
-        constraints.append(P[degree] - jump.T @ P[0] @ jump - room >> 0)
+        constraints.append(P[degree] - jump.T @ P[0] @ jump - slack >> 0)
         for vertex in problem.vertices():
             A = float(length) * scaled(_flow(problem, vertex), units, units)
             falls = zip(_changes(P), P, strict=True)
-            constraints += [-(fall + A.T @ matrix + matrix @ A) - room >> 0 for fall, matrix in falls]
+            constraints += [-(fall + A.T @ matrix + matrix @ A) - slack >> 0 for fall, matrix in falls]
     if not solved(cp.Problem(cp.Maximize(margin), constraints), margin):
         return []
     inverse = 1 / np.array(units, dtype=float)
@@ -388,9 +388,9 @@ class HeldPoles:
     def at(self, step: Fraction) -> dict[Vertex, list[acb]]:
         """Poles by corner (β, s [1/s²], w [1/s]) at a period [s]."""
         scales = self.problem.scales()
-        inside, push = self.problem.nondimensional(scales), scales.gains_inside(self.gains)
+        inside, feedback = self.problem.nondimensional(scales), scales.gains_inside(self.gains)
         return {
-            corner: poles(inside, push, step / scales.time, scaled)
+            corner: poles(inside, feedback, step / scales.time, scaled)
             for corner, scaled in zip(self.problem.vertices(), inside.vertices(), strict=True)
         }
 

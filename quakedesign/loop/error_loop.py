@@ -350,8 +350,8 @@ def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction
     steady = steady_states(law.rates, law.output, zeros, _ONE)
     own = tuple(f"law {i}" for i in range(len(law.states)))
     rows = zip((law.feedback, *law.measured), (law.output, *law.rates), strict=True)
-    push, *rates = (dict(zip(("e1", "e2", *own), (*fed, *row), strict=True)) for fed, row in rows)
-    system = Interconnection(("e1", "e2", *own), {"push": {name: authority * v for name, v in push.items()}})
+    acceleration, *rates = (dict(zip(("e1", "e2", *own), (*fed, *row), strict=True)) for fed, row in rows)
+    system = Interconnection(("e1", "e2", *own), {"push": {name: authority * v for name, v in acceleration.items()}})
     plant = {"e1": model.slip, "e2": -model.rate, "push": model.gain / authority}
     inputs = {
         "acceleration": {"e2": _ONE},

@@ -320,8 +320,8 @@ def _closed(gains: Sequence[Sequence[Fraction]], first: Sequence[Fraction]) -> l
     wider = np.array(first, dtype=float)
     wider = wider * _WIDER + 1e-9 * max(wider.max(), 1e-100)
     bounds = [rational(float(v)) for v in np.linalg.solve(np.eye(len(wider)) - _WIDER * matrix, wider)]
-    holds = all(v > 0 and f + _dot(row, bounds) < v for v, f, row in zip(bounds, first, gains, strict=True))
-    return bounds if holds else None
+    contracts = all(v > 0 and f + _dot(row, bounds) < v for v, f, row in zip(bounds, first, gains, strict=True))
+    return bounds if contracts else None
 
 
 def _middle(ends: Range) -> tuple[Fraction, Fraction]:

@@ -116,8 +116,8 @@ class FaultPlant:
                 f"Received the coefficients {', '.join(map(shortly, self.shape))}. Give them lowest power first."
             )
 
-    def _require(self, holds: bool, name: str, condition: str, value: Fraction) -> None:
-        if not holds:
+    def _require(self, satisfied: bool, name: str, condition: str, value: Fraction) -> None:
+        if not satisfied:
             raise ParameterError(
                 f"{name} of {self.name} must be {condition}. Received {shortly(value)}. Correct the value."
             )
@@ -260,7 +260,11 @@ class FaultPlant:
         Constants of the fault and its reference must be the same; friction, ranges and disturbance must lie within
         those of this plant. The name is not compared.
         """
-        return [*_other(self, other), *_wider_ranges(self, other), *_rougher(self.friction, other.friction)]
+        return [
+            *_differing_constants(self, other),
+            *_wider_ranges(self, other),
+            *_rougher(self.friction, other.friction),
+        ]
 
 
 def _hull(values: Iterable[Fraction]) -> Range:
@@ -315,18 +319,18 @@ _SAME = {
 _SPREADS = ("stiffness", "damping", "authority")
 
 
-def _other(proved: FaultPlant, required: FaultPlant) -> list[str]:
+def _differing_constants(proved: FaultPlant, required: FaultPlant) -> list[str]:
     """Constants that differ."""
     pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(required, name)) for name, unit in _SAME.items()}
     pairs["static friction [-]"] = proved.friction.static, required.friction.static
     for name, unit, *both in zip(("slip", "rate"), ("1/s^2", "1/s"), proved.growths, required.growths, strict=True):
         pairs[f"disturbance per {name} [{unit}]"] = both[0], both[1]
-    found = [
+    differences = [
         f"{name} {six_digits(one)} in the certificate, {six_digits(other)} in the fault"
         for name, (one, other) in pairs.items()
         if one != other
     ]
-    return found + ([] if proved.shape == required.shape else ["the shape of the reference"])
+    return differences + ([] if proved.shape == required.shape else ["the shape of the reference"])
 
 
 def _wider_ranges(proved: FaultPlant, required: FaultPlant) -> list[str]:
@@ -337,13 +341,13 @@ def _wider_ranges(proved: FaultPlant, required: FaultPlant) -> list[str]:
     pairs["disturbance [m/s^2]"] = [proved.amplitude, required.amplitude]
     if proved.change is not None and required.change is not None:
         pairs["change of the disturbance [m/s^3]"] = [proved.change, required.change]
-    found = [
+    wider = [
         f"{name} up to {six_digits(one)} in the certificate, {six_digits(other)} in the fault"
         for name, (one, other) in pairs.items()
         if other > one
     ]
     jumps = proved.change is not None and required.change is None
-    return found + (["class of the disturbance: rate in the certificate, amplitude in the fault"] if jumps else [])
+    return wider + (["class of the disturbance: rate in the certificate, amplitude in the fault"] if jumps else [])
 
 
 def _rougher(proved: Friction, required: Friction) -> list[str]:

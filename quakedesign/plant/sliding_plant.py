@@ -91,8 +91,8 @@ class SlidingPlant:
             self._require(getattr(self, name) >= 0, name, "0 or more", shortly(getattr(self, name)))
         self._require(0 <= self.swing < 1, "swing", "from 0 to below 1", shortly(self.swing))
 
-    def _require(self, holds: bool, name: str, condition: str, value: str) -> None:
-        if not holds:
+    def _require(self, satisfied: bool, name: str, condition: str, value: str) -> None:
+        if not satisfied:
             raise ParameterError(f"{name} of {self.name} must be {condition}. Received {value}. Correct the value.")
 
     @property

@@ -229,19 +229,19 @@ def simulate_blocks(
         seen.append(now.copy())
         if not np.isfinite(now[place["x"]]).all():
             raise ParameterError("the slip is not finite at the end of the run: reduce the gains of the law")
-    kept = np.array(seen)
-    times = kept[:, place["count"]].ravel() * step
+    stored = np.array(seen)
+    times = stored[:, place["count"]].ravel() * step
     task = chain.fault.reference
-    least = kept[-1, place["margins"]]
+    least = stored[-1, place["margins"]]
     return BlockRun(
         times=times,
-        slip=kept[:, place["x"]],
-        slip_rate=kept[:, place["peak"]],
-        pressure=kept[:, place["p"]],
+        slip=stored[:, place["x"]],
+        slip_rate=stored[:, place["peak"]],
+        pressure=stored[:, place["p"]],
         reference=task.target_slip * task.shape(np.minimum(times / task.operation_time, 1)),
-        slip_error=kept[-1, place["worst"]],
-        slip_rate_error=kept[-1, place["rate"]],
-        rest=kept[-1, place["rest"]] / kept[-1, place["count"]],
+        slip_error=stored[-1, place["worst"]],
+        slip_rate_error=stored[-1, place["rate"]],
+        rest=stored[-1, place["rest"]] / stored[-1, place["count"]],
         reversed=bool(least[0] < 0),
         opened=bool(least[1] <= 0),
     )

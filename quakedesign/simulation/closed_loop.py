@@ -403,11 +403,11 @@ def acceleration_with_parameters(fault: Fault, names: Sequence[str]) -> tuple[sp
     """x2' [m/s²] as in `acceleration_expression`, with the named parameters as symbols; and these symbols."""
     law = fault.friction
     free = law.symbols() | {name: sp.Symbol(name, positive=True) for name in plant.PARAMETERS}
-    known = {name: sp.Rational(str(rational(getattr(fault, name)))) for name in plant.PARAMETERS}
-    hatted = plant.hatted_parameters(fault, known | {name: free[name] for name in names if name in known})
-    held = {symbol: value for symbol, value in law.values().items() if symbol not in {free[name] for name in names}}
+    numbers = {name: sp.Rational(str(rational(getattr(fault, name)))) for name in plant.PARAMETERS}
+    hatted = plant.hatted_parameters(fault, numbers | {name: free[name] for name in names if name in numbers})
+    fixed = {symbol: value for symbol, value in law.values().items() if symbol not in {free[name] for name in names}}
     symbols = [free[name] for name in names]
-    return _inserted(plant.shifted_acceleration(), law.symbolic(), hatted).subs(held), symbols
+    return _inserted(plant.shifted_acceleration(), law.symbolic(), hatted).subs(fixed), symbols
 
 
 def _with_numbers(expression: sp.Expr, fault: Fault, varied: bool) -> sp.Expr:
@@ -545,8 +545,8 @@ class ClosedLoop(Metered):
     @property
     def feedforward(self) -> sp.Expr:
         """Feed-forward of known plant terms [m/s²]; the law adds it to ν, so that it is part of h."""
-        known = self.controller.feedforward if self.controller is not None else NONE
-        return known.acceleration(plant.x1, plant.x2, r_acceleration)
+        compensated = self.controller.feedforward if self.controller is not None else NONE
+        return compensated.acceleration(plant.x1, plant.x2, r_acceleration)
 
     @cached_property
     def perturbation(self) -> Motion:

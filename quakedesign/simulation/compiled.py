@@ -423,14 +423,18 @@ def called(function: ca.Function, work: Instruction) -> Called:
     NotPortableError
         If the call is neither a repetition nor a branch, or is ambiguous.
     """
-    found = [f for f in function.find_functions(0) if f.nnz_in() == len(work.taken) and f.nnz_out() == len(work.given)]
-    name = found[0].name() if len(found) == 1 else ""
+    candidates = [
+        f for f in function.find_functions(0) if f.nnz_in() == len(work.taken) and f.nnz_out() == len(work.given)
+    ]
+    name = candidates[0].name() if len(candidates) == 1 else ""
     if name.startswith("fold_"):
         inner = name.removeprefix("fold_")
-        (all_of_them,) = map(found[0].get_function, found[0].get_function())  # its name varies with the number of calls
-        return Called(found[0].find_function(inner), int(all_of_them.size2_out(0)))
+        (all_of_them,) = map(
+            candidates[0].get_function, candidates[0].get_function()
+        )  # its name varies with the number of calls
+        return Called(candidates[0].find_function(inner), int(all_of_them.size2_out(0)))
     if name == "where_needed":
-        return Called(found[0].find_function("solved"), 0)
+        return Called(candidates[0].find_function("solved"), 0)
     raise NotPortableError(f"a call in {function.name()} is neither a repetition nor a branch")
 
 
@@ -727,10 +731,10 @@ def compiler() -> tuple[str, ...]:
         If there is none, or CC cannot be parsed.
     """
     try:
-        wanted = shlex.split(os.environ.get("CC", ""))
+        preferred = shlex.split(os.environ.get("CC", ""))
     except ValueError as error:
         raise FileNotFoundError(f"CC must be a command: {error}") from None
-    for command in [wanted] if wanted else [["cc"], ["gcc"], ["clang"]]:
+    for command in [preferred] if preferred else [["cc"], ["gcc"], ["clang"]]:
         path = shutil.which(command[0])
         if path:
             return path, *command[1:]
@@ -932,7 +936,7 @@ class _Body:
             yield f"if (any) {again};"
         else:
             yield f"for (times = 0; times < {call.times}; ++times) {again};"
-        yield from _over_lanes([f"{kept} = {chosen.format(i)};" for kept, i in results if kept])
+        yield from _over_lanes([f"{variable} = {chosen.format(i)};" for variable, i in results if variable])
         yield "}"
 
     def _loop(self, tasks: list[_Task]) -> Iterator[str]:
@@ -945,7 +949,7 @@ class _Body:
             if work.operation == ca.OP_OUTPUT:
                 ends.append(f"z[{work.given[1]}][lane] = {taken[0].number};")
                 continue
-            values[place] = declared(lines, task.number, work, taken, _named)
+            values[place] = declared(lines, task.number, work, taken, _macro)
             if place in self._kept:
                 lines.append(f"{self._kept[place]} = {values[place].number};")
         yield from _over_lanes([*lines, *ends])
@@ -963,7 +967,7 @@ class _Body:
         return values[place]
 
 
-def _named(code: int) -> str | None:
+def _macro(code: int) -> str | None:
     return (f"portable_{FUNCTIONS[code].__name__}" if code in FUNCTIONS else None) or called_alone(code)
 
 

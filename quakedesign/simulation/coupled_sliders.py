@@ -114,9 +114,9 @@ class CoupledSliders:
     @cached_property
     def _friction(self) -> list[ca.Function]:
         """Per block (log v, log θ) → μ, ∂μ/∂log v, ∂μ/∂log θ, (log θ)', and the factor of −(log N)' in (log θ)'."""
-        known: dict[FrictionLaw, ca.Function] = {}
+        functions: dict[FrictionLaw, ca.Function] = {}
         for law in self.laws:
-            if law not in known:
+            if law not in functions:
                 log_rate, log_state = ca.SX.sym("log_rate"), ca.SX.sym("log_state")
                 exact, states = law.exact(), state_symbols(law.state_names)
                 parts = [
@@ -127,8 +127,8 @@ class CoupledSliders:
                 mu, change = to_casadi([sp.sympify(part) for part in parts], values)
                 by = [ca.jacobian(mu, x) for x in (log_rate, log_state)]
                 outputs = [mu, *by, change / values[states[0]], ca.SX(law.stress_exponents[0])]
-                known[law] = ca.Function("friction", [log_rate, log_state], outputs)
-        return [known[law] for law in self.laws]
+                functions[law] = ca.Function("friction", [log_rate, log_state], outputs)
+        return [functions[law] for law in self.laws]
 
     def _of_friction(self, log_rate: ca.MX, log_state: ca.MX) -> list[ca.MX]:
         """Outputs of `_friction` as columns, one entry a block."""
@@ -154,12 +154,12 @@ class CoupledSliders:
         N, n = self.sizes
         behind, log_rate, log_state, h = ca.vertsplit(y, [0, N, 2 * N, 3 * N, 3 * N + n])
         v, pressure, change, moved = ca.exp(log_rate), load[1], load[2], y[:0]
-        held = 3 + N * (self.mass > 0)
+        fixed_loads = 3 + N * (self.mass > 0)
         if n:
             flow = ca.DM(ca.sparsify(ca.DM(self.flow)))
             moved = ca.mtimes(flow, h)
             if np.size(self.source):
-                moved += ca.mtimes(ca.DM(self.source), load[held:])
+                moved += ca.mtimes(ca.DM(self.source), load[fixed_loads:])
             shares = ca.DM(ca.sparsify(ca.DM(self.shares)))
             pressure, change = pressure + ca.mtimes(shares, h), change + ca.mtimes(shares, moved)
         normal = ca.DM(self.normal_stress) - pressure
@@ -167,7 +167,7 @@ class CoupledSliders:
         aged -= exponent * change / normal
         S = ca.DM(self.stiffness)
         if self.mass:
-            driven = load[3:held] - ca.mtimes(S, behind) + stress - normal * mu - self.damping * v
+            driven = load[3:fixed_loads] - ca.mtimes(S, behind) + stress - normal * mu - self.damping * v
             faster = driven / (self.mass * v)
         else:
             loaded = stress_rate - ca.mtimes(S, v - load[0]) + change * mu - normal * by_state * aged
@@ -178,11 +178,11 @@ class CoupledSliders:
         """CasADi Function (y, load) → y', with the Jacobian up to `MOST_EXPANDED` blocks."""
         N, n = self.sizes
         y, load = ca.MX.sym("y", 3 * N + n), ca.MX.sym("load", 3 + N * (self.mass > 0) + inputs)
-        found = ca.Function("rates", [y, load], [ca.densify(self.field(y, load))])
+        rates = ca.Function("rates", [y, load], [ca.densify(self.field(y, load))])
         if N > MOST_EXPANDED:
-            return found
+            return rates
         state, loading = ca.SX.sym("y", y.size1()), ca.SX.sym("load", load.size1())
-        field = ca.cse([found(state, loading)])[0]
+        field = ca.cse([rates(state, loading)])[0]
         return ca.Function("rates", [state, loading], [field, ca.jacobian(field, state)])
 
     def resisting(self, y: "np.ndarray") -> "np.ndarray":
@@ -198,17 +198,17 @@ class CoupledSliders:
 
         if self.mass:
             return y
-        wanted, found = self.resisting(y) + stress, y.copy()
+        strength, stressed = self.resisting(y) + stress, y.copy()
         N = len(self.laws)
 
         def excess(value: float, i: int) -> float:
             tried = y.copy()
             tried[N + i] = value
-            return float(self.resisting(tried)[i] - wanted[i])
+            return float(self.resisting(tried)[i] - strength[i])
 
         for i in range(N):
-            found[N + i] = brentq(excess, y[N + i] - _WIDEST, y[N + i] + _WIDEST, args=(i,), xtol=1e-14)
-        return found
+            stressed[N + i] = brentq(excess, y[N + i] - _WIDEST, y[N + i] + _WIDEST, args=(i,), xtol=1e-14)
+        return stressed
 
 
 # ----------------------------------------------------------------------
@@ -262,7 +262,7 @@ class SlidersRun:
 
     def events(self, moment_per_slip: "np.ndarray | None" = None) -> tuple[BlockEvent, ...]:
         """Events of the run. Magnitudes need `moment_per_slip`, the seismic moment per slip of every block [N]."""
-        below, found = self.fastest <= self.onset_rate, []
+        below, events = self.fastest <= self.onset_rate, []
         falls = np.flatnonzero(~below[:-1] & below[1:])
         for onset in self.onsets:
             after = falls[self.times[falls + 1] > onset]
@@ -278,7 +278,7 @@ class SlidersRun:
             size = None
             if moved is not None and moment_per_slip is not None:
                 size = magnitude(float(moment_per_slip @ moved))
-            found.append(
+            events.append(
                 BlockEvent(
                     onset=float(onset),
                     arrest=arrest,
@@ -287,7 +287,7 @@ class SlidersRun:
                     magnitude=size,
                 )
             )
-        return tuple(found)
+        return tuple(events)
 
 
 def _run_of(sliders: CoupledSliders, times: np.ndarray, values: np.ndarray, far: Any = 0.0, *more: Any) -> SlidersRun:
@@ -355,14 +355,14 @@ def simulate_sliders(
     prestress = tuple(sliders.resisting(start)) if sliders.mass else ()
     scales = np.array([*slips, *[1.0] * (2 * N), *[_SMALL] * n])
     level = math.log(onset_rate) if math.isfinite(onset_rate) else math.inf
-    held = tuple(inputs[0][1]) if inputs else ()
-    problem = SmoothProblem(sliders.rates(len(held)), scales, slice(N, 2 * N), level)
+    pressures = tuple(inputs[0][1]) if inputs else ()
+    problem = SmoothProblem(sliders.rates(len(pressures)), scales, slice(N, 2 * N), level)
     breaks = {float(time) for time, _ in inputs if 0 < time < duration}
     breaks |= {i * _LONGEST for i in range(1, math.ceil(duration / _LONGEST))}
     y, pieces, crossings, evaluations = start, list[tuple[np.ndarray, np.ndarray]](), [], 0
     for now, end in pairwise((0.0, *sorted(breaks), duration)):
-        held = next((tuple(u) for time, u in reversed(inputs) if time <= now), held)
-        load = (loading_rate, 0.0, 0.0, *prestress, *held)
+        pressures = next((tuple(u) for time, u in reversed(inputs) if time <= now), pressures)
+        load = (loading_rate, 0.0, 0.0, *prestress, *pressures)
         ramp = Ramp(now, load, (0.0,) * len(load))
         instants = np.array([now, *(time for time in times if now < time < end), end])
         part = problem.integrate(y, ramp, instants, every_step=not len(times), method=method, rtol=rtol)
@@ -478,11 +478,11 @@ def simulate_sampled_blocks(
     y = sliders.start([V] * N, [float(one.steady_state(V)[0]) for one in sliders.laws])
     prestress = sliders.resisting(y)
     y = sliders.stressed(y, stress * np.sin(phases))
-    time, held, state = ca.MX.sym("t"), ca.MX.sym("held", m), ca.MX.sym("y", len(y))
+    time, pressures, state = ca.MX.sym("t"), ca.MX.sym("held", m), ca.MX.sym("y", len(y))
     planned = per_slip * course.slip(time)
-    load = ca.vertcat(0, planned, ca.jacobian(planned, time), ca.DM(prestress) if inertia else ca.MX(0, 1), held)
+    load = ca.vertcat(0, planned, ca.jacobian(planned, time), ca.DM(prestress) if inertia else ca.MX(0, 1), pressures)
     stresses = stress * ca.sin(turn * time + ca.DM(phases)), stress * turn * ca.cos(turn * time + ca.DM(phases))
-    rates = ca.Function("rates", [time, state, held], [ca.densify(sliders.field(state, load, *stresses))])
+    rates = ca.Function("rates", [time, state, pressures], [ca.densify(sliders.field(state, load, *stresses))])
     slips = [float(one.critical_slip) for one in sliders.laws]  # type: ignore[attr-defined]
     scales = [*slips, *[1.0] * (2 * N), *[MPA] * m]
     flow = adaptive_integrators()["cvodes"].flow(rates.expand(), scales, _SHARES, rtol=TIGHT_RTOL)
@@ -495,12 +495,12 @@ def simulate_sampled_blocks(
         u = MPA * (H @ z + D @ seen)
         z = F @ z + G @ seen if len(F) else z
         try:
-            found = flow.follow(now, step, y, u)[0]
+            samples = flow.follow(now, step, y, u)[0]
         except StoppedError as error:
             raise SimulationError(f"the run stopped at {now:g} s: {error}. Reduce the stress.") from None
-        rows += list(found.T)
+        rows += list(samples.T)
         times += [now + share * step for share in _SHARES]
-        y = found[:, -1]
+        y = samples[:, -1]
         progress(min(1.0, (now + step) / length))
     run = _run_of(sliders, np.array(times), np.array(rows))
     return replace(run, reference=np.asarray(course.slip(run.times)))

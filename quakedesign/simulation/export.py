@@ -151,8 +151,8 @@ def source_text(exported: ControllerStep, header: str) -> str:
     start = ",\n".join(f"    {value!r}" for value in exported.start.values())
     entries = {"applied": "", "given": ""}
     if exported.limited:
-        held = list(exported.start).index(HELD)
-        entries = {"applied": "const double* applied, ", "given": f"applied ? applied : &memory[{held}], "}
+        place = list(exported.start).index(HELD)
+        entries = {"applied": "const double* applied, ", "given": f"applied ? applied : &memory[{place}], "}
     return generator.dump() + c_file("controller.c", header=header, start=start, **entries, **_sizes(exported.function))
 
 
@@ -401,17 +401,17 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
     count, z = ca.vertsplit(memory, [0, 1, 1 + len(states)])
     pressures, later = decided(chain, law, count, measurement[:N], measurement[N:], z)
     outputs = ca.cse([ca.vertcat(count + 1, later), ca.densify(pressures)])
-    known = {"fault": chain.name, "blocks": str(N), "wells [m]": _text(chain.wells)}
+    facts = {"fault": chain.name, "blocks": str(N), "wells [m]": _text(chain.wells)}
     if chain.has_state:
         task, course = chain.fault.reference, "d((1 - c)t/T + c s^3(10 - 15s + 6s^2)), s = min(t/T, 1)"
         values = f"d = {task.target_slip!r} m, T = {task.operation_time!r} s, c = {task.ramp or 0.0!r}"
-        known |= {_PLAN: f"{planned_per_slip(chain)!r} Pa/m times r(t), r = {course}, {values}"}
+        facts |= {_PLAN: f"{planned_per_slip(chain)!r} Pa/m times r(t), r = {course}, {values}"}
     return ControllerStep(
         function=expanded(ca.Function("sampled_step", [measurement, memory], outputs)),
         measurement={f"{name}_{i + 1}": unit for name, unit in measured for i in range(N)},
         start=dict.fromkeys(["sample", *states], 0.0),
         step=float(law.step),
-        facts=known | library_versions("quakedesign", "casadi"),
+        facts=facts | library_versions("quakedesign", "casadi"),
         remarks=remarks,
     )
 
@@ -505,5 +505,5 @@ def _text(value: object) -> str:
         return f"[{', '.join(map(_text, value))}]"
     if not is_dataclass(value):
         return str(value)
-    held = {f.name: getattr(value, f.name) for f in fields(value)}
-    return ", ".join(f"{name} {_text(part)}" for name, part in held.items() if part not in (None, ()))
+    values = {f.name: getattr(value, f.name) for f in fields(value)}
+    return ", ".join(f"{name} {_text(part)}" for name, part in values.items() if part not in (None, ()))

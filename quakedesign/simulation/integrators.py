@@ -164,11 +164,11 @@ class AdaptiveIntegrator:
         start, length = ca.SX.sym("start"), ca.SX.sym("length")
         parameters, y, share = ca.SX.sym("parameters", count), ca.SX.sym("y", size), ca.SX.sym("share")
         sizes = ca.DM(np.asarray(scales, dtype=float))
-        found: Any = rates(start + share * length, y * sizes, parameters)
-        field, *more = found if isinstance(found, tuple | list) else (found,)
+        outputs: Any = rates(start + share * length, y * sizes, parameters)
+        field, *integrands = outputs if isinstance(outputs, tuple | list) else (outputs,)
         problem = {"x": y, "t": share, "p": ca.vertcat(start, length, parameters), "ode": length * field / sizes}
         if quadratures:
-            problem["quad"] = length * more[0]
+            problem["quad"] = length * integrands[0]
         options = {
             "reltol": rtol,
             "abstol": rtol * FLOOR,
@@ -204,10 +204,10 @@ class Flow:
             If the tolerance cannot be met, or a value is not finite.
         """
         try:
-            found = self.solver(x0=y / self.scales, p=[time, length, *parameters])
+            solution = self.solver(x0=y / self.scales, p=[time, length, *parameters])
         except RuntimeError as error:
             raise StoppedError(_reason(str(error))) from None
-        values, integrals = found["xf"].full() * self.scales[:, None], found["qf"].full()
+        values, integrals = solution["xf"].full() * self.scales[:, None], solution["qf"].full()
         if not (np.all(np.isfinite(values)) and np.all(np.isfinite(integrals))):
             raise StoppedError("a value is not finite")
         return values, integrals
@@ -261,14 +261,14 @@ def any_integrator(name: str) -> type[Integrator] | type[AdaptiveIntegrator]:
     ParameterError
         For an unknown name.
     """
-    known = integrators() | adaptive_integrators()
-    if name not in known:
+    available = integrators() | adaptive_integrators()
+    if name not in available:
         raise ParameterError(
             f"method must be one of {', '.join(sorted(integrators()))} (fixed step) or "
             f"{', '.join(sorted(adaptive_integrators()))} (adaptive step, smooth loops only). Received {name!r}."
-            f"{nearest_name(name, known)}"
+            f"{nearest_name(name, available)}"
         )
-    return known[name]
+    return available[name]
 
 
 class Cvodes(AdaptiveIntegrator):

@@ -80,16 +80,16 @@ def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters:
 def _free_plant(fault: Fault, controller: Controller | None, names: tuple[str, ...]) -> Any:
     """CasADi Function (t, x, p, parameters) → dx."""
     fault.require_memoryless("free parameters")
-    known = (*plant.PARAMETERS, *fault.friction.quantities())
+    available = (*plant.PARAMETERS, *fault.friction.quantities())
     if controller is not None:
         raise ParameterError(
             f"parameters apply only without a controller. Received the controller {controller.name}. Omit it."
         )
     for name in names:
-        if name not in known or names.count(name) > 1:
+        if name not in available or names.count(name) > 1:
             raise ParameterError(
-                f"parameters must be distinct names out of {', '.join(known)}. Received {name!r}"
-                f"{', twice' if name in known else ''}.{nearest_name(name, known) if name not in known else ''}"
+                f"parameters must be distinct names out of {', '.join(available)}. Received {name!r}"
+                f"{', twice' * (name in available)}.{'' if name in available else nearest_name(name, available)}"
             )
     acceleration, symbols = acceleration_with_parameters(fault, names)
     inputs = {"t": [plant.t], "x": [plant.x1, plant.x2], "p": [plant.p], "parameters": symbols}
@@ -184,7 +184,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     import control
 
     scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})
-    found, unknown = control_step(scheme.__class__, DiscreteLaw.of(controller, 0.0)), ca.SX.sym("unknown")
+    control_function, unknown = control_step(scheme.__class__, DiscreteLaw.of(controller, 0.0)), ca.SX.sym("unknown")
     own = [symbol.name for symbol in integral_symbols(controller)]
     names = [*own, *(f"memory_{i}" for i in range(len(scheme.initial_memory))), "held"]
     state, seen = ca.SX.sym("state", len(names)), ca.SX.sym("seen", len(_SEEN))
@@ -196,9 +196,11 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
         scheme.authority or unknown,
         state[-1],
     ]
-    numbers = ca.DM(found.numbers)
-    pressure, after, kept, _ = found.function(ca.vertcat(*signals), state[: len(own)], numbers, state[len(own) : -1])
-    later = ca.vertcat(after, kept, pressure)
+    numbers = ca.DM(control_function.numbers)
+    pressure, after, memory, _ = control_function.function(
+        ca.vertcat(*signals), state[: len(own)], numbers, state[len(own) : -1]
+    )
+    later = ca.vertcat(after, memory, pressure)
     if ca.depends_on(later, unknown):  # r'', future values of r and r', or B0
         raise UnsupportedError(
             "a controller without its fault knows neither the input gain nor future references. Received a law whose "
@@ -322,13 +324,13 @@ def _vertex(fault: Fault, ends: tuple[str, ...]) -> tuple[Any, Any]:
             "vertex must be three of low, middle and high, for slope, damping and input gain. "
             f"Received {len(ends)}: {', '.join(map(str, ends))}."
         )
-    known = uncertain_plant(fault)
-    found = []
-    for end, (low, high) in zip(ends, (known.slip_chord, known.rate_chord, known.beta), strict=True):
+    uncertain = uncertain_plant(fault)
+    chosen = []
+    for end, (low, high) in zip(ends, (uncertain.slip_chord, uncertain.rate_chord, uncertain.beta), strict=True):
         require_known(end, _ENDS, "end of a range")
-        found.append(float((low, (low + high) / 2, high)[_ENDS.index(end)]))
-    s, w, beta = found
-    return np.array([[0.0, 1.0], [s, -w]]), np.array([[0.0], [beta * float(known.authority)]])
+        chosen.append(float((low, (low + high) / 2, high)[_ENDS.index(end)]))
+    s, w, beta = chosen
+    return np.array([[0.0, 1.0], [s, -w]]), np.array([[0.0], [beta * float(uncertain.authority)]])
 
 
 def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actuator: Actuator | None = None) -> Any:
@@ -465,9 +467,12 @@ class _FrequencyResponse:
     def of(cls, loop: Any) -> "_FrequencyResponse":
         """Frequency response from far below the poles and zeros to far above them."""
         roots = np.concatenate([loop.poles(), loop.zeros()])
-        known = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
-        known = np.log(known[known > 1e-9 * np.max(known, initial=1.0)])
-        ends = np.min(known, initial=0.0) - 7, math.log(math.pi) if loop.dt else np.max(known, initial=0.0) + 7
+        logarithms = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
+        logarithms = np.log(logarithms[logarithms > 1e-9 * np.max(logarithms, initial=1.0)])
+        ends = (
+            np.min(logarithms, initial=0.0) - 7,
+            math.log(math.pi) if loop.dt else np.max(logarithms, initial=0.0) + 7,
+        )
         return cls(loop, np.linspace(*ends, _FREQUENCIES))
 
     def at(self, places: Any) -> Any:
@@ -477,11 +482,11 @@ class _FrequencyResponse:
     @property
     def modulus_margin(self) -> float:
         """min |1 + L| [-]."""
-        found = np.abs(1 + self.at(self.places))
-        least = int(np.argmin(found))
-        ends = self.places[max(least - 1, 0)], self.places[min(least + 1, len(found) - 1)]
+        distances = np.abs(1 + self.at(self.places))
+        least = int(np.argmin(distances))
+        ends = self.places[max(least - 1, 0)], self.places[min(least + 1, len(distances) - 1)]
         inside = minimize_scalar(lambda x: abs(1 + self.at(x)), bounds=ends, method="bounded", options={"xatol": 1e-10})
-        return float(min(found[least], inside.fun))
+        return float(min(distances[least], inside.fun))
 
     @property
     def phase_margin(self) -> float | None:

@@ -79,7 +79,7 @@ def _positive(name: str, value: float) -> float:
 def trajectory(
     recorder: Recorder,
     setting: RunSetting,
-    kept: np.ndarray,
+    vectors: np.ndarray,
     criterion: OutcomeCriterion,
     provenance: Json,
     began: tuple[float, float],
@@ -101,11 +101,11 @@ def trajectory(
     vector = ca.SX.sym("z", recorder.size)
     named = recorder.signals(vector)
     observe = ca.Function("observe", [vector], [recorder.observe(vector)])
-    end = observe(kept[:, -1]).full().ravel()
+    end = observe(vectors[:, -1]).full().ravel()
     watched, ended = recorder.watched(end), perf_counter()
     if watched["diverged"] >= 0:
-        kept = kept[:, kept[0] * setting.step < watched["diverged"]]
-    if not kept.size:
+        vectors = vectors[:, vectors[0] * setting.step < watched["diverged"]]
+    if not vectors.size:
         raise SimulationError("the initial values of the loop are infinite or undefined: check the gains and the load")
     took = {"preparation_seconds": began[1] - began[0], "stepping_seconds": ended - began[1]}
     loop = recorder.loop
@@ -119,11 +119,11 @@ def trajectory(
         sticks=loop.sticks,
         further=recorder.scheme.described,
     )
-    values = ca.Function("signals", [vector], list(named.values())).call([kept])
+    values = ca.Function("signals", [vector], list(named.values())).call([vectors])
     columns: dict[str, Any] = {name: value.full().ravel() for name, value in zip(named, values, strict=True)}
     if loop.controller is None:  # there is no reference to track
         columns |= dict.fromkeys(("reference", "reference_rate", "matched_perturbation"))
-    columns["integrals"] = kept[4 : 4 + len(loop.integrals)]
+    columns["integrals"] = vectors[4 : 4 + len(loop.integrals)]
     described = recorder.scheme.described
     further = {name: (columns.pop(name), *description) for name, description in described.items()}
     return LoopTrajectory(
@@ -233,19 +233,19 @@ def run(
     """Trajectory of a recorder's loop with a fixed step; see `simulate`."""
     began = perf_counter()
     step, start = _step(recorder, method), recorder.start(setting.settled_from)
-    wanted = instants(setting.steps, setting.samples)
-    file = Checkpoint.of(checkpoint, step, start, wanted) if checkpoint else None
+    stored = instants(setting.steps, setting.samples)
+    file = Checkpoint.of(checkpoint, step, start, stored) if checkpoint else None
     steps = setting.steps * recorder.scheme.settings.get("substeps", 1)
-    key = stepping.run_key(step, start, wanted, compiled, steps)
+    key = stepping.run_key(step, start, stored, compiled, steps)
     if file is None and (answer := stepping.recall_run(key)) is not None:
-        (kept, reported), ready = answer, perf_counter()
+        (vectors, reported), ready = answer, perf_counter()
     else:
         backend = prepare(step, compiled, steps)
         ready = perf_counter()
-        kept = march(Advancer.of(backend, start), wanted, recorder.index("diverged"), progress, file)
+        vectors = march(Advancer.of(backend, start), stored, recorder.index("diverged"), progress, file)
         reported = {"backend": backend.name, "backend_reason": backend.reason}
-        stepping.store_run(key, kept, reported)
-    return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | reported, (began, ready))
+        stepping.store_run(key, vectors, reported)
+    return trajectory(recorder, setting, vectors, criterion, _provenance(recorder, method) | reported, (began, ready))
 
 
 def run_adaptive(
@@ -263,10 +263,10 @@ def run_adaptive(
         raise ParameterError(f"a checkpoint needs a fixed step. Received method {method.name}. Use dormand-prince.")
     require_smooth(recorder, method.name)
     began = perf_counter()
-    start, wanted = recorder.start(setting.settled_from), instants(setting.steps, setting.samples)
-    kept = smooth_march(recorder, method, rtol, start, wanted, progress)
+    start, stored = recorder.start(setting.settled_from), instants(setting.steps, setting.samples)
+    vectors = smooth_march(recorder, method, rtol, start, stored, progress)
     entries = {"backend": "sundials", "rtol": rtol, "floor": FLOOR}
-    return trajectory(recorder, setting, kept, criterion, _provenance(recorder, method) | entries, (began, began))
+    return trajectory(recorder, setting, vectors, criterion, _provenance(recorder, method) | entries, (began, began))
 
 
 def _step(recorder: Recorder, method: type[Integrator]) -> ca.Function:

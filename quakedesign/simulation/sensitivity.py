@@ -32,7 +32,7 @@ QUANTITIES = {
     "matched_error": ("max |e3|", "m/s^2"),
 }
 _COLOURS = {"explicit": "#D55E00", "implicit": "#0072B2", "semi-implicit": "#CC79A7", "compensated": "#009E73"}
-_KEPT = 20_000
+_MOST_SAMPLES = 20_000
 
 
 @checked_dataclass(frozen=True, kw_only=True)
@@ -59,8 +59,8 @@ class Study:
     def rows(self) -> list[Json]:
         """One row per scheme and level."""
         return [
-            {"scheme": scheme, self.label: level} | {name: values[i] for name, values in found.items()}
-            for scheme, found in self.errors.items()
+            {"scheme": scheme, self.label: level} | {name: values[i] for name, values in errors.items()}
+            for scheme, errors in self.errors.items()
             for i, level in enumerate(self.levels)
         ]
 
@@ -104,8 +104,10 @@ class Study:
 
     def _panel(self, axis: "Axes", name: str) -> None:
         label, unit = QUANTITIES[name]
-        for scheme, found in self.errors.items():
-            axis.plot(self.levels, found[name], "o-", ms=3, lw=1.2, color=_COLOURS.get(scheme, "#555555"), label=scheme)
+        for scheme, errors in self.errors.items():
+            axis.plot(
+                self.levels, errors[name], "o-", ms=3, lw=1.2, color=_COLOURS.get(scheme, "#555555"), label=scheme
+            )
         wide = min(self.levels) > 0 and max(self.levels) > 10 * min(self.levels)
         axis.set_xscale("log" if wide else "linear")
         axis.set_yscale("log")
@@ -156,7 +158,7 @@ def accuracy(
             step=step,
             duration=duration,
             settled_from=settled_from,
-            samples=_KEPT,
+            samples=_MOST_SAMPLES,
             plant=PRINTED,
         )
 
@@ -267,8 +269,8 @@ def _study(
 ) -> Study:
     errors = {}
     for scheme in schemes:
-        found = [_errors(run(scheme, level), matched) for level in levels]
-        errors[scheme] = {name: tuple(values[name] for values in found) for name in found[0]}
+        errors_of_levels = [_errors(run(scheme, level), matched) for level in levels]
+        errors[scheme] = {name: tuple(values[name] for values in errors_of_levels) for name in errors_of_levels[0]}
     label, unit = parameter
     return Study(title=title, label=label, unit=unit, levels=levels, errors=errors)
 

@@ -113,9 +113,9 @@ class Resolved(OdeSolver):  # type: ignore[misc]
 class _Between(DenseOutput):  # type: ignore[misc]
     """Values within a step, computed by the solver; at its ends the known values."""
 
-    def __init__(self, solver: Resolved, known: dict[float, np.ndarray]) -> None:
+    def __init__(self, solver: Resolved, dense: dict[float, np.ndarray]) -> None:
         super().__init__(solver.t_old, solver.t)
-        self._solver, self._known = solver, known
+        self._solver, self._known = solver, dense
 
     def _call_impl(self, t: np.ndarray) -> np.ndarray:
         return np.array([self._at(float(time)) for time in t]).T if t.ndim else self._at(float(t))
@@ -196,8 +196,8 @@ class SmoothProblem:
         SimulationError
             If the method stops.
         """
-        known = (*METHODS, *adaptive_integrators())
-        require_known(method, known, "method")
+        available = (*METHODS, *adaptive_integrators())
+        require_known(method, available, "method")
         require_tolerance(rtol)
         began, clock = float(times[0]), replace(load, start=load.start - float(times[0]))
         solution = self._stepped(start, clock, times - began, every_step=every_step, method=method, rtol=rtol)
@@ -356,10 +356,10 @@ def smooth_march(
     method: type[AdaptiveIntegrator],
     rtol: float,
     start: list[float],
-    kept: list[int],
+    instants: list[int],
     progress: Callable[[float], None] | None = None,
 ) -> "np.ndarray":
-    """Vectors at the step numbers `kept`, one per column, until the first step at which the run has diverged.
+    """Vectors at the step numbers `instants`, one per column, until the first step at which the run has diverged.
 
     Raises
     ------
@@ -367,9 +367,9 @@ def smooth_march(
         If the solver stops without divergence.
     """
     pieces = cache(partial(_piece, recorder, method, rtol))
-    wanted, vector, found, longest = set(kept), np.array(start), [np.array(start)], CHUNK
-    while (now := recorder.parts(vector)).counter < kept[-1] and now.watched["diverged"] < 0:
-        count, vectors = min(longest, kept[-1] - round(now.counter)), None
+    stored, vector, columns, longest = set(instants), np.array(start), [np.array(start)], CHUNK
+    while (now := recorder.parts(vector)).counter < instants[-1] and now.watched["diverged"] < 0:
+        count, vectors = min(longest, instants[-1] - round(now.counter)), None
         while vectors is None:  # if the solver stops, retry with fewer steps
             try:
                 vectors = pieces(count)(vector)
@@ -382,13 +382,13 @@ def smooth_march(
                 count = max(1, count // _FEWER)
         longest = min(longest, count)
         counters = recorder.parts(vectors).counter
-        found += [column for column, counter in zip(vectors.T, counters, strict=True) if round(counter) in wanted]
+        columns += [column for column, counter in zip(vectors.T, counters, strict=True) if round(counter) in stored]
         vector = vectors[:, -1]
         if progress:
-            progress(counters[-1] / kept[-1])
-    if recorder.parts(found[-1]).counter != now.counter:
-        found.append(vector)
-    return np.array(found).T
+            progress(counters[-1] / instants[-1])
+    if recorder.parts(columns[-1]).counter != now.counter:
+        columns.append(vector)
+    return np.array(columns).T
 
 
 def _piece(

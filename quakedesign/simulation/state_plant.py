@@ -152,14 +152,14 @@ class SpringSlider:
             If the rate or a state is not positive, or the number of states is not that of the law.
         """
         require_positive("Their logarithms are the variables of the simulation.", start_rate=at_rate)
-        held = self.law.steady_state(at_rate) if states is None else states
-        if len(held) != len(self.law.state_names):
-            raise ParameterError(f"start_state must have {len(self.law.state_names)} values. Received {len(held)}.")
+        initial = self.law.steady_state(at_rate) if states is None else states
+        if len(initial) != len(self.law.state_names):
+            raise ParameterError(f"start_state must have {len(self.law.state_names)} values. Received {len(initial)}.")
         require_positive(
-            "Rate and state enter by their logarithms.", **dict(zip(self.law.state_names, held, strict=True))
+            "Rate and state enter by their logarithms.", **dict(zip(self.law.state_names, initial, strict=True))
         )
-        logs = [float(sp.log(rational_number(value)).evalf(30)) for value in (at_rate, *held)]
-        friction = float(sp.N(self.law.exact().coefficient(0, *map(rational_number, (at_rate, *held))), 30))
+        logs = [float(sp.log(rational_number(value)).evalf(30)) for value in (at_rate, *initial)]
+        friction = float(sp.N(self.law.exact().coefficient(0, *map(rational_number, (at_rate, *initial))), 30))
         resisting = (self.normal_stress - pressure) * friction + self.damping * at_rate
         return [0.0, resisting / self.stiffness, *logs]
 
@@ -325,9 +325,9 @@ class PressurePath:
         Partial fractions of the diffusion path in series with the lag: exact but for the truncation error of 24
         modes. If the rate of the lag equals that of a mode, it is reduced by a relative 1e-9.
         """
-        rock = Layer(time=self.diffusion or Fraction(1))
-        found = [(float(rock.rate(i)), float(rock.share(i))) for i in range(MODES if self.diffusion else 0)]
-        rates, shares = np.array(found).reshape(-1, 2).T
+        path = Layer(time=self.diffusion or Fraction(1))
+        modes = [(float(path.rate(i)), float(path.share(i))) for i in range(MODES if self.diffusion else 0)]
+        rates, shares = np.array(modes).reshape(-1, 2).T
         if not self.lag:
             return rates, shares
         own = 1 / float(self.lag)
@@ -356,7 +356,7 @@ class Instruments:
         """Instruments before the first sample."""
         late = [stage for stage in path.stages if isinstance(stage, Delay)]
         others = [stage for stage in path.stages if not isinstance(stage, Delay)]
-        stages = (_remembering(_held(s, step)) for s in (late, others))
+        stages = (_remembering(_actuator_function(s, step)) for s in (late, others))
         return cls(step, Actuator(stages=path.stages).part, _remembering(_read(transducer, step)), *stages)
 
     def read(self, slip: float) -> float:
@@ -382,7 +382,7 @@ def _read(transducer: Transducer | None, step: float) -> "tuple[ca.Function, tup
     return ca.Function("reading", [memory, slip], [seen, ca.vertcat(*after)]), transducer.start
 
 
-def _held(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tuple[float, ...]] | None":
+def _actuator_function(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tuple[float, ...]] | None":
     """CasADi Function (memory, commanded pressure) → held pressure, memory, and initial memory; None without stages."""
     if not stages:
         return None
@@ -401,7 +401,7 @@ def _remembering(element: tuple[ca.Function, tuple[float, ...]] | None) -> Calla
     memory = [ca.DM(start)]
 
     def passed_on(value: float) -> Any:
-        found, memory[0] = function(memory[0], value)
-        return found
+        output, memory[0] = function(memory[0], value)
+        return output
 
     return passed_on

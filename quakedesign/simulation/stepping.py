@@ -39,7 +39,7 @@ class Checkpoint:
     _written: list[float] = field(default_factory=lambda: [monotonic()], repr=False)
 
     @classmethod
-    def of(cls, path: str | Path, step: "ca.Function", start: Sequence[float], kept: Sequence[int]) -> "Checkpoint":
+    def of(cls, path: str | Path, step: "ca.Function", start: Sequence[float], instants: Sequence[int]) -> "Checkpoint":
         """Checkpoint of a run.
 
         Parameters
@@ -52,7 +52,7 @@ class Checkpoint:
         kept : sequence of int
             Numbers of the steps to store.
         """
-        inputs = (step.serialize(), *(float(x).hex() for x in start), *map(str, kept), version("casadi"))
+        inputs = (step.serialize(), *(float(x).hex() for x in start), *map(str, instants), version("casadi"))
         return cls(Path(path), hashlib.sha256("\n".join(inputs).encode()).hexdigest())
 
     def read(self) -> "list[np.ndarray]":
@@ -67,8 +67,8 @@ class Checkpoint:
         """
         sweep(self.path.parent)
         try:
-            with np.load(BytesIO(self.path.read_bytes()), allow_pickle=False) as held:
-                fingerprint, vectors = str(held["fingerprint"]), held["vectors"]
+            with np.load(BytesIO(self.path.read_bytes()), allow_pickle=False) as archive:
+                fingerprint, vectors = str(archive["fingerprint"]), archive["vectors"]
         except FileNotFoundError:
             return []
         except OSError as error:
@@ -171,35 +171,35 @@ def instants(steps: int, samples: int) -> list[int]:
 
 def march(
     advancer: Advancer,
-    kept: list[int],
+    instants: list[int],
     diverged_at: int,
     progress: ProgressReport | None,
     checkpoint: Checkpoint | None = None,
 ) -> "np.ndarray":
-    """Vectors at the instants `kept`, one per column; ends early once the entry `diverged_at` is set.
+    """Vectors at the step numbers `instants`, one per column; ends early once the entry `diverged_at` is set.
 
     Python code runs between two calls, so that the user can interrupt the run and see its progress. The vectors stored
     so far are in the checkpoint, if there is one; the next call resumes from these.
     """
-    found = (checkpoint.read() if checkpoint else []) or [advancer.vector.copy()]
-    advancer.vector[:] = found[-1]
+    vectors = (checkpoint.read() if checkpoint else []) or [advancer.vector.copy()]
+    advancer.vector[:] = vectors[-1]
     try:
-        for before, after in pairwise(kept[len(found) - 1 :]):
+        for before, after in pairwise(instants[len(vectors) - 1 :]):
             if advancer.vector[diverged_at] >= 0:
                 break
             advancer.advance(after - before)
-            found.append(advancer.vector.copy())
+            vectors.append(advancer.vector.copy())
             if progress:
-                progress(after / kept[-1])
+                progress(after / instants[-1])
             if checkpoint:
-                checkpoint.write(found)
+                checkpoint.write(vectors)
     except BaseException:
         if checkpoint:
-            checkpoint.write(found, now=True)
+            checkpoint.write(vectors, now=True)
         raise
     if checkpoint:
         checkpoint.remove()
-    return np.array(found).T
+    return np.array(vectors).T
 
 
 # ----------------------------------------------------------------------
@@ -222,9 +222,9 @@ def recall_run(key: tuple[bytes, ...]) -> tuple["np.ndarray", dict[str, str]] | 
     """Cached vectors, one per column, and the provenance entries of the backend; None if the run is not cached."""
     if not key or (content := cache.load("run", *key)) is None:
         return None
-    with np.load(BytesIO(content), allow_pickle=False) as kept:
-        entries = {name: str(kept[name]) for name in kept.files if name != "vectors"}
-        return kept["vectors"], entries | {"backend_reason": f"{entries['backend_reason']}; from the cache"}
+    with np.load(BytesIO(content), allow_pickle=False) as archive:
+        entries = {name: str(archive[name]) for name in archive.files if name != "vectors"}
+        return archive["vectors"], entries | {"backend_reason": f"{entries['backend_reason']}; from the cache"}
 
 
 def store_run(key: tuple[bytes, ...], vectors: "np.ndarray", entries: dict[str, str]) -> None:

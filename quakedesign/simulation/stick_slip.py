@@ -171,16 +171,16 @@ def _pieces(loading: Any, duration: float | None) -> list[tuple[float, float]]:
 def _output_times(times: Any, pieces: list[tuple[float, float]]) -> "np.ndarray | None":
     if times is None:
         return None
-    wanted, end = np.asarray(times, dtype=float), math.fsum(length for length, _ in pieces)
+    instants, end = np.asarray(times, dtype=float), math.fsum(length for length, _ in pieces)
     if (
-        wanted.ndim != 1
-        or not len(wanted)
-        or np.any(np.diff(wanted) <= 0)
-        or wanted[0] < 0
-        or wanted[-1] > end * (1 + 1e-12)
+        instants.ndim != 1
+        or not len(instants)
+        or np.any(np.diff(instants) <= 0)
+        or instants[0] < 0
+        or instants[-1] > end * (1 + 1e-12)
     ):
         raise ParameterError(f"times must ascend between 0 and the duration ({end!r} s). Received {times!r}.")
-    return np.asarray(np.minimum(wanted, end))
+    return np.asarray(np.minimum(instants, end))
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ class _History:
     problem: SmoothProblem
     pieces: list[tuple[float, float]]
     course: PressureHistory
-    wanted: "np.ndarray | None"
+    output_times: "np.ndarray | None"
     method: str
     rtol: float
 
@@ -201,12 +201,16 @@ class _History:
             y, onset = self._stepped(y, now)
             pressure = self.course.after(now)
             slope = (self.course.before(end) - pressure) / (end - now)
-            inner = np.empty(0) if self.wanted is None else self.wanted[(self.wanted > now) & (self.wanted < end)]
+            inner = (
+                np.empty(0)
+                if self.output_times is None
+                else self.output_times[(self.output_times > now) & (self.output_times < end)]
+            )
             part = self.problem.integrate(
                 y,
                 Ramp(now, (load, pressure, slope), (0.0, slope, 0.0)),
                 np.array([now, *inner, end]),
-                every_step=self.wanted is None,
+                every_step=self.output_times is None,
                 method=self.method,
                 rtol=self.rtol,
             )
@@ -216,23 +220,23 @@ class _History:
 
     def _spans(self) -> "list[tuple[float, float, float]]":
         """Start, end [s] and loading rate [m/s] of spans of limited length with smooth loading and pressure."""
-        found, now = [], 0.0
+        spans, now = [], 0.0
         for length, load in self.pieces:
             end = now + length
             inside = {time for time in self.course.times if now < time < end}
             inside |= {now + i * _LONGEST for i in range(1, math.ceil(length / _LONGEST))}
-            found += [(a, b, load) for a, b in pairwise((now, *sorted(inside), end))]
+            spans += [(a, b, load) for a, b in pairwise((now, *sorted(inside), end))]
             now = end
-        return found
+        return spans
 
     def _stepped(self, y: "np.ndarray", now: float) -> "tuple[np.ndarray, np.ndarray]":
         """Variables after a step of the pressure at this time, if any; the time if the rate jumps above the onset."""
         before, after = self.course.before(now), self.course.after(now)
         if before == after:
             return y, np.empty(0)
-        found, watched = self.slider.stepped(y, before, after), self.problem.watched
-        risen = y[watched] < self.problem.level <= found[watched]
-        return found, np.array([now] if risen else [])
+        stepped, watched = self.slider.stepped(y, before, after), self.problem.watched
+        risen = y[watched] < self.problem.level <= stepped[watched]
+        return stepped, np.array([now] if risen else [])
 
     def _joined(self, start: "np.ndarray", parts: list[SmoothSolution]) -> SmoothSolution:
         """All parts joined; at a jump both values are returned, but only the later one at a requested instant."""
@@ -242,9 +246,9 @@ class _History:
             times.append(part.time[same:])
             values.append(part.values[:, same:])
         time, value = np.concatenate(times), np.concatenate(values, axis=1)
-        if self.wanted is not None:
-            kept = np.isin(time, self.wanted) & np.append(np.diff(time) > 0, True)
-            time, value = time[kept], value[:, kept]
+        if self.output_times is not None:
+            selected = np.isin(time, self.output_times) & np.append(np.diff(time) > 0, True)
+            time, value = time[selected], value[:, selected]
         crossings = np.concatenate([part.crossings for part in parts])
         return SmoothSolution(time, value, crossings, sum(part.evaluations for part in parts))
 
@@ -315,15 +319,15 @@ def _energy(
     """Energy budget of an area [m²] from forces integrated along the paths of block and load point."""
     slip, stretch, rate = values[0], values[1], np.exp(values[2])
 
-    def gained(energy: "np.ndarray") -> float:
+    def change_of(energy: "np.ndarray") -> float:
         return float(area * (energy[-1] - energy[0]))
 
     def work(force: "np.ndarray", path: "np.ndarray") -> float:
         return float(area * np.trapezoid(force, path))
 
     return EnergyBudget(
-        kinetic=gained(0.5 * slider.mass * rate**2),
-        elastic=gained(0.5 * slider.stiffness * stretch**2),
+        kinetic=change_of(0.5 * slider.mass * rate**2),
+        elastic=change_of(0.5 * slider.stiffness * stretch**2),
         frictional=work((slider.normal_stress - pressure) * friction, slip),
         injection=work(pressure * friction, slip),
         viscous=work(slider.damping * rate, slip),
@@ -408,13 +412,13 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> I
             f"an initial condition late in the cycle needs repeated events. Received {fault.name}, which is stable. "
             "Use steady sliding as initial condition."
         )
-    found = cycles(fault, rate, **settings)
-    if len(found.onsets) < _CYCLES:
+    cycle = cycles(fault, rate, **settings)
+    if len(cycle.onsets) < _CYCLES:
         raise ParameterError(
-            f"a start late in the cycle needs repeated events. Received {fault.name}, with {len(found.onsets)} of "
-            f"them in {found.time[-1]:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
+            f"a start late in the cycle needs repeated events. Received {fault.name}, with {len(cycle.onsets)} of "
+            f"them in {cycle.time[-1]:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
         )
-    before, after = found.onsets[-2:]
+    before, after = cycle.onsets[-2:]
     time = float(before + share * (after - before))
     settings |= disturbed(fault, rate).settings
     run = simulate_state(fault, rate, duration=math.nextafter(time, math.inf), times=[time], **settings)

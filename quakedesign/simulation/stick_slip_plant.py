@@ -48,7 +48,7 @@ class StickSlipLoop(ClosedLoop):
         return rates
 
     @property
-    def held(self) -> Motion:
+    def resting_plant(self) -> Motion:
         """As `plant`, with the friction of a fault at rest, which is larger with healing."""
         plant, excess = self.plant, self.fault.friction.rest_excess
         _, normal, _, stress = self.hats()
@@ -58,7 +58,7 @@ class StickSlipLoop(ClosedLoop):
 
     def resting_load(self, time: ca.SX, slip: ca.SX, pressure: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Load minus friction, load plus friction [m/s²] at rest (SX); rest persists while first ≤ 0 ≤ second."""
-        forward = self.held(time, ca.vertcat(slip, 0), pressure)[1]
+        forward = self.resting_plant(time, ca.vertcat(slip, 0), pressure)[1]
         _, normal, _, stress = self.hats()
         friction = self.friction(ca.vertcat(slip, 0)) + self.fault.friction.rest_excess
         return forward, forward + 2 * normal * friction * ca.fmax(stress - pressure, 0)
@@ -70,13 +70,13 @@ class StickSlipLoop(ClosedLoop):
     def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
         """Shear stress [Pa]: μ max(σ' − p, 0) in slip, or the stress that balances the load at rest (SX)."""
         closed = ca.fmax(self.fault.effective_normal_stress - pressure, 0)
-        strength, held = friction * closed, (friction + self.fault.friction.rest_excess) * closed
-        load = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + held
-        return ca.if_else(state[1] == 0, ca.fmin(load, held), strength)
+        strength, rest_strength = friction * closed, (friction + self.fault.friction.rest_excess) * closed
+        load = self.resting_load(time, state[0], pressure)[0] / self.hats()[1] + rest_strength
+        return ca.if_else(state[1] == 0, ca.fmin(load, rest_strength), strength)
 
     def advance(self, method: type[Integrator], motion: Motion, state: ca.SX, step: float, works: int = 0) -> ca.SX:
         """State after one step, with at most one release and one stop; the last `works` states are works."""
-        moved = _SplitStep(self.plant, self.held, method, motion, step, works)
+        moved = _SplitStep(self.plant, self.resting_plant, method, motion, step, works)
         rests, starting = state[1] == 0, moved.starting_acceleration(0.0, state)
         release = _crossing(starting, moved.starting_acceleration(1.0, moved.rested(0.0, 1.0, state)))
         begin = ca.if_else(rests, ca.if_else(starting > 0, 0.0, release), 0.0)
@@ -91,7 +91,7 @@ class _SplitStep:
     """Motion within one step, divided at shares [-] of its length."""
 
     plant: Motion
-    held: Motion
+    resting_plant: Motion
     method: type[Integrator]
     motion: Motion
     step: float
@@ -103,7 +103,7 @@ class _SplitStep:
 
     def starting_acceleration(self, passed: Number, state: ca.SX) -> ca.SX:
         """Acceleration [m/s²] from rest; positive if friction cannot carry the load."""
-        return self.motion(self.held, passed, ca.vertcat(state[0], 0, state[2:]))[1]
+        return self.motion(self.resting_plant, passed, ca.vertcat(state[0], 0, state[2:]))[1]
 
     def slid(self, passed: Number, share: Number, state: ca.SX) -> ca.SX:
         """State after the fault slips for a share of the step."""

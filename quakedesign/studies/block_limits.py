@@ -182,8 +182,8 @@ def chain_limits(
         if mode.pressure is not None:
             ratio, p = largest / mode.pressure, mode.pole
             late = float(np.log(max(ratio, 1.0))) / p
-            rock = float(np.arccosh(max(ratio * np.exp(-p * step), 1.0))) ** 2 / p
-            far = float(np.sqrt(rock * diffusivity))
+            diffusion = float(np.arccosh(max(ratio * np.exp(-p * step), 1.0))) ** 2 / p
+            far = float(np.sqrt(diffusion * diffusivity))
             needed = mode.pressure * float(np.exp(p * step))
             mode = replace(mode, pressure=needed, longest_step=late, farthest_well=far)
         modes.append(mode)
@@ -291,13 +291,15 @@ def _modes(
         turned = np.linalg.svd(rows @ felt)[0].conj().T
         shapes = columns @ np.linalg.inv(turned)
         for row, shape in zip(turned @ rows, shapes.T, strict=True):
-            reach, steady = np.abs(row @ felt).sum(), np.abs(row @ B).sum()
-            reached = bool(reach and steady > _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B))
+            largest_effect, steady = np.abs(row @ felt).sum(), np.abs(row @ B).sum()
+            reached = bool(largest_effect and steady > _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B))
             sized = reached and not wave and size is not None
             yield UnstableMode(
                 pole=float(pole.real),
                 frequency=wave,
                 shape=tuple(np.real(shape / shape[np.argmax(np.abs(shape))]).tolist()),
                 reached=reached,
-                pressure=size * float(np.abs(row @ entries).sum() / reach) if sized and size is not None else None,
+                pressure=size * float(np.abs(row @ entries).sum() / largest_effect)
+                if sized and size is not None
+                else None,
             )

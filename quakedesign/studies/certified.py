@@ -296,22 +296,22 @@ def largest_sampling_time(fault: Fault, controller: Controller, lipschitz: float
     """
     window = min(_WINDOW * fault.sampling_time, fault.reference.operation_time)
 
-    def holds(step: float) -> bool:
+    def proves(step: float) -> bool:
         run = simulate(fault, controller, step=step, duration=window, samples=2)
         rate = run.metrics.max_h_rate
         return rate is not None and rate <= lipschitz
 
     high = fault.sampling_time
-    if holds(high):
+    if proves(high):
         return high
     low = high / 4
-    while not holds(low):
+    while not proves(low):
         high, low = low, low / 4
         if low < fault.sampling_time / _FINEST:
             return None
     for _ in range(_HALVINGS):
         middle = (low * high) ** 0.5
-        low, high = (middle, high) if holds(middle) else (low, middle)
+        low, high = (middle, high) if proves(middle) else (low, middle)
     return float(f"{low * 0.995:.2g}")
 
 

@@ -247,9 +247,9 @@ def designs_of(
     options: Mapping[str, Any] | None = None,
 ) -> Iterator[Design]:
     """Designs of the named laws, one after the other, with options of `quakedesign.design`."""
-    wanted = list(names)
-    for i, name in enumerate(wanted):
-        progress(f"synthesis and proof of {name}", i / len(wanted))
+    listed = list(names)
+    for i, name in enumerate(listed):
+        progress(f"synthesis and proof of {name}", i / len(listed))
         yield synthesise(fault, name, progress=progress, **(options or {}))
 
 

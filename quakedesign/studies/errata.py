@@ -102,15 +102,15 @@ def find_rows(numbers: Iterable[int | str] = ()) -> tuple[ErrataRow, ...]:
         For a number without a row, and for a value that is not a whole number.
     """
     rows = {str(row.number): row for row in errata_rows()}
-    wanted = list(dict.fromkeys(str(n).strip() for n in numbers))
-    for number in wanted:
+    requested = list(dict.fromkeys(str(n).strip() for n in numbers))
+    for number in requested:
         if number not in rows:
             first, last = min(map(int, rows)), max(map(int, rows))
             raise UnknownNameError(
                 f"row of the errata must be a whole number from {first} to {last}. Received {number!r}. "
                 "Omit the row to run every row."
             )
-    return tuple(rows[n] for n in wanted) if wanted else errata_rows()
+    return tuple(rows[n] for n in requested) if requested else errata_rows()
 
 
 def run_rows(numbers: Iterable[int | str] = ()) -> list[Json]:

@@ -435,8 +435,8 @@ def _rock(fault: Fault) -> list[str]:
     numbers = ", ".join(
         f"{name} {getattr(law, name):.4g} {field.metadata['unit']}".strip() for name, field in law.quantities().items()
     )
-    rock = f"shear waves {speed:.4g} m/s{unlikely}, effective normal stress {stress}"
-    return [f"{rock}, friction {law.name}: {numbers}", *box_sentences(fault)]
+    material = f"shear waves {speed:.4g} m/s{unlikely}, effective normal stress {stress}"
+    return [f"{material}, friction {law.name}: {numbers}", *box_sentences(fault)]
 
 
 def box_sentence(fault: Fault) -> str:

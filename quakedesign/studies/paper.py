@@ -138,7 +138,10 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
     """
     task = uncertain_plant(fault)
     designs = {"peak": design_sampled_law(task, step, objective="peak")}
-    designs |= {f"tracking, {room:g} times the peak": design_sampled_law(task, step, allowance=room) for room in ROOMS}
+    designs |= {
+        f"tracking, {allowance:g} times the peak": design_sampled_law(task, step, allowance=allowance)
+        for allowance in ROOMS
+    }
     length = min(_PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
     return tuple(
         FrontPoint(

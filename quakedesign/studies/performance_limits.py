@@ -401,17 +401,17 @@ def _limits_at_rest(
 
 
 def _limits_by_name(
-    push: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
+    theorem: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
 ) -> dict[str, Bound | None]:
     """Performance limits of every controller by name; None where no limit is known."""
-    reaction, path = longest_reaction(push, withdrawal), longest_diffusion(push, withdrawal, step)
+    reaction, path = longest_reaction(theorem, withdrawal), longest_diffusion(theorem, withdrawal, step)
     return {
         "peak_slip_rate_error": peak,
         "largest_step": reaction,
         "largest_delay": None if reaction is None else UpperBound(max(reaction - step, Fraction(0))),
         "largest_diffusion_time": path,
         "farthest_well": None if path is None else farthest_well(path, diffusivity),
-        "smallest_pressure": smallest_withdrawal(push, step),
+        "smallest_pressure": smallest_withdrawal(theorem, step),
     }
 
 
@@ -478,13 +478,13 @@ def _sliding_limits(
             "limits of slow sliding need a shear stress disturbance above 0. Received none, and no design was "
             f"found that withstands any{why}. Give --stress, such as '25 kPa'."
         )
-    push = SlidingPush(model=model, amplitude=amplitude)
-    farthest, rock = longest_diffusion(push, withdrawal, step), (path or IDEAL).diffusion
-    if path is not None and (farthest is None or rock <= farthest):
+    theorem = SlidingPush(model=model, amplitude=amplitude)
+    farthest, diffusion = longest_diffusion(theorem, withdrawal, step), (path or IDEAL).diffusion
+    if path is not None and (farthest is None or diffusion <= farthest):
         behind = guarantee_sliding(fault, stress=requested, spread=off, setup=ExactSetup.of(path)).proof
         proof = behind if behind.available else None
-        push = replace(push, amplitude=proof.task.stress) if proof else push
-    impossible = _limits_by_name(push, withdrawal, step, spread, push.smallest_rate_error(step))
+        theorem = replace(theorem, amplitude=proof.task.stress) if proof else theorem
+    impossible = _limits_by_name(theorem, withdrawal, step, spread, theorem.smallest_rate_error(step))
     proved: dict[str, Bound | None] = {}
     if proof is not None:
         proved["peak_slip_rate_error"] = above_the_reference(proof)
@@ -500,9 +500,9 @@ def _sliding_limits(
         **limits_by_name | {"smallest_pressure": replace(limits_by_name["smallest_pressure"], title="pressure")},
         proved=(),
         sensing=Sensing(),
-        push=push,
+        push=theorem,
         guarantee=proof,
-        rock=rock,
+        rock=diffusion,
     )
 
 

@@ -316,9 +316,9 @@ def _start(
     fault: Fault, kind: str, rate: float, hold: float | None, share: float | None, settings: dict[str, Any]
 ) -> InitialCondition:
     options = {"hold": hold, "share": share}
-    wanted: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
-    require_known(kind, wanted, "start", UnknownNameError)
-    if others := [name for name, value in options.items() if value is not None and name not in wanted[kind]]:
+    entries: dict[str, tuple[str, ...]] = {"steady": (), "locked": ("hold",), "late": ("share",)}
+    require_known(kind, entries, "start", UnknownNameError)
+    if others := [name for name, value in options.items() if value is not None and name not in entries[kind]]:
         raise ParameterError(f"{others[0]} cannot be used with the start {kind}. Received both. Omit {others[0]}.")
     if kind == "steady":
         return sliding(fault, rate)

@@ -16,7 +16,7 @@ from quakedesign.laws.user_law import exact_matrix, integrating
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant import UncertainPlant
 
-_KNOWN = {"step", "delay", "lag"}
+_SUPPORTED = {"step", "delay", "lag"}
 _UNSEEN = 1e-9
 
 
@@ -36,24 +36,24 @@ def guarantee_plant(
     decentralised : bool
         For a designed law: whether the pressure of each well depends on its own measurements alone.
     """
-    if unknown := setup.given().keys() - _KNOWN:
+    if unknown := setup.given().keys() - _SUPPORTED:
         raise ParameterError(
             f"a guarantee of an uncertain plant has step, delay and lag of the loop setup; noise and start are fields "
             f"of the plant. Received {', '.join(sorted(unknown))}. Omit these."
         )
-    around = plant.behind(setup.lag) if setup.lag else plant
-    exact, notes = _law_of(around, law, gains, setup, decentralised)
-    radius, mode = escaping(around, exact)
+    behind = plant.behind(setup.lag) if setup.lag else plant
+    exact, notes = _law_of(behind, law, gains, setup, decentralised)
+    radius, mode = escaping(behind, exact)
     if radius >= 1:
-        count = _shown(around)
+        count = _shown(behind)
         mode = mode / (max(mode[:count], key=abs) or 1)  # blocks may have pressures [Pa] as well as slips [m]
         shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[:count], 9))
-        seen = np.abs(np.array(around.C, dtype=float) @ mode).max() > _UNSEEN
+        seen = np.abs(np.array(behind.C, dtype=float) @ mode).max() > _UNSEEN
         return NoProof(
             reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
             f"steepest the states ({shape}) grow by a factor of {radius:.4g} a sample",
         )
-    proof = plant_guarantee(around, exact)
+    proof = plant_guarantee(behind, exact)
     return replace(proof, notes=notes) if proof.available else proof
 
 

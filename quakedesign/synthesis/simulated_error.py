@@ -130,7 +130,7 @@ def sampling(
     if not needed > 0:
         raise ParameterError(f"lipschitz must be positive. Received {lipschitz}.")
     low, high = coefficient_range(fault, divisor) if gain_range is None else map(rational, gain_range)
-    wanted = step or fault.sampling_time
+    requested = step or fault.sampling_time
     return TrialSampling(
         fault=fault,
         law=chosen,
@@ -139,8 +139,8 @@ def sampling(
         divisor=divisor,
         metric=metric,
         scheme=scheme,
-        step=wanted,
-        duration=duration or min(_WINDOW * wanted, fault.reference.operation_time),
+        step=requested,
+        duration=duration or min(_WINDOW * requested, fault.reference.operation_time),
     )
 
 

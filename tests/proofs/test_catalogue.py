@@ -12,7 +12,7 @@ from thinned import few
 
 from quakedesign.checking import check_files
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_compensated, design_sampled_law, tightened
+from quakedesign.guarantees import design_compensated, design_sampled_law, with_varying_gain
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee, read_guarantee
 from quakedesign.laws import family, law
 from quakedesign.lyapunov import Verdict, certificate_text, load_certificate, loop_of
@@ -128,7 +128,7 @@ def test_a_guarantee_is_about_the_default_design_of_its_fault(path):
         return  # its search is tested in tests/guarantees/search/test_unclocked.py
     if "cta" in path.stem:
         base = replace(family("cta")[0].law, gains=dict(family("cta")[0].law.gains), divisor=stored.task.authority)
-        again = tightened(design_compensated(stored.task, base, stored.sampled_loop.step).proof)
+        again = with_varying_gain(design_compensated(stored.task, base, stored.sampled_loop.step).proof)
         assert again.sampled_loop.law.implicit_step.pull == stored.sampled_loop.law.implicit_step.pull
     else:
         again = design_sampled_law(stored.task, stored.sampled_loop.step, setup=stored.sampled_loop.setup)

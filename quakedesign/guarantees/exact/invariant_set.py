@@ -121,8 +121,8 @@ class InvariantPolytope:
                 shortly(negative[0]) if negative else "none",
             ),
         )
-        for condition, holds, received in conditions:
-            if not holds:
+        for condition, satisfied, received in conditions:
+            if not satisfied:
                 raise ParameterError(f"{condition} in an invariant set. Received {received}. Search for the set again.")
 
 

@@ -439,11 +439,11 @@ def _surprised(task: FaultPlant) -> Iterator[_ReversalPlant]:
     for kappa, w, area in _corners(task):
         yield _ReversalPlant(-kappa, w, _IMPOSSIBILITY_ZERO, law.static, None)
         if law.static > law.least and law.weakening:
-            reach = _SHARE * min((law.static - law.least) / law.weakening, target)
-            middle = max(law.least + law.weakening * reach, law.static - law.weakening * target)
+            extent = _SHARE * min((law.static - law.least) / law.weakening, target)
+            middle = max(law.least + law.weakening * extent, law.static - law.weakening * target)
             stress = (law.static * task.normal_stress - kappa / area * target) / middle
             slip = area * law.weakening * stress - kappa
-            yield _ReversalPlant(slip, w, law.weakening, middle - law.weakening * reach, reach)
+            yield _ReversalPlant(slip, w, law.weakening, middle - law.weakening * extent, extent)
 
 
 def _surprise(
@@ -463,11 +463,11 @@ def _surprise(
     def bound(slip: Fraction, unseen: Fraction) -> arb:
         return 2 * ball(amplitude) * _moved(slip, plant.rate, interval + shortened(delay) + unseen)[1]
 
-    reach = plant.excess or _IMPOSSIBILITY_ZERO
+    extent = plant.excess or _IMPOSSIBILITY_ZERO
 
-    def gained(peak: Fraction, more: Fraction = _IMPOSSIBILITY_ZERO) -> Fraction:
-        """Change of σ by the slope of friction under the pressure force."""
-        force = 2 * peak / interval + plant.slip * reach + abs(plant.rate) * peak + more
+    def slope_change(peak: Fraction, more: Fraction = _IMPOSSIBILITY_ZERO) -> Fraction:
+        """Change of σ [1/s²] by the slope of friction under the pressure force."""
+        force = 2 * peak / interval + plant.slip * extent + abs(plant.rate) * peak + more
         return plant.weakening * force / plant.friction
 
     def largest(share: Fraction) -> Fraction:
@@ -475,12 +475,12 @@ def _surprise(
         if not plant.weakening:
             return end_of(bound(plant.slip, unseen).lower())
         low, high = _IMPOSSIBILITY_ZERO, upper(bound(plant.slip, unseen))
-        unseen = min(unseen, hidden(plant.slip + gained(high, amplitude)))
+        unseen = min(unseen, hidden(plant.slip + slope_change(high, amplitude)))
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
-            slip = plant.slip - gained(middle)
-            holds = slip >= 0 and bool(bound(slip, unseen) >= ball(middle))
-            low, high = (middle, high) if holds else (low, middle)
+            slip = plant.slip - slope_change(middle)
+            reached = slip >= 0 and bool(bound(slip, unseen) >= ball(middle))
+            low, high = (middle, high) if reached else (low, middle)
         return low
 
     best = _IMPOSSIBILITY_ZERO
@@ -498,8 +498,8 @@ def _moved(slip: Fraction, rate: Fraction, time: Fraction) -> tuple[arb, arb]:
     return moved[0, 2], moved[1, 2]
 
 
-def _require(holds: bool, what: str, *values: Fraction) -> None:
-    if not holds:
+def _require(condition: bool, what: str, *values: Fraction) -> None:
+    if not condition:
         received = ", ".join(f"{float(v):.4g}" for v in values)
         raise ParameterError(f"a performance limit needs {what}. Received {received}.")
 

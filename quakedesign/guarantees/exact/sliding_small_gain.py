@@ -269,9 +269,9 @@ def inertia(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims
     """Stress equivalent of inertia, sup|κ|/λ₀ [Pa]."""
     low, high = task.normal_stress(claims.push)
     (a_low, a), (_, b), (_, mu) = (task.ranges[n] for n in ("direct_effect", "evolution_effect", "coefficient"))
-    grown, moved = exponential(claims.log_rate), _fastest_push(task, sampled_loop, claims)
+    grown, moved = exponential(claims.log_rate), _pressure_rate(task, sampled_loop, claims)
     rest = (task.pressure_per_slip * task.fastest + moved) * (a * claims.log_rate + b * claims.log_state)
-    rest += high * b * _fastest_state(task, claims) + _fastest_pull(task, claims) + mu * moved
+    rest += high * b * _state_rate(task, claims) + _spring_rate(task, claims) + mu * moved
     return rest * task.inertia * task.rate * grown / (low * a_low)
 
 
@@ -289,19 +289,19 @@ def _least_exponent(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     return 2 * (mu - a * claims.log_rate - b * claims.log_state) / a
 
 
-def _fastest_push(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims) -> Fraction:
+def _pressure_rate(task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims) -> Fraction:
     """Bound of |q′| [Pa/s]."""
     late = sampled_loop.diffusion / 2 + sampled_loop.lag
     speed = Fraction(5, 2) / sampled_loop.diffusion if sampled_loop.diffusion else 1 / sampled_loop.lag
     return speed * (claims.asked + task.drift * late + claims.push) + task.drift
 
 
-def _fastest_pull(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
+def _spring_rate(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     """Bound of K|x′| [Pa/s]."""
     return task.stiffness * task.rate * (exponential(claims.log_rate) - 1 + task.swing)
 
 
-def _fastest_state(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
+def _state_rate(task: SlidingPlant, claims: SlidingClaims) -> Fraction:
     """Bound ζ of |z′| [1/s]."""
     grown, aged = exponential(claims.log_rate), exponential(claims.log_state)
     if task.state_law == "slip":
@@ -313,11 +313,11 @@ def _moved(
     task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims, model: SlidingModel, time: Fraction
 ) -> dict[str, Fraction]:
     """Bounds of the change of y and its combinations within a time [s], without steps of e."""
-    of_state = _fastest_state(task, claims)
+    of_state = _state_rate(task, claims)
     change = (
-        _fastest_pull(task, claims)
+        _spring_rate(task, claims)
         + model.weakening * of_state
-        + model.coefficient * _fastest_push(task, sampled_loop, claims)
+        + model.coefficient * _pressure_rate(task, sampled_loop, claims)
     )
     y, z = change / model.strength * time, of_state * time
     return {

@@ -464,11 +464,11 @@ def stop_bounds(
     for i in range(LINES + 1):
         share = least + (1 - least) * i / LINES
         m, x = share * step, (1 - share) * step
-        room = 1 + plant.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
-        if least >= 1 or low * x >= 1 or room <= 0:
+        factor = 1 + plant.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
+        if least >= 1 or low * x >= 1 or factor <= 0:
             raise ParameterError("T_s is too long, for this damping and friction slope, to bound the slip until a stop")
         start = m - low * m**2 / 2 + low**2 * m**3 / 6
-        pairs.append((start / room, amplitude * x**2 / (1 - low * x / 3) / room))
+        pairs.append((start / factor, amplitude * x**2 / (1 - low * x / 3) / factor))
     return tuple(pairs)
 
 
@@ -793,12 +793,12 @@ def polytopes(
         return flat
     stops = stop_bounds(task, sampled_loop, plant)
     most = task.beta[1] * task.authority
-    room = most * sampled_loop.pressure_noise - task.amplitude
+    excess = most * sampled_loop.pressure_noise - task.amplitude
     for combination in (COMBINATIONS[place] for place in LEAST):
         feedback = feedback_row(sampled_loop, _ZERO, combination)[0]  # the least r′ has no constant part
         larger = (*(-most * v for v in feedback), plant.slope[0])
         tall: list[Constraint] = [((*row, _ZERO), b) for row, b in flat[combination[0]]]
-        tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, room)]
+        tall += [((_ZERO, _ZERO, _ZERO, -one), _ZERO), (larger, excess)]
         tall += [((_ZERO, -g, _ZERO, one), h) for g, h in stops]
         flat.append(tall)
     return flat

@@ -77,14 +77,14 @@ class Claims:
     def of(cls, task: FaultPlant, bounds: Bounds) -> "Claims":
         """Tightest claims that bounds support."""
         low, high = task.rest_pressure
-        push = bounds.push / task.authority
+        pressure = bounds.push / task.authority
         commanded = None if bounds.valve_push is None else bounds.valve_push / task.authority
         return cls(
             slip_error=UpperBound(bounds.slip_error),
             slip_rate_error=UpperBound(bounds.slip_rate_error),
             peak_slip_rate=UpperBound(bounds.slip_rate_error + task.reference_rates[0]),
-            least_pressure=LowerBound(low - push),
-            largest_pressure=UpperBound(high + push),
+            least_pressure=LowerBound(low - pressure),
+            largest_pressure=UpperBound(high + pressure),
             least_asked=None if commanded is None else LowerBound(low - commanded),
             largest_asked=None if commanded is None else UpperBound(high + commanded),
             largest_step=None if bounds.stepped is None else UpperBound(bounds.stepped / task.authority),
@@ -164,8 +164,8 @@ def _covers(step: UpperBound | None, other: UpperBound | None) -> bool:
 
 
 def _wider(low: LowerBound, high: UpperBound) -> tuple[LowerBound, UpperBound]:
-    room = (high - low) * (MARGIN - 1)
-    return LowerBound(-above(room - low)), UpperBound(above(high + room))
+    margin = (high - low) * (MARGIN - 1)
+    return LowerBound(-above(margin - low)), UpperBound(above(high + margin))
 
 
 def above(value: Fraction) -> Fraction:

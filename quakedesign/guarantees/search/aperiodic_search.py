@@ -207,10 +207,12 @@ class _Floats:
 def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pushes: list[np.ndarray]) -> np.ndarray:
     """Farthest image of the points and their negatives in every direction."""
     row, images = np.arange(len(ahead)), list[tuple[np.ndarray, np.ndarray]]()
-    for step, push in zip(maps, pushes, strict=True):
+    for step, input_map in zip(maps, pushes, strict=True):
         heights = ahead @ step @ points.T
         best = np.abs(heights).argmax(axis=1)
-        after = np.sign(heights[row, best])[:, None] * (points[best] @ step.T) + np.sign(ahead @ push.T) @ push
+        after = (
+            np.sign(heights[row, best])[:, None] * (points[best] @ step.T) + np.sign(ahead @ input_map.T) @ input_map
+        )
         images.append(((ahead * after).sum(axis=1), after))
     choice = np.array([height for height, _ in images]).argmax(axis=0)
     return np.asarray(np.array([after for _, after in images])[choice, row])
@@ -227,10 +229,10 @@ def _rounded_set(task: FaultPlant, sampled_loop: SampledLoop, raised: float) -> 
     columns = loop.columns(sides, _MANY)
     for turn in range(_ROUNDS):
         largest = sides.largest(loop, bounds)
-        wanted = loop.own + loop.shares @ largest
-        if (wanted <= bounds).all():
+        input_bounds = loop.own + loop.shares @ largest
+        if (input_bounds <= bounds).all():
             invariant_set = sides.exact(loop, bounds)
-            if (wanted >= bounds / _LOOSE).all():
+            if (input_bounds >= bounds / _LOOSE).all():
                 break
         share, more = loop.solved(bounds, largest, columns)
         if more is None:

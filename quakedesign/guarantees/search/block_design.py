@@ -119,13 +119,13 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
     whole = np.block([[own, np.vstack([np.zeros_like(read), read * largest])], [np.zeros((more, size)), flow]])
     wells = np.linalg.inv(gain) / largest
     at_once = np.eye(count) + read @ np.linalg.solve(flow, fed) @ wells * largest if more else np.eye(count)
-    phi, reach = _with_hold(whole, np.vstack([still, at_once, fed @ wells]), float(step))
-    K = _feedback(phi, reach, x * (1, 1, 1, 1, not alone))
+    phi, input_map = _with_hold(whole, np.vstack([still, at_once, fed @ wells]), float(step))
+    K = _feedback(phi, input_map, x * (1, 1, 1, 1, not alone))
     scale = np.r_[np.ones(size), np.full(more, 1 / largest)]  # scales of the states, for pressures in Pa
     feedback = rounded(K * scale)
     pushed = _with_hold(own, np.vstack([still, np.eye(count)]), float(step))[1]
     learned = rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
-    closed = (phi - reach @ (np.array(feedback, dtype=float) / scale)) * scale / scale[:, None]
+    closed = (phi - input_map @ (np.array(feedback, dtype=float) / scale)) * scale / scale[:, None]
     return _law(step, rounded(gain), feedback, learned, rounded(closed[count:]))
 
 

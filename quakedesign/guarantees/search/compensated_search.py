@@ -122,7 +122,7 @@ STICK_SLIP = "stick-slip"  # the scheme for the stick–slip plant
 _NAMED = ("weight", "slip_weight", "rest_slip", "authority")  # settings other than the limit at rest
 WEIGHTS = tuple(Fraction(k, 20) for k in range(2, 11))
 _RATIOS = tuple(Fraction(k, 20) for k in range(17, 22))  # ratios of B0 to the midpoint of the input gain
-_ROOM = Fraction(5, 4)  # largest peak of `tracking` over the smallest
+_LARGEST_RATIO = Fraction(5, 4)  # largest peak of `tracking` over the smallest
 _SLOPES = tuple(Fraction(v) for v in ("1", "0.99", "0.97", "0.93", "0.88", "0.8", "0.7", "0.6"))
 _REMAINDERS = tuple(Fraction(v) for v in ("0", "0.02", "0.1"))  # shares of a deadbeat slip-rate error
 _NEARLY = 2  # leading entries of _SLOPES that count as nearly deadbeat in the choice of λ
@@ -476,7 +476,9 @@ def sticking_loop(controller: SlidingMode, slip_noise: Fraction = Fraction(0)) -
     return SampledStickSlip(law=law, step=step, slip_noise=slip_noise)
 
 
-def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, **wanted: Any) -> Compensation | NoProof:
+def design_sticking(
+    task: FaultPlant, controller: SlidingMode, step: Fraction, **options: Any
+) -> Compensation | NoProof:
     """Sliding mode with given base gains and a guarantee on the stick–slip plant.
 
     The disturbance estimator and B0 are those for which a deadbeat step has a guarantee; λ = ρ⁶ is the smallest tried
@@ -492,7 +494,7 @@ def design_sticking(task: FaultPlant, controller: SlidingMode, step: Fraction, *
     **wanted
         As in `design_stick_slip`.
     """
-    proof = design_stick_slip(task, step, implicit=True, **wanted)
+    proof = design_stick_slip(task, step, implicit=True, **options)
     if not isinstance(proof, StickSlipProof):
         return proof
     sampled_loop, claims = proof.sampled_loop, proof.claims
@@ -550,9 +552,9 @@ def _deadbeat(
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
     """Weight, B0 [m²/kg] and bounds of the measured errors [m], [m/s] of a deadbeat step, as estimated; else None."""
     require_known(objective, OBJECTIVES, "objective")
-    question = "deadbeat", task, step, objective, weights, setup
+    key = "deadbeat", task, step, objective, weights, setup
     search = partial(_deadbeat_search, task, step, objective, weights, setup)
-    weight, authority, *errors = map(Fraction, search_once(search, *question))
+    weight, authority, *errors = map(Fraction, search_once(search, *key))
     return weight, authority, (errors[0], errors[1]) if errors else None
 
 
@@ -571,7 +573,7 @@ def _deadbeat_search(
     peaks = {choice: float(_bounds(estimate).slip_rate_error) for choice, estimate in seen.items()}
     least = min(peaks, key=lambda choice: peaks[choice])
     if objective == "tracking":
-        allowed = [choice for choice in seen if peaks[choice] <= _ROOM * peaks[least]]
+        allowed = [choice for choice in seen if peaks[choice] <= _LARGEST_RATIO * peaks[least]]
         least = min(allowed, key=lambda choice: seen[choice].drift_gain)
     bounds = _bounds(seen[least])
     slip_noise, rate_noise = setup.slip_noise, setup.rate_noise

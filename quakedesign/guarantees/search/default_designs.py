@@ -29,7 +29,7 @@ from quakedesign.guarantees.search.linear_design import (
     design_sampled_law,
     longest_delay,
     longest_step,
-    tightened,
+    with_varying_gain,
 )
 from quakedesign.guarantees.search.stick_slip_design import proved
 from quakedesign.laws import SlidingMode
@@ -105,17 +105,17 @@ def sampled_design(
     ParameterError
         For an unknown objective.
     """
-    wanted: Any = {"measured": measured, "setup": setup}
-    proof = design_sampled_law(task, step, objective=objective, **wanted)
-    longest = longest_step(task, **wanted)
+    options: Any = {"measured": measured, "setup": setup}
+    proof = design_sampled_law(task, step, objective=objective, **options)
+    longest = longest_step(task, **options)
     if not proof.available:
-        proof = design_near_longer_step(task, step, longest, **wanted) or proof
+        proof = design_near_longer_step(task, step, longest, **options) or proof
     reason = proof.reason if not proof.available else ""
     if not proof.available and longest is not None:
         proof = design_at(task, longest)
     if not proof.available:
         return SampledDesign(step=step, runs=None, reason=reason)
-    delayed, own = longest_delay(task, proof.sampled_loop.step, **wanted), proof.sampled_loop.delay
+    delayed, own = longest_delay(task, proof.sampled_loop.step, **options), proof.sampled_loop.delay
     return SampledDesign(
         step=step,
         runs=proof,
@@ -150,7 +150,7 @@ def sampled_sliding_mode(
         made = laws.at(task, longest, objective)
     if not made.without_stick.available:
         return made, SampledDesign(step=step, runs=None, reason=reason)
-    runs = tightened(made.without_stick)
+    runs = with_varying_gain(made.without_stick)
     sampled_loop = runs.sampled_loop
     delayed = longest_delay(task, sampled_loop.step, kind=laws, setup=setup)
     return replace(made, proof=runs), SampledDesign(
@@ -190,7 +190,7 @@ def guarantee_of(
         reason = f"a guarantee in the scheme {GUARANTEED} requires the settings weight and authority"
         return NoProof(reason=reason)
     setup = replace(setup, **own.path)
-    return tightened(compensated(task, law, settings["weight"], settings["authority"], own.step, setup=setup))
+    return with_varying_gain(compensated(task, law, settings["weight"], settings["authority"], own.step, setup=setup))
 
 
 def sliding_mode(
@@ -230,7 +230,7 @@ def sliding_mode(
     if scheme != GUARANTEED:
         return NoProof(reason=_why_none(task, law, scheme, step))
     made = design_compensated(task, compensation.controller, step, objective=objective, setup=setup)
-    return replace(made, proof=tightened(made.without_stick))
+    return replace(made, proof=with_varying_gain(made.without_stick))
 
 
 def deadbeat(task: FaultPlant, law: type[SlidingMode], gains: tuple[str, ...] = ()) -> Deadbeat:

@@ -82,10 +82,10 @@ def best_guarantee(task: FaultPlant, sampled_loop: SampledLoop) -> TrackingProof
 
 
 @overload
-def tightened(proof: TrackingProof) -> TrackingProof: ...
+def with_varying_gain(proof: TrackingProof) -> TrackingProof: ...
 @overload
-def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof: ...
-def tightened(proof: TrackingProof | NoProof) -> TrackingProof | NoProof:
+def with_varying_gain(proof: TrackingProof | NoProof) -> TrackingProof | NoProof: ...
+def with_varying_gain(proof: TrackingProof | NoProof) -> TrackingProof | NoProof:
     """Guarantee with a slowly varying input gain in place of one with an arbitrary gain, if one is found."""
     if not proof.available or proof.varying_gain is not None or proof.invariant_set is not None:
         return proof
@@ -238,13 +238,13 @@ def design_sampled_law(
     laws = _Laws.of(task, step, measured, setup)
     if isinstance(laws, NoProof):
         return laws
-    behind_rock, starts = bool(laws.template.diffusion), laws.family.starts
+    behind_path, starts = bool(laws.template.diffusion), laws.family.starts
     least, x = 10 * _FAILED, np.array(starts[0])
     for start in starts:
         least, x = min((least, x), laws.least_peak(start), key=lambda reached: reached[0])
-        if behind_rock and _far_from_proof(least):
+        if behind_path and _far_from_proof(least):
             break
-    if behind_rock and (none := laws.without_bounds(x)) is not None and _far_from_proof(least):
+    if behind_path and (none := laws.without_bounds(x)) is not None and _far_from_proof(least):
         return none  # such a proof takes a minute
     seen = laws.seen(x)
     if objective == "tracking" and seen is not None and seen.bounds.available:

@@ -33,7 +33,7 @@ from quakedesign.symbolic.rate_and_state_plant import sliding_errors, sliding_ra
 # ----------------------------------------------------------------------
 # Laws for a fault with a lag or a diffusion path: gains of a discrete Riccati equation on fault and path.
 
-THROUGH_ROCK = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # parameters of good laws
+THROUGH_PATH = ((-2.4, -9.3, 0.12), (-2.0, -8.0, 0.06), (-3.0, -9.5, 0.25))  # parameters of good laws
 BEHIND_LAG = ((-2.4, -6.0, 0.3), (-1.0, -4.0, 0.5))
 _MOST_STATES = 20  # of a loop
 # number of states without path model: e1, e2, π2, d, valve pressure, and its last step or the well pressure
@@ -59,7 +59,7 @@ class PathFeedback:
     flow: np.ndarray
     first: np.ndarray
     unit: float
-    push: float
+    acceleration: float
 
     @classmethod
     def of(cls, model: NominalModel, step: Fraction, setup: ExactSetup, *, observed: bool = False) -> "PathFeedback":
@@ -90,7 +90,7 @@ class PathFeedback:
         """
         weights = np.zeros(self.flow.shape)
         weights[0, 0], weights[1, 1] = exp(slip) / self.unit**2, 1
-        cost = exp(pressure) * self.push**2
+        cost = exp(pressure) * self.acceleration**2
         of_slip, of_rate, *of_path = map(short, _regulator(self.flow, self.first, weights, cost))
         return of_slip, of_rate, *(v / self.model.gain for v in of_path)
 
@@ -241,7 +241,7 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
         exponents = np.abs(x[0 if path else 2 : 4 if observed else 2])
         return bool((exponents < _WIDEST).all() and (observed or 0 < x[2] < 1))
 
-    starts: tuple[tuple[float, ...], ...] = (THROUGH_ROCK if layer else BEHIND_LAG) if path else _STARTS
+    starts: tuple[tuple[float, ...], ...] = (THROUGH_PATH if layer else BEHIND_LAG) if path else _STARTS
     if observed:
         decades = kalman.decades(float(task.amplitude), setup.slip_noise)
         first = starts if path else _OBSERVERS

@@ -27,7 +27,7 @@ from quakedesign.plant.user_plant import UncertainPlant
 _TURNS = 60  # largest number of turns for the bounds of sectors
 _WIDER = Fraction(51, 50)  # enlargement of each bound over the last requirement
 _PIECES = ((36, 16), (96, 8))  # largest number of states, and pieces of a flow
-_ROOM = 1.002  # margin for a checker with other bounds of the same integrals
+_MARGIN = 1.002  # margin for a checker with other bounds of the same integrals
 
 
 def linear_part(plant: UncertainPlant, bounds: dict[str, Fraction]) -> LinearPart:
@@ -126,7 +126,7 @@ def _numbers(plant: UncertainPlant, part: LinearPart, responses: ResponseBounds)
     gains = np.array([[float(v) for v in row[span]] for row in responses.inputs[first:]]).T
     matrix = halves[:, None] * gains
     radius = max(abs(np.linalg.eigvals(matrix)))
-    if radius * _ROOM >= 1:
+    if radius * _MARGIN >= 1:
         alone = int(np.argmax(np.diag(matrix)))
         return NoProof(
             reason=f"small gain {radius:.3g}, which must be below 1: {names[alone]} contributes "
@@ -136,7 +136,7 @@ def _numbers(plant: UncertainPlant, part: LinearPart, responses: ResponseBounds)
     none = tuple(Fraction(0) for _ in halves)
     own = halves * np.array([float(v) for v in row_bounds(part, responses, none)[span]])
     own += 1e-12 * max(own.max(), 1e-300)
-    solved = np.linalg.solve(np.eye(len(own)) - _ROOM * matrix, _ROOM * own)
+    solved = np.linalg.solve(np.eye(len(own)) - _MARGIN * matrix, _MARGIN * own)
     return tuple(_rounded(rational(float(v)), 8) for v in solved)
 
 

@@ -33,7 +33,7 @@ _SLOWEST, _FORGET = 0.985, 1000  # largest eigenvalue of a period, and periods: 
 _SMALL = 0.004  # least logarithm of the state at the start of the search
 _TURNS = 14
 _PIECES = 8  # pieces of a period, which is short compared with the times of the plant
-_ROOM = 1.03
+_MARGIN = 1.03
 _LOST = 100.0
 _DIGITS = 10
 _HALVINGS = 20  # bisections of a range of stresses
@@ -67,7 +67,7 @@ def sliding_block_guarantee(
         reason = f"no self-consistent bounds of slip rate and state: small gain {small:.3g}. Reduce the stress"
         return NoProof(reason=reason, small_gain=UpperBound(rational(f"{small:.6g}")))
     for _ in range(3):
-        claims = _grown(claims, _ROOM)
+        claims = _grown(claims, _MARGIN)
         plant, rate = blocks.plant(claims), blocks.log_rate(claims)
         if plant is None or rate is None:
             break
@@ -201,7 +201,7 @@ class _WeightSearch:
             if all(v <= getattr(claims, name) for name, v in reached.items()):
                 return law, claims, small
             responses = {
-                name: rational(f"{max(v * _ROOM, float(getattr(claims, name))):.6g}") for name, v in reached.items()
+                name: rational(f"{max(v * _MARGIN, float(getattr(claims, name))):.6g}") for name, v in reached.items()
             }
             claims = BlockClaims(**responses)
         return law, None, small

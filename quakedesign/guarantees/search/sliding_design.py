@@ -57,7 +57,7 @@ _TURNS = 6
 _SHRINKING = 24
 _MEASURED = 2
 _SPARE = 1.02
-_ROOM = 1.05  # margin of claims over estimates
+_MARGIN = 1.05  # margin of claims over estimates
 _NEAR = 0.89  # largest estimate over its claim, as the sums of the proof are larger
 _FAILED = 50.0
 _SMALL = Fraction(1, 10**4)  # share of the normal stress
@@ -100,8 +100,8 @@ def _smallest_claims(proof: SlidingProof) -> SlidingClaims:
         bounds, estimate = cell_bounds(worst, proof.sampled_loop, claims), _estimate(worst, proof.sampled_loop, claims)
         if isinstance(bounds, NoProof) or estimate is None:
             break
-        room = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in _NAMES}
-        claims = _followed(proof, claims, room)
+        margins = {name: _SPARE * float(bounds[name]) / float(estimate[name]) for name in _NAMES}
+        claims = _followed(proof, claims, margins)
     return claims
 
 
@@ -126,10 +126,10 @@ def largest_stress(task: SlidingPlant, sampled_loop: SampledLoop, *, log_rate: F
     claims, some = _guess(corner, log_rate), _SMALL * corner.ranges["normal_stress"][0]
     estimates = [_estimate(replace(corner, stress=stress), sampled_loop, claims) for stress in (Fraction(0), some)]
     rest, more = (0.0 if one is None else float(one["log_rate"]) for one in estimates)
-    room = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
-    if None in estimates or room <= 0:
+    margin = (1 if corner == task else _NEAR) * _NEAR * float(log_rate) - rest
+    if None in estimates or margin <= 0:
         return Fraction(0)
-    return two_digits(Fraction(float(some) * room / (more - rest)))
+    return two_digits(Fraction(float(some) * margin / (more - rest)))
 
 
 def two_digits(value: Fraction) -> Fraction:
@@ -294,8 +294,8 @@ def _claims(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -
         estimate = _estimate(task, sampled_loop, claims)
         if estimate is None:
             return None
-        wider = {k: float(estimate[k]) * _ROOM / _NEAR for k in _NAMES}
-        if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _ROOM:
+        wider = {k: float(estimate[k]) * _MARGIN / _NEAR for k in _NAMES}
+        if min(float(getattr(claims, k)) / v for k, v in wider.items() if k != "log_rate") >= 1 / _MARGIN:
             break
         try:
             claims = _as_claims({**wider, "log_rate": log_rate})
@@ -382,7 +382,7 @@ Prove = Callable[[SlidingPlant, SampledLoop, Fraction], SlidingProof | NoProof]
 PATH = {"diffusion": "L^2/D", "lag": "the lag"}
 _EASY = Fraction(1)  # L²/D in D_c/V for which laws are found without continuation
 _FARTHER = Fraction(13, 10), Fraction(9, 8), Fraction(17, 16)  # step factors, the next one after a failure
-_WELL_ROOM = Fraction(3, 4)
+_WELL_SHARE = Fraction(3, 4)
 _NEARER = 3  # number of halvings of the path
 _LAWS = 40  # number of laws tried for a share of the path
 _ENOUGH = 0.5  # ratio of the estimate to the bound of |ln(v/V)| that suffices
@@ -453,7 +453,7 @@ def farthest(
         if reached.share < share:
             farther.pop(0)
     if 0 < reached.share < most:  # with a margin for a proof, whose bounds exceed their estimate
-        return _followed_well(task, step, setup, _WELL_ROOM * reached.share, reached, rates)
+        return _followed_well(task, step, setup, _WELL_SHARE * reached.share, reached, rates)
     return reached
 
 

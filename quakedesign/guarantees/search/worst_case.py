@@ -40,7 +40,7 @@ _CLIMBING, _CLIMBS = 48, 8  # trajectories improved from the best of those, and 
 _CHANGED = 0.15, 0.4, 1.0  # probabilities of replacing the inputs of a piece by those of the adjoint, used in turn
 _BLOCK = 8  # pieces that change together, at most
 _RESTING, _ROUNDS = 96, 9  # pairs of trajectories of 128 periods that push, rest and push again; rounds
-_FIRST_PUSH, _LONGEST_PUSH = 20, 7  # latest start and longest duration of the first acceleration, in periods
+_LATEST_START, _LONGEST_DURATION = 20, 7  # latest start and longest duration of the first acceleration, in periods
 _NEAR = np.array([[2], [2], [_PIECES]])  # changes per round, in pieces: start and length of the first push, end of rest
 _MOST_RESTED = 128  # periods
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are also evaluated for a loop with initial errors
@@ -117,7 +117,7 @@ def _searched(claim: TrackingProof | ContinuousProof, sticks: bool) -> list[floa
             searches[2].ascend(switched[:, best])
             if isinstance(claim, TrackingProof) and claim.task.reference_rates[0]:
                 searches.append(_resting(claim, searches[0]))
-                searches[3].rest_and_push(_ROUNDS)
+                searches[3].push_after_rest(_ROUNDS)
     if claim.loop.segments and not sticks:
         searches.append(_CourseSearch(claim, sticks, 2 * _COURSES, searches[0].periods))
         searches[-1].end_between_samples()
@@ -194,7 +194,7 @@ def _on_time(sampled_loop: SampledLoop) -> tuple[SampledLoop, Fraction, Fraction
     return plain, off, 2 * late if alone or part else Fraction(0)
 
 
-def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction = Fraction(0)) -> list[_Event]:
+def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, later: Fraction = Fraction(0)) -> list[_Event]:
     """Events of one period from the earliest sample on, shifted by timing errors.
 
     Samples shift by up to `off` [s], pressures lead by `early` [s]; aperiodic sampling lengthens a period by up to
@@ -208,7 +208,7 @@ def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, more: Fraction =
         events += [_Event(arrival.jump, early, samples=False, soon=True)] if early else []
         events.append(_Event(arrival.jump, arrival.duration - off, samples=False, late=bool(early)))
     still = tuple(tuple(Fraction(i == j) for j in range(len(loop.flow))) for i in range(len(loop.flow)))
-    return [*events, *([_Event(still, more, samples=False, free=True)] if more else [])]
+    return [*events, *([_Event(still, later, samples=False, free=True)] if later else [])]
 
 
 @dataclass(slots=True)
@@ -327,10 +327,10 @@ class _CourseSearch:
         self.heard = np.array([_filled(loop.sampled.get(name, ()), self.size) for name in NOISES])
         self.start = np.array([_filled(column, self.size) for column in loop.start]).reshape(-1, self.size)
         beta = [float(b) for b in task.beta]
-        push = np.zeros(self.size)
-        push[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
+        input_column = np.zeros(self.size)
+        input_column[: len(loop.states)] = [float(v) for v in loop.outputs["push"]]
         ends = product(*map(dict.fromkeys, (task.beta, task.slip_chord, task.rate_chord)))
-        vertices = [_at(task, flow, push, *map(float, v)) for v in ends]
+        vertices = [_flow_at_vertex(task, flow, input_column, *map(float, v)) for v in ends]
         more = claim.sampled_loop.slack if isinstance(claim, TrackingProof) else Fraction(0)
         events = _events(loop, off, early, more) if loop.segments else [_flowing(flow)]
         self.parts = [_pieces(vertices, inputs, event, none=more > 0) for event in events]
@@ -404,14 +404,14 @@ class _CourseSearch:
             top = np.maximum(top, reached)
             chosen, fixed, jumped = now
 
-    def rest_and_push(self, rounds: int) -> None:
+    def push_after_rest(self, rounds: int) -> None:
         """Search over trajectories that accelerate, rest and accelerate again ahead of the reference.
 
         Each round varies start and length of the first acceleration and the end of the rest, from the best with the
         same input gain. The adjoint gives no direction here: it is 0 while the fault is at rest.
         """
         random, courses, period = np.random.default_rng(_SEED), len(self.aim), self.steps // self.periods
-        limits = [[_FIRST_PUSH * period], [_LONGEST_PUSH * period], [1]]
+        limits = [[_LATEST_START * period], [_LONGEST_DURATION * period], [1]]
         tried: np.ndarray = np.array([[0], [1], [self.steps]]) + random.integers(0, limits, (3, courses))
         best, top, number = tried, np.zeros(courses), np.arange(self.steps)[:, None]
         for turn in range(rounds):
@@ -472,11 +472,11 @@ class _CourseSearch:
                 state = np.where(jumps[:, None], after, state)
                 jumped.append(jumps)
             ahead = np.einsum("vij,cj->cvi", part.steps, state)
-            push = _pushes(part.added, costate)
-            ways = np.sign(push)
+            products = _pushes(part.added, costate)
+            ways = np.sign(products)
             if slopes is not None:
                 ways[:, :, -1] = slopes[number][:, None]
-            gain = np.einsum("cvi,ci->cv", ahead, costate) + (push * ways).sum(axis=2)
+            gain = np.einsum("cvi,ci->cv", ahead, costate) + (products * ways).sum(axis=2)
             best = np.where(self.allowed, gain, -np.inf).argmax(axis=1)
             row = np.arange(len(best))
             following = ahead[row, best] + np.einsum("cij,cj->ci", part.added[best], ways[row, best])
@@ -496,8 +496,8 @@ class _CourseSearch:
             return np.ones(len(state), dtype=bool)
         following = self.parts[(number // _PIECES + 1) % len(self.parts)]
         on = part.moved_on()
-        gained = state @ (on @ part.jump - part.jump @ on).T
-        return np.asarray(np.einsum("ci,ci->c", costates[number + _PIECES] @ following.steps[0], gained) >= 0)
+        difference = state @ (on @ part.jump - part.jump @ on).T
+        return np.asarray(np.einsum("ci,ci->c", costates[number + _PIECES] @ following.steps[0], difference) >= 0)
 
     def _seen(self, state: np.ndarray) -> None:
         slip, rate = np.abs(state[:, :2]).max(axis=0)
@@ -613,22 +613,24 @@ def _pushes(added: np.ndarray, costates: np.ndarray) -> np.ndarray:
 def _with_disturbance(task: FaultPlant, loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray]:
     """Flow, and columns of all inputs at their bounds; a rate-limited disturbance is a state."""
     flow = np.array(loop.flow, dtype=float)
-    push, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
+    column, drift = (np.array(loop.inputs[name], dtype=float) for name in ("acceleration", "drift"))
     force, slow = float(task.reference_force), drift * float(task.drift)
     if task.change is None:
-        return flow, np.array([push * (force + float(task.amplitude)), slow]).T
+        return flow, np.array([column * (force + float(task.amplitude)), slow]).T
     size = len(flow)
     wide = np.zeros((size + 1, size + 1))
     wide[:size, :size], wide[1, size] = flow, 1
     columns = np.zeros((size + 1, 3))
-    columns[:size, 0], columns[:size, 1], columns[size, 2] = push * force, slow, float(task.change)
+    columns[:size, 0], columns[:size, 1], columns[size, 2] = column * force, slow, float(task.change)
     return wide, columns
 
 
-def _at(task: FaultPlant, flow: np.ndarray, push: np.ndarray, beta: float, slip: float, rate: float) -> np.ndarray:
+def _flow_at_vertex(
+    task: FaultPlant, flow: np.ndarray, column: np.ndarray, beta: float, slip: float, rate: float
+) -> np.ndarray:
     """Flow at a vertex: slopes act on the errors, the input gain on the matched input."""
     matrix, model = flow.copy(), task.model
-    matrix[1] += (beta - float(model.gain / task.authority)) * push
+    matrix[1] += (beta - float(model.gain / task.authority)) * column
     matrix[1, :2] += slip - float(model.slip), float(model.rate) - rate
     return matrix
 

@@ -56,13 +56,13 @@ def scheme_of_run(
     if own is None:
         return usual if scheme is None else scheme, step, {}
     chosen, period = own.scheme if scheme is None else scheme, float(own.step)
-    wanted, named = {key: float(value) for key, value in own.settings}, isinstance(chosen, str)
-    received_settings = wanted if isinstance(chosen, str) else {key: getattr(chosen, key, None) for key in wanted}
+    settings, named = {key: float(value) for key, value in own.settings}, isinstance(chosen, str)
+    received_settings = settings if isinstance(chosen, str) else {key: getattr(chosen, key, None) for key in settings}
     name = chosen if isinstance(chosen, str) else chosen.name
-    if (name, received_settings) != (own.scheme, wanted) or step not in (None, period):
+    if (name, received_settings) != (own.scheme, settings) or step not in (None, period):
         received = "".join(f", {key} {value!r}" for key, value in received_settings.items() if not named)
         raise ParameterError(
             f"a sampled law runs with the scheme {own} and the step {period!r} s of its design. Received the scheme "
             f"{name}{received} and the step {period if step is None else step!r} s. Omit scheme and step."
         )
-    return chosen, period, wanted if named else {}
+    return chosen, period, settings if named else {}

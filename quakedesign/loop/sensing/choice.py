@@ -232,17 +232,17 @@ def smallest_bound(
             f"order must be 1 for the smallest bound of a differentiator. Received {differentiator.order}. Use order=1."
         )
 
-    def holds(exponent: float) -> bool:
+    def stable(exponent: float) -> bool:
         tried = replace(differentiator, bound=10.0**exponent)
         return joint_condition(fault, controller, tried, acceleration=acceleration, noise=noise).holds
 
     high = math.log10(LARGEST_BOUND)
-    if not holds(high):
+    if not stable(high):
         return None
     low = -high
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        low, high = (low, middle) if holds(middle) else (middle, high)
+        low, high = (low, middle) if stable(middle) else (middle, high)
     return float(10.0**high)
 
 

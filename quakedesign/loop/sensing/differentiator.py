@@ -75,12 +75,12 @@ def implicit_step(
         ahead = value + step * ahead
     ahead = (ahead - _whole_power(step, filters) * slip) / scale
     root, share = _solve(ca.fabs(ahead), table)
-    push = [_whole_power(root, size - j) for j in range(1, size)] + [share]
+    injection = [_whole_power(root, size - j) for j in range(1, size)] + [share]
     after: Entries = []
     following = ca.SX(0)
     for j in range(size, 0, -1):
         drift = following - slip if j == filters else following
-        following = state[j - 1] + step * drift - gains[j - 1] * ca.sign(ahead) * push[j - 1]
+        following = state[j - 1] + step * drift - gains[j - 1] * ca.sign(ahead) * injection[j - 1]
         after.insert(0, following)
     return after
 
@@ -349,13 +349,15 @@ class OutputFeedback(Sensor):
         own, past = iter(numbers), iter(memory)
         slip, memories = x[0], []
         for stage in self.stages:
-            slip, after = stage.pass_on(_next(own, len(stage.numbers(self.step))), _next(past, len(stage.start)), slip)
+            slip, after = stage.pass_on(
+                _taken(own, len(stage.numbers(self.step))), _taken(past, len(stage.start)), slip
+            )
             memories += after
         estimates, after = self.differentiator.estimate(list(own), list(past), slip)
         return ca.vertcat(estimates[0], estimates[1]), [*memories, *after]
 
 
-def _next(entries: Iterator[ca.SX], count: int) -> Entries:
+def _taken(entries: Iterator[ca.SX], count: int) -> Entries:
     return [next(entries) for _ in range(count)]
 
 

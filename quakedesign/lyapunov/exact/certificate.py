@@ -102,8 +102,8 @@ def _check_witnesses(certificate: Evidence, obligations: Iterable[Obligation]) -
     for one in different(obligations):
         expected.append(one.name)
         require(one.name in certificate.witnesses, f"the witness of {one.name!r} is missing.")
-        holds = proves(one, certificate.witnesses[one.name], certificate.loop.domain)
-        require(holds, f"the witness of {one.name!r} does not prove that its polynomial is non-negative.")
+        proved = proves(one, certificate.witnesses[one.name], certificate.loop.domain)
+        require(proved, f"the witness of {one.name!r} does not prove that its polynomial is non-negative.")
     extra = "the witnesses must be those of the distinct obligations, in the same order, without further ones."
     require(expected == list(certificate.witnesses), extra)
 

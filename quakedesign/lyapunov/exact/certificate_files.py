@@ -80,8 +80,10 @@ class LoopEntries(Entries):
         need(all(1 <= w <= top for w in self.states.values()), f"weights must be integers from 1 to {top}")
         for name, (low, high) in self.uncertain.items():
             need(low <= high, f"the range of {name} is not ordered")
-        known = {*self.gains, *self.constants}
-        need(all(of in known for of, *_ in self.roots.values()), "a root must be the square root of a gain or constant")
+        symbols = {*self.gains, *self.constants}
+        need(
+            all(of in symbols for of, *_ in self.roots.values()), "a root must be the square root of a gain or constant"
+        )
         roots = {name: (of, (low, high)) for name, (of, low, high) in self.roots.items()}
         bare = made(Loop, self, field={}, roots=roots, lifts={})
         powers = (*self.states, *self.lifts)

@@ -153,11 +153,11 @@ def certified_domain(problem: DomainProblem) -> Domain:
     return _domain(problem, Fraction(0), "", _whole_limit(problem, Errors()))
 
 
-def _largest(holds: Callable[[int], bool], low: int, high: int) -> int:
+def _largest(condition: Callable[[int], bool], low: int, high: int) -> int:
     """Largest step for which `holds` is true, by bisection; it must be true for `low`."""
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if holds(middle) else (low, middle)
+        low, high = (middle, high) if condition(middle) else (low, middle)
     return low
 
 

@@ -52,9 +52,9 @@ def figure(title: str, caption: str, shown: Mapping[str, tuple[np.ndarray, Mappi
 
 
 def _distribution(axis: Any, name: str, values: np.ndarray, marks: Mapping[float, float | None]) -> None:
-    known = values[~np.isnan(values)]
-    finite = np.sort(known[np.isfinite(known)])
-    axis.step(finite, np.arange(1, len(finite) + 1) / len(known), where="post", color="#0072B2")
+    defined = values[~np.isnan(values)]
+    finite = np.sort(defined[np.isfinite(defined)])
+    axis.step(finite, np.arange(1, len(finite) + 1) / len(defined), where="post", color="#0072B2")
     for level, value in marks.items():
         if value is not None:
             axis.axvline(value, color="grey", linestyle=":", linewidth=1)
@@ -172,8 +172,8 @@ class Campaign:
     def worst(self, metric: str, count: int = SHOWN) -> list[int]:
         """Indices of the worst samples in one metric, worst first; those that diverged or have no value come first."""
         require_metric(metric, self.metrics)
-        known = [(-severity(result, metric), i) for i, result in enumerate(self.results) if result]
-        return [i for _, i in sorted(known)[:count]]
+        ranked = [(-severity(result, metric), i) for i, result in enumerate(self.results) if result]
+        return [i for _, i in sorted(ranked)[:count]]
 
     @cached_property
     def events(self) -> dict[str, list[int]]:
@@ -218,7 +218,9 @@ class Campaign:
         """Return JSON data: samples, outcomes, worst, quantiles, events, failures, search, resumed."""
         return {
             "samples": len(self.results),
-            "outcomes": {kind: {"count": len(found), "first": found[:SHOWN]} for kind, found in self.kinds.items()},
+            "outcomes": {
+                kind: {"count": len(indices), "first": indices[:SHOWN]} for kind, indices in self.kinds.items()
+            },
             "worst": {metric: [self._worst_entry(i, metric) for i in self.worst(metric)] for metric in self.metrics},
             "quantiles": self.quantiles(),
             "events": {name: {"count": len(found), "first": found[:SHOWN]} for name, found in self.events.items()},
@@ -306,11 +308,11 @@ def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for result in results if not result.diverged for name in result.figures))
 
 
-def require_metric(metric: str, known: Sequence[str]) -> None:
+def require_metric(metric: str, available: Sequence[str]) -> None:
     """Raise if a metric is unknown."""
-    if not known:
+    if not available:
         raise ParameterError(f"metric {metric!r} has no value, since all runs diverged")
-    require_known(metric, known, "metric")
+    require_known(metric, available, "metric")
 
 
 def severity(result: SampleResult, metric: str) -> float:

@@ -129,10 +129,10 @@ class Ledger:
     def _changes(self, inputs: Any) -> list[str]:
         """Names of the inputs that differ from those of the campaign in the folder."""
         try:
-            held = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
+            stored = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
         except (OSError, ValueError):
-            held = None
-        return differences(held, inputs)
+            stored = None
+        return differences(stored, inputs)
 
     def read(self) -> "dict[bytes, np.ndarray]":
         """Final vectors, indexed by the bytes of the initial vectors; damaged files are skipped.
@@ -150,8 +150,8 @@ class Ledger:
 
     def _pairs(self, path: Path) -> "list[tuple[np.ndarray, np.ndarray]]":
         try:
-            with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as held:
-                fingerprint, starts, ends = str(held["fingerprint"]), held["starts"], held["ends"]
+            with np.load(BytesIO(path.read_bytes()), allow_pickle=False) as archive:
+                fingerprint, starts, ends = str(archive["fingerprint"]), archive["starts"], archive["ends"]
         except Exception:  # zipfile, zlib and numpy raise errors without a common base for damaged bytes
             return []
         if fingerprint != self.fingerprint:

@@ -268,8 +268,8 @@ class SlidingProgram:
 
 def _sample_row(run: SlidingRun) -> list[float]:
     measured = run.metrics.to_dict()
-    found = [measured[name] for name in _FIGURES] + [run.events.get(name) for name in EVENTS]
-    return [math.nan if value is None else float(value) for value in found]
+    values = [measured[name] for name in _FIGURES] + [run.events.get(name) for name in EVENTS]
+    return [math.nan if value is None else float(value) for value in values]
 
 
 @checked_dataclass(frozen=True, kw_only=True, repr=False)
@@ -329,9 +329,9 @@ class SlidingProblem(CampaignProblem):
         return [self._result(end.tolist()) for end in ends]
 
     def _result(self, end: list[float]) -> SampleResult:
-        known = {name: v for name, v in zip((*_FIGURES, *EVENTS), end, strict=True) if not math.isnan(v)}
-        happened = {name: known.pop(name) for name in EVENTS if name in known}
-        return SampleResult(figures=known, events=happened)
+        defined = {name: v for name, v in zip((*_FIGURES, *EVENTS), end, strict=True) if not math.isnan(v)}
+        happened = {name: defined.pop(name) for name in EVENTS if name in defined}
+        return SampleResult(figures=defined, events=happened)
 
     @property
     def metrics(self) -> tuple[str, ...]:

@@ -344,8 +344,8 @@ class _Runner:
         self._used.update(start.tobytes() for start in starts)
         self._compute([starts[i] for i in missing], [names[i] for i in missing], what, len(starts))
         ends = [self._records.get(start.tobytes()) for start in starts]
-        found = iter(self._problem.results([end for end in ends if end is not None]))
-        return [None if end is None else next(found) for end in ends]
+        results = iter(self._problem.results([end for end in ends if end is not None]))
+        return [None if end is None else next(results) for end in ends]
 
     def _compute(self, starts: "list[np.ndarray]", names: list[str], what: str, total: int) -> None:
         size = self._batch_size(len(starts))
@@ -375,19 +375,19 @@ class _Runner:
 
     def search(self, results: Sequence[SampleResult | None], metric: str, rounds: int) -> WorstSample | None:
         """Worst sample by a metric, searched from the worst result and the corners; None if all failed."""
-        known = [(i, result) for i, result in enumerate(results) if result]
-        if not known:
+        completed = [(i, result) for i, result in enumerate(results) if result]
+        if not completed:
             return None
-        require_metric(metric, metric_names([result for _, result in known]))
-        first = max(known, key=lambda pair: severity(pair[1], metric))[0]
+        require_metric(metric, metric_names([result for _, result in completed]))
+        first = max(completed, key=lambda pair: severity(pair[1], metric))[0]
         counter = 0
 
         def evaluate(samples: Sequence[Sample]) -> list[float]:
             nonlocal counter
             names = [f"search-{counter + i}" for i in range(len(samples))]
             counter += len(samples)
-            found = self.results(samples, names, f"search, {counter} samples")
-            return [-math.inf if result is None else severity(result, metric) for result in found]
+            evaluated = self.results(samples, names, f"search, {counter} samples")
+            return [-math.inf if result is None else severity(result, metric) for result in evaluated]
 
         start, seed = self._problem.point(first), self._problem.sample(first).noise_seed
         return search(self._problem.space, metric, evaluate, [start], noise_seed=seed, rounds=rounds)

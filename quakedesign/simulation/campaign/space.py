@@ -209,9 +209,9 @@ def search(
         beside = neighbours(space, centre, span)
         if not beside or math.isinf(value):
             break
-        found = look(beside)
-        if found[0] > value:
-            value, centre, index = found
+        best = look(beside)
+        if best[0] > value:
+            value, centre, index = best
         else:
             span /= 2
     return WorstSample(metric=metric, value=value, sample=looked_at[index], index=index, looked_at=tuple(looked_at))

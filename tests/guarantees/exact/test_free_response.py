@@ -19,7 +19,7 @@ from quakedesign.guarantees import SampledLoop, TrackingProof, guarantee
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.norms import free_peaks, norms
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
-from quakedesign.guarantees.search.lqg import THROUGH_ROCK, family_of
+from quakedesign.guarantees.search.lqg import THROUGH_PATH, family_of
 from quakedesign.laws import ImplicitStep, Power, compensated
 from quakedesign.loop import PeriodicLoop, Segment
 from quakedesign.lyapunov.exact.claim import Verdict
@@ -337,7 +337,7 @@ def followed(loop, periods):
 @pytest.mark.parametrize("around", [{"lag": F("0.1")}, {"delay": F("0.02")}])
 def test_through_rock_and_late_both_bound_what_is_seen_of_the_free_response(around):
     task, step, around = stored().task, F("0.05"), {"diffusion": F(1), **around}
-    law = family_of(task, step, "slip-and-rate", ExactSetup(**around)).law(np.array(THROUGH_ROCK[0]))
+    law = family_of(task, step, "slip-and-rate", ExactSetup(**around)).law(np.array(THROUGH_PATH[0]))
     held = SampledLoop(law=law, step=step, initial_slip=F("1e-5"), initial_slip_rate=F("4e-5"), **around)
     loop = held.loop(task)
     raw = json.loads(guarantee_text(TrackingProof(task=task, sampled_loop=held, claims=stored().claims)))

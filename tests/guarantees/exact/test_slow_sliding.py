@@ -323,7 +323,7 @@ def test_the_state_of_the_slip_law_moves_at_most_as_fast_as_the_slip():
     given, slipping = claims("1/2", "1/18"), task(ranges=UNSURE, state_law="slip")
     fastest = 1.2e-6 / 0.8e-3 * math.exp(0.5) * (0.5 + 1 / 18)
     found = alone(slipping, given=given).fastest_state()
-    assert small_gain._fastest_state(slipping, given) == found
+    assert small_gain._state_rate(slipping, given) == found
     assert float(found) == pytest.approx(fastest, rel=1e-9)
 
 
@@ -460,7 +460,7 @@ def test_the_state_that_ages_fastest_counts():
     given = claims("1/18", "1/2")
     cell = alone(task(ranges=UNSURE), given=given)
     fastest = 1.2e-6 / 0.8e-3 * (math.exp(0.5) - math.exp(-1 / 18))
-    assert small_gain._fastest_state(task(ranges=UNSURE), given) == cell.fastest_state()
+    assert small_gain._state_rate(task(ranges=UNSURE), given) == cell.fastest_state()
     assert float(cell.fastest_state()) == pytest.approx(fastest, rel=1e-9)
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.linalg import expm
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import design_compensated, design_sampled_law, tightened
+from quakedesign.guarantees import design_compensated, design_sampled_law, with_varying_gain
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.tracking_result import with_worst_case as beside_searches
@@ -61,7 +61,7 @@ def designed(row):
     if kind in GAINS:
         law = control_law(kind).from_values(GAINS[kind], scale=F(1), divisor=task.authority)
         made = design_compensated(task, law, step, setup=setup, **wanted)
-        claim = tightened(made.proof)
+        claim = with_varying_gain(made.proof)
         held = attacker.sliding(made.controller, made.weight, made.authority, claim, float(task.authority))
     else:
         claim = design_sampled_law(task, step, setup=setup, **wanted)

@@ -21,7 +21,7 @@ from quakedesign.guarantees import (
     design_compensated,
     guarantee_of,
     load_guarantee,
-    tightened,
+    with_varying_gain,
     worst_tracking,
 )
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
@@ -275,5 +275,5 @@ def test_the_guarantee_of_a_law_of_samples_is_that_of_its_own_numbers():
     made, (weight, authority) = law("cta", CTA, 1), SETTINGS
     settings = ("weight", weight), ("authority", authority)
     sampled = replace(made, gains=CTA_GAINS, sampling=Sampling(step=STEP, scheme="compensated", settings=settings))
-    assert guarantee_of(TASK, sampled) == tightened(compensated(TASK, made, *SETTINGS, STEP))
-    assert guarantee_of(TASK, designed("cta").controller) == tightened(designed("cta").proof)
+    assert guarantee_of(TASK, sampled) == with_varying_gain(compensated(TASK, made, *SETTINGS, STEP))
+    assert guarantee_of(TASK, designed("cta").controller) == with_varying_gain(designed("cta").proof)

@@ -13,7 +13,7 @@ import quakedesign as qd
 from quakedesign.cli.design_commands import DesignOptions
 from quakedesign.errors import ParameterError
 from quakedesign.fault import Disturbance
-from quakedesign.guarantees import design_sampled_law, tightened, worst_tracking
+from quakedesign.guarantees import design_sampled_law, with_varying_gain, worst_tracking
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.search.worst_case import _steepest
 from quakedesign.lyapunov import Verdict
@@ -98,6 +98,6 @@ def test_the_steepest_disturbance_keeps_its_rate_in_short_pieces_too():
 def test_the_worst_found_is_near_what_is_proved_of_the_class_rate(objective, most):
     """For the smallest peak a search that takes the disturbance by the sign of its costate stays at 1.62."""
     claim = design_sampled_law(uncertain_plant(REAL, rate_limited=True), F("0.184"), objective=objective)
-    found, claims = worst_tracking(tightened(claim)), tightened(claim).claims
+    found, claims = worst_tracking(with_varying_gain(claim)), with_varying_gain(claim).claims
     assert found.slip_error <= claims.slip_error <= most[0] * found.slip_error
     assert found.slip_rate_error <= claims.slip_rate_error <= most[1] * found.slip_rate_error

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from quakedesign.fault import load_fault
-from quakedesign.guarantees import NoProof, TrackingProof, best_guarantee, design_sampled_law, guarantee, tightened
+from quakedesign.guarantees import (
+    NoProof,
+    TrackingProof,
+    best_guarantee,
+    design_sampled_law,
+    guarantee,
+    with_varying_gain,
+)
 from quakedesign.guarantees.exact.guarantee_files import guarantee_text, parse_guarantee
 from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search import aperiodic_search as unclocked
@@ -44,7 +51,7 @@ def test_a_set_is_found_that_both_prove_a_little_more_than_the_stored_one():
     assert (
         stored().claims.slip_rate_error <= claim.claims.slip_rate_error <= F("1.15") * stored().claims.slip_rate_error
     )
-    assert tightened(claim) is claim
+    assert with_varying_gain(claim) is claim
 
 
 def test_a_narrow_range_comes_near_what_is_proved_by_a_clock():
