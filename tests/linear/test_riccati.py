@@ -1,5 +1,7 @@
 """The Riccati design: bandwidth, bound on the uncertainty, guarantee."""
 
+import decimal
+import math
 from dataclasses import replace
 from fractions import Fraction as F
 
@@ -10,8 +12,9 @@ import pytest
 import quakedesign as qd
 from quakedesign.fault import Disturbance
 from quakedesign.linear import linear_problem as m
+from quakedesign.linear import riccati
 from quakedesign.linear.linear_problem import LinearProblem, decreases
-from quakedesign.linear.riccati import riccati_design, sound_bound, vertex_poles
+from quakedesign.linear.riccati import limiting_gains, riccati_design, smallest_gain, sound_bound, vertex_poles
 
 REAL = qd.load_fault("real-fault")
 BOTH = qd.load_fault("real-fault", box="ten-percent").with_disturbance(Disturbance(slip_growth=1e-3, rate_growth=0.05))
@@ -73,3 +76,42 @@ def test_a_fault_without_uncertainty_needs_no_bound():
     design = riccati_design(fault)
     assert np.diag(design.Q) == pytest.approx([1, 0.01, 1, 1])
     assert decreases(LinearProblem.of(fault), values(design), design.theta)
+
+
+def test_the_poles_of_a_design_are_those_of_its_nominal_loop():
+    design, problem = riccati_design(REAL), LinearProblem.of(REAL)
+    k, eta, b = map(float, (problem.stiffness, problem.damping, problem.sectors.authority))
+    row = np.array([-k, -eta, 0, 0]) - b * np.array(values(design), dtype=float)
+    loop = np.array([[0, 1, 0, 0], row, [1, 0, 0, 0], [0, 0, 1, 0]])
+    assert np.sort_complex(design.E) == pytest.approx(np.sort_complex(np.linalg.eigvals(loop)), rel=1e-6)
+
+
+@pytest.mark.parametrize(("bandwidth", "weight"), [(1e12, 1e-14), (1e-6, 1.0)])
+def test_a_bandwidth_out_of_reach_gives_the_nearest_weight(bandwidth, weight):
+    assert riccati_design(REAL, bandwidth=bandwidth).R == weight
+
+
+def test_the_split_of_the_smallest_gain_is_the_best_of_a_grid():
+    problem = LinearProblem.of(BOTH)
+    least, pace = smallest_gain(problem), math.sqrt(problem.stiffness)
+
+    def size(split):
+        slip, rate = limiting_gains(problem, split)
+        return math.hypot(slip, pace * rate)
+
+    assert (least.slip, least.rate) == limiting_gains(problem, least.split)
+    assert size(least.split) <= min(size(w) for w in np.linspace(0.01, 0.99, 99))
+    assert smallest_gain(LinearProblem.of(REAL)).split == 0.5  # one of the bounds is 0: no split
+
+
+@pytest.mark.parametrize(("proved", "digits"), [((10, 17), 10), ((17,), 17), ((), 10)])
+def test_gains_have_ten_digits_unless_only_more_are_proved(monkeypatch, proved, digits):
+    def rounded(value, count):  # by the context of the standard library
+        context = decimal.Context(prec=count, rounding=decimal.ROUND_HALF_EVEN)
+        return F(context.divide(decimal.Decimal(value.numerator), decimal.Decimal(value.denominator)))
+
+    gains = (F(2, 3), F(-123456, 7), F(0), F(1, 10**12 + 7))
+    by_count = {count: tuple(rounded(g, count) for g in gains) for count in (10, 17)}
+    accepted = [by_count[count] for count in proved]
+    monkeypatch.setattr(riccati, "decreases", lambda problem, decimals, theta: decimals in accepted)
+    assert riccati._rounded_gains(None, gains, ()) == by_count[digits]
