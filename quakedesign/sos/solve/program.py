@@ -45,8 +45,8 @@ class Solution:
 
     values: Mapping[str, Fraction]  # Decision variables
     answers: tuple[Answer, ...]  # One ``sos`` answer for every required polynomial, in order
-    objective: Fraction  # Exact value of the objective, attained by a feasible decision
-    bound: float  # Optimum of the solver in floating point, without proof
+    objective: Fraction  # Exact value of the maximised or minimised function at these values
+    bound: float  # Optimum of the same function by the solver, in floating point without proof
     # Equations solved in advance, each with its requirement and the monomial or kernel that forces it
     forced: tuple[str, ...] = ()
 
@@ -90,7 +90,8 @@ class Program:
         self._margin: cp.Variable | None = None
         self._status = ""
         self._definite: list[list[list[dict[Exponents, Fraction]]]] = []
-        self._objective: dict[Exponents, Fraction] = {}
+        self._objective: dict[Exponents, Fraction] = {}  # maximised
+        self._sign = 1  # -1 if the function of the user is minimised
 
     def __getitem__(self, decision: str) -> "cp.Expression":
         """Decision as a cvxpy expression for further constraints, which steer the search and are not proved."""
@@ -152,15 +153,15 @@ class Program:
         self._definite.append(rows)
 
     def maximize(self, objective: Any) -> None:
-        """Set an affine function of the decisions to maximise."""
-        self._objective = self._affine(objective)
+        """Set a function of the decisions to maximise. Raises PolynomialError if it is not affine."""
+        self._objective, self._sign = self._affine(objective), 1
 
     def minimize(self, objective: Any) -> None:
-        """Set an affine function of the decisions to minimise."""
-        self._objective = {e: -c for e, c in self._affine(objective).items()}
+        """Set a function of the decisions to minimise. Raises PolynomialError if it is not affine."""
+        self._objective, self._sign = {e: -c for e, c in self._affine(objective).items()}, -1
 
     def problem(self) -> "cp.Problem":
-        """First cvxpy problem of the search, on the faces that the requirements force."""
+        """First cvxpy problem of the search, on the forced faces. Raises PolynomialError without a requirement."""
         self._forced = Forced(requirements=tuple(self._required)).reduced(self.decisions)
         return self._problem()
 
@@ -182,31 +183,31 @@ class Program:
         """
         self.problem()
         base = self._forced
-        solution, ended = self._ended()
+        solution, outcome = self._attempt()
         for kernel in _KERNELS if solution is None and self._margin is not None else ():
             self._forced = base
             for _ in range(_ROUNDS):
                 if not self._restricted(*kernel):
                     break
-                solution, _ = self._ended()
+                solution, _ = self._attempt()
                 if solution is not None:
                     return solution
             self._forced = base
-        return solution or NoSolution(reason="; ".join((*base.reasons, ended)))
+        return solution or NoSolution(reason="; ".join((*base.reasons, outcome)))
 
-    def _ended(self) -> tuple[Solution | None, str]:
+    def _attempt(self) -> tuple[Solution | None, str]:
         """Solution on the present faces or None, and the outcome of the search in words."""
         if self._forced.contradiction:
             return None, "hence the requirements are infeasible at this degree"
         solution = next(filter(None, (self._rounded(*point) for point in self._interior(_LOSSES))), None)
-        ended = (
+        outcome = (
             f"the {'remaining programme' if self._forced.reasons else 'programme'} is {self._status} in floating point"
         )
         if self._margin is not None:
-            ended += f", with a margin of {self._margin.value:.1g}, but no exact decisions were found"
+            outcome += f", with a margin of {self._margin.value:.1g}, but no exact decisions were found"
         elif refuted := self._forced.refuted():
-            ended = f"{refuted}; so no decisions satisfy the requirements at this degree"
-        return solution, ended
+            outcome = f"{refuted}; so no decisions satisfy the requirements at this degree"
+        return solution, outcome
 
     def _restricted(self, threshold: float, tolerance: float) -> bool:
         """Restrict to faces without the numerical kernels of the last Gram matrices; whether any kernel exists."""
@@ -228,7 +229,7 @@ class Program:
         Parameters
         ----------
         margin : float
-            Loss of objective allowed for the margin, relative to max(1, |optimum|).
+            Loss of objective allowed for the margin, relative to max(1, |optimum|); finite and not negative.
         """
         if not margin >= 0 or math.isinf(margin):
             raise PolynomialError(f"margin must be a number of at least 0. Received {margin!r}. Give for example 0.01.")
@@ -260,19 +261,18 @@ class Program:
                     yield best, loss
 
     def _rounded(self, best: float, loss: float) -> Solution | None:
-        """Proved decision near the last one of the solver; its objective is within 2·`loss` of the optimum."""
+        """Proved solution near the last one of the solver; its objective is within 2·`loss` of the optimum."""
         for bits in _BITS:
             near = [nearest(float(v), 2**bits) for v in np.asarray(self._vector.value).tolist()]
             values = self._forced.completed(near)
             close = not self._objective or _at(self._objective, values) >= Fraction(best) - 2 * Fraction(loss)
             answers = self._proved(values) if close else None
             if answers is not None:
-                objective = _at(self._objective, values)
                 return Solution(
                     values=dict(zip(self.decisions, values, strict=True)),
                     answers=answers,
-                    objective=objective,
-                    bound=best,
+                    objective=self._sign * _at(self._objective, values),
+                    bound=self._sign * best,
                     forced=self._forced.reasons,
                 )
         return None
@@ -429,7 +429,7 @@ class Membership:
         self._program = MomentProgram([b.shape() for b in initial_blocks(template)], rows)
 
     def margin(self, polynomial: Mapping[Exponents, Fraction | float]) -> float:
-        """Largest t with polynomial − t·Σ b² in the cone, in floating point without proof; NaN if the solver fails.
+        """Largest t (float, unproved) with polynomial − t·Σ b² in the cone; NaN if the solver fails, −∞ if none exists.
 
         Raises
         ------

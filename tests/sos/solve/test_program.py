@@ -35,6 +35,8 @@ def test_matrix_inequality_is_finished_exactly():
     a, b = found.values["a"], found.values["b"]
     assert a * b > 1
     assert 2 < a + b < Fraction(2001, 1000)
+    assert found.objective == a + b  # of the minimised function, not of its negative
+    assert found.bound == pytest.approx(2, abs=1e-4)
 
 
 def test_cvxpy_constraints_steer_the_search():
