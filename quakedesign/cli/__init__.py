@@ -38,12 +38,12 @@ __all__ = [
 ]
 
 
-_PLACES = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
-"""Error numbers of a disk that cannot be written; all others are defects."""
+_UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EPERM)
+"""Error numbers of output that cannot be written; any other `OSError`, except on stdout, is an internal error."""
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit with its code; every input error is one line on stderr and exit code 2."""
+    """Run the command line and exit with its code; an input error prints one line on stderr and exits with code 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -68,7 +68,7 @@ def main(arguments: list[str] | None = None) -> None:
             lack_memory()
         if "QUAKEDESIGN_TRACEBACK" in os.environ:
             raise
-        if isinstance(error, OSError) and (error.errno in _PLACES or error.filename == "stdout"):
+        if isinstance(error, OSError) and (error.errno in _UNWRITABLE or error.filename == "stdout"):
             where = error.filename or "the output"
             _reject(f"{where} cannot be written: {error.strerror}. Choose another folder, or free disk space.")
         defect = one_line(f"{type(error).__name__}: {error}")
@@ -79,7 +79,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _with_help(error: CycloptsError) -> str:
-    """Error message of a command line; a pointer to --help follows unless the error is about an option's value."""
+    """Message of an error of the command line, with a pointer to --help unless the value of an option is wrong."""
     if isinstance(error, CoercionError):
         return str(error)
     hyphen = " If a value begins with -, write --option=value." if isinstance(error, MissingArgumentError) else ""

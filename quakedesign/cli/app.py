@@ -35,7 +35,7 @@ def store_command(arguments: Sequence[str]) -> None:
 
 
 def set_output(*, quiet: bool, level: str) -> None:
-    """Switch off text output if `quiet`, and log on stderr from a logging level on."""
+    """Switch off text output if `quiet`, and log messages of a level and above on stderr."""
     _quiet.set(quiet)
     for handler in _log.handlers[:]:
         _log.removeHandler(handler)
@@ -75,7 +75,7 @@ def specified(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def reject(options: Mapping[str, Any], what: str) -> None:
-    """Reject given options that cannot be combined with `what`."""
+    """Raise ParameterError if any of the options, which cannot be used with `what`, is given."""
     if names := list(specified(options)):
         raise ParameterError(f"{', '.join(names)} cannot be used with {what}. Omit {', '.join(names)}.")
 
@@ -93,10 +93,10 @@ def print_lines(lines: Iterable[str]) -> None:
 
 
 class _Screen(Console):
-    """Console that prints strings as plain text: no markup, no emoji, no control characters, no endless line."""
+    """Console that prints strings as plain text: no markup, no emoji, no control characters, long lines broken."""
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Print strings, with a hanging indent on a terminal; elsewhere only text over 200 characters is broken."""
+        """Print strings, on a terminal wrapped with a hanging indent, elsewhere broken only beyond 200 characters."""
         if self.is_terminal:
             objects = tuple(self._wrapped(text) if isinstance(text, str) else text for text in objects)
         super().print(*objects, **options)
@@ -138,7 +138,7 @@ def new_file(path: Path | None, what: str, *, force: bool) -> None:
 
 
 def require_different(places: Mapping[str, Path | None]) -> None:
-    """Reject two names of one file, so that no input file is overwritten."""
+    """Raise OutputError if two options name one file, so that no input file is overwritten."""
     named = {name: os.path.realpath(path) for name, path in places.items() if path is not None}
     for one, other in combinations(named, 2):
         if named[one] == named[other]:

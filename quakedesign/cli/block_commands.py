@@ -1,4 +1,4 @@
-"""Command `blocks`, and what other commands do for fault files with several blocks."""
+"""Command `blocks`, and the parts of other commands for fault files with several blocks."""
 
 import os
 from collections.abc import Collection
@@ -48,8 +48,8 @@ def blocks(
 ) -> int:
     """Check whether one block is an adequate model of a fault, by guarantees for the fault cut into several blocks.
 
-    Each block has its own friction law, any law within the uncertainty box, and its own disturbance. Springs connect
-    neighbours. A law is designed for each number of blocks. Exit code 0 only if every number of blocks has a proof.
+    Each block has its own friction law, arbitrary within the uncertainty box, and its own disturbance. Springs connect
+    neighbouring blocks. A law is designed for each number of blocks. Exit code 0 only if each number has a proof.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def blocks(
         one: one well for all blocks (its law measures mean slip and mean slip rate); each: a well for each block.
     coupling
         Stiffness of the springs between blocks divided by the mass of a block, in 1/s^2; by default that of elastic
-        strips, G·blocks²/(ρL²).
+        strips, G·blocks²/(ρL²), with shear modulus G, density ρ and length L of the fault.
     step
         Sampling time T_s; the fault's by default.
     out
@@ -118,7 +118,7 @@ def several_blocks(
         has = {*accepted, "json"} - {"state"} | ({"force", "box"} & options.keys())
         raise ParameterError(
             f"options of {command.__name__} for a fault of several blocks must be among "
-            f"{', '.join(f'--{name}' for name in sorted(has)).replace('_', '-')}. Received {named}. Omit these."
+            f"{', '.join(f'--{name}' for name in sorted(has)).replace('_', '-')}. Received {named}. Omit these options."
         )
     if chosen.get("accept_poor_fit"):
         chain = replace(chain, fault=with_accepted_fit(chain.fault, True))
@@ -126,19 +126,19 @@ def several_blocks(
 
 
 def chain_at_step(chain: "BlockChain", setup: LoopSetup) -> "BlockChain":
-    """The blocks, with T_s of a loop setup if given."""
+    """The blocks, with the T_s of a loop setup if it has one."""
     return replace(chain, fault=setup.at_step(chain.fault)[0])
 
 
 def _scope(proof: Any, chain: "BlockChain") -> list[str]:
-    """Conditions of a statement about blocks, and its terms."""
+    """Definitions of the terms in a statement about blocks, and its conditions."""
     from quakedesign.studies.several_blocks import farthest_balance
 
     meant = "'load of a pressure' in the statement: the well pressure that keeps the blocks in balance on the reference"
     if chain.has_state:
         return [
-            "log state: ln(θV/D_c), θ the friction state; pull: shear stress by springs and wells [MPa]; a bound |y| "
-            "is one of a log state or a pull; load of a pressure: the planned pressure",
+            "log state: ln(θV/D_c), θ the friction state, V the reference slip rate; pull: shear stress by springs and "
+            "wells [MPa]; y in |y|: a log state or a pull; load of a pressure: the planned pressure",
         ]
     if (far := farthest_balance(chain, proof)) is not None:
         meant = (
@@ -176,11 +176,11 @@ def show_chain(chain: "BlockChain", output: Output) -> int:
     return 0
 
 
-def chain_limits(chain: "BlockChain", output: Output, **beside: Any) -> int:
+def chain_limits(chain: "BlockChain", output: Output, **options: Any) -> int:
     """The command `limits`."""
     from quakedesign.studies import chain_limits as limits
 
-    result = limits(chain, **beside)
+    result = limits(chain, **options)
     output.show(result.to_dict(), result.lines())
     return 0
 
@@ -214,7 +214,7 @@ def guarantee_chain(
     force: bool,
     output: Output,
 ) -> int:
-    """The command `guarantee`; `sliding` are lag and stress of blocks in slow sliding."""
+    """The command `guarantee`; `sliding` contains lag [s] and stress [Pa] of blocks in slow sliding."""
     from quakedesign.synthesis import guarantee
 
     law = block_law(controller, "elqr")
@@ -243,7 +243,7 @@ _HEADS = ("law", "proved", "", "in the run", "", "pressure", "")
 
 
 def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any], output: Output) -> int:
-    """The command `compare`: centralised laws (each well uses all measurements) and decentralised laws (its own)."""
+    """The command `compare`: centralised laws, and decentralised laws, in which a well uses its own measurements."""
     from quakedesign.studies.several_blocks import run_of_chain, run_sliding_chain
     from quakedesign.synthesis.guarantee import BLOCK_LAWS
 
@@ -280,7 +280,7 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
 
 
 def require_loads(chain: "BlockChain", sliding: dict[str, Any]) -> None:
-    """Reject lag and stress of friction without a state."""
+    """Raise ParameterError for a lag or a stress if the friction has no state."""
     if not chain.has_state and any(sliding.values()):
         raise ParameterError(
             "--lag and --stress of several blocks need friction with a state. Received "

@@ -75,8 +75,8 @@ class DesignOptions(WellOptions):
         plant, without stick). By default the runs are on stick-slip, and so is the guarantee if one is found there;
         otherwise, and with --class rate, the guarantee is on printed. Not for rate-and-state faults, which never rest.
     whole_task
-        Rate-and-state faults: simulate the whole task instead of its first 500 D_c/V. The proof covers the whole task
-        in either case.
+        Rate-and-state faults: simulate the whole task instead of its first 500 D_c/V, V the mean slip rate of the task.
+        The proof covers the whole task in either case.
     accept_poor_fit
         Continue although the laboratory record does not support the friction law of the fault; results are labelled.
     """
@@ -120,7 +120,7 @@ class DesignOptions(WellOptions):
         Raises
         ------
         ParameterError
-            For a scheme if the designs have their own.
+            For a scheme without `continuous`, as sampled designs have their own scheme.
         """
         if self.scheme is not None and not self.continuous:
             raise ParameterError(
@@ -132,12 +132,12 @@ class DesignOptions(WellOptions):
 
     @property
     def sliding(self) -> dict[str, Any]:
-        """Lag and stress for several blocks in slow sliding."""
+        """Lag [s] and stress [Pa] for several blocks in slow sliding."""
         return {"lag": self.setup().lag, "stress": None if self.stress is None else rational(self.stress)}
 
     @property
     def _laws(self) -> str:
-        """Requested law, or all; if only the slip is measured, elqr, the only law that can be designed then."""
+        """Requested law or all; elqr if only the slip is measured, as no other law can then be designed."""
         if self.measured != "slip" or self.controller == "elqr":
             return self.controller
         if self.controller != "all":
@@ -164,10 +164,10 @@ def design(
 ) -> int:
     """Design, prove and simulate controllers, compare them with published gains, and write a report.
 
-    Every designed controller runs as it is guaranteed: sampled, with a zero-order hold over T_s. Exit code 0 if every
-    design is proved at the fault's T_s and no run of a designed controller is an earthquake, diverges or opens the
-    fault; with --continuous, if the premises control_coefficient, along_reference and friction_slope hold too. Exit
-    code 1 otherwise.
+    Without --continuous, every designed controller runs as guaranteed: sampled, with a zero-order hold over T_s. Exit
+    code 0 if every design is proved at the fault's T_s and no run of a designed controller is an earthquake, diverges
+    or opens the fault; with --continuous, the premises control_coefficient, along_reference and friction_slope must
+    hold too. Exit code 1 otherwise.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def controllers(name: str, fault: "Fault | None" = None) -> list[str]:
 
 
 def positive(comparison: Any) -> bool:
-    """Whether every design is proved, its premises listed in `needed` hold, and its run is harmless.
+    """Whether every design is proved, its premises in `needed` hold, and its run is harmless.
 
     False for a design without the guarantee of its sampled loop.
     """
@@ -277,8 +277,8 @@ def compare(
     with progress() as tell:
         comparison = designed_comparison(loaded, tell=tell, **arguments)
     if output.json:
-        beside = {"numbers": table(comparison), "printed": printed(comparison)}
-        print_json({**results(comparison, stored=False), **beside})
+        of_paper = {"numbers": table(comparison), "printed": printed(comparison)}
+        print_json({**results(comparison, stored=False), **of_paper})
     else:
         from quakedesign.report.terminal import print_comparison
 

@@ -22,7 +22,7 @@ from quakedesign.files import Json
 
 @app.command
 def fault(fault: FaultName, /, *, box: Box = None, output: Output = PLAIN) -> int:
-    """Show derived quantities of a fault and why it is unstable."""
+    """Show derived quantities of a fault, and whether and why it is unstable."""
     options, name = dict(locals()), fault
     from quakedesign.cli.block_commands import several_blocks, show_chain
     from quakedesign.fault import load_fault
@@ -100,11 +100,11 @@ def scale(
     controller
         cta, dia or elqr.
     gains
-        published, or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min,
-        N̂_min the smallest N̂ of the source).
+        published, or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, p the
+        pressure, μ_res the residual friction coefficient, N̂_min the smallest A/m of the source).
     clock
-        Time scale from operation-time or natural-period; by default operation-time,
-        or natural-period if the ratio of the operation times differs from that of the natural periods.
+        Time scale from operation-time or natural-period; by default operation-time, or natural-period if the ratio of
+        the operation times differs from that of the natural periods.
     """
     from quakedesign.report.terminal import scale_lines
     from quakedesign.studies.scaling import scale_answer
@@ -171,15 +171,15 @@ def init(
 
     if file.suffix != ".toml":
         raise OutputError(f"the file of a fault must end in .toml. Received {file}. Write {file.stem or 'fault'}.toml.")
-    beside = file.parent / SCHEMA_NAME if schema else None
+    schema_file = file.parent / SCHEMA_NAME if schema else None
     text = template(law, schema=schema)
-    for path in (file, beside):
+    for path in (file, schema_file):
         new_file(path, "fault file" if path == file else "schema", force=force)
     write_whole(file, text)
-    if beside is not None:
-        write_whole(beside, json.dumps(fault_schema(), indent=1, ensure_ascii=False) + "\n")
-    written = [str(path) for path in (file, beside) if path is not None]
-    entries = {"file": str(file), "schema": str(beside) if beside else None}
+    if schema_file is not None:
+        write_whole(schema_file, json.dumps(fault_schema(), indent=1, ensure_ascii=False) + "\n")
+    written = [str(path) for path in (file, schema_file) if path is not None]
+    entries = {"file": str(file), "schema": str(schema_file) if schema_file else None}
     output.show(entries, [f"written: {', '.join(written)}", f"next: edit it, then quakedesign fault {file}"])
     return 0
 
@@ -226,13 +226,13 @@ def identify(
     data
         Text with headings and units, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
         normal_stress [MPa]' (load_point_rate, shear_force, normal_force, friction and slip are accepted too), with any
-        column separator; xlook's text and reduced binary; vectors of a MATLAB file. A column weight (1/variance of
-        friction, in any unit) weights the samples.
+        column separator; or text or reduced binary of xlook; or vectors of a MATLAB file. A column weight (1/variance
+        of friction, in any unit) weights the samples.
     more
         Further files, each with one velocity step of the same experiment. Each step is fitted alone; then one law is
         fitted to all steps.
     law
-        Friction law. By default rate-and-state-aging and rate-and-state-slip are fitted and the better one is taken;
+        Friction law. By default rate-and-state-aging and rate-and-state-slip are fitted and the better one is chosen;
         others are regularised-rate-and-state, exponential-slip-weakening and linear-slip-weakening.
     stiffness
         Machine stiffness, such as '5 GPa/m' ('2 kN/um' for forces, '1e-3 1/um' for friction); fitted by default.
@@ -254,15 +254,15 @@ def identify(
     states
         Number of friction states; 2 may explain a record that 1 does not, but a fault file can have only 1.
     trend
-        Drift of friction, linear in displacement or time, or none; by default kept if significant (F test at 1 %).
+        Drift of friction, linear in displacement or time, or none; by default included if significant (F test at 1 %).
     seed
         Seed of the random starting points.
     out
-        Fault file to write; its friction covers the whole confidence region where a fault file can express that.
+        Fault file to write; its friction covers the whole confidence region if a fault file can express it.
     figure
         Figure of data, fit and residuals to write: .svg, .png or .pdf.
     verbose
-        Also print every test, the noise, the searches and what was assumed.
+        Also print every test, the noise, the searches and the assumptions.
     """
     from textwrap import wrap
 
@@ -279,7 +279,7 @@ def identify(
         require_format(figure)
     further = {f"record {i}": path for i, path in enumerate(more, start=2)}
     require_different({"--out": out, "--figure": figure, "the record": data, "--fault": Path(fault), **further})
-    around = load_fault(fault)
+    base_fault = load_fault(fault)
     records = [
         record
         for path in (data, *more)
@@ -287,23 +287,23 @@ def identify(
     ]
     spring = None if stiffness is None else in_unit(stiffness, records[0].stiffness_unit, "stiffness")
     speeds = [in_unit(part.strip(), "m/s", "rates") for part in rates.split(",") if part.strip()]
-    how: dict[str, Any] = {"stiffness": spring, "rates": speeds, "states": states, "trend": trend, "seed": seed}
-    several = identify_steps(records, law, **how) if len(records) > 1 else None
-    identification = fitted(records[0], law, **how) if several is None else several.common
+    settings: dict[str, Any] = {"stiffness": spring, "rates": speeds, "states": states, "trend": trend, "seed": seed}
+    several = identify_steps(records, law, **settings) if len(records) > 1 else None
+    identification = fitted(records[0], law, **settings) if several is None else several.common
     result = several or identification
     file, remarks = out, list[str]()
     if out is not None:
         try:
-            save_fault(identification, around, out)
-            remarks.append(f"from {around.name}, not from the record: {other_parts(identification, around)}")
-            remarks += task_remarks(identification, around)
-        except RecordError as refused:
+            save_fault(identification, base_fault, out)
+            remarks.append(f"from {base_fault.name}, not from the record: {other_parts(identification, base_fault)}")
+            remarks += task_remarks(identification, base_fault)
+        except RecordError as error:
             file = None
-            remarks.append(f"not written: {out}: {refused}")
+            remarks.append(f"not written: {out}: {error}")
     if figure is not None:
         save_figure(result, figure)
     written = ", ".join(str(path) for path in (figure, file) if path is not None)
-    remarks = [*law_remarks(identification, around), *([f"written: {written}"] if written else []), *remarks]
+    remarks = [*law_remarks(identification, base_fault), *([f"written: {written}"] if written else []), *remarks]
     remarks = [line for each in remarks for line in wrap(each, 80, subsequent_indent="  ", break_long_words=False)]
     usable = file is not None or (out is None and identification.explained)
     remarks += [f"next: {next_command(identification, file)}"] if usable else []
@@ -319,7 +319,7 @@ def identify(
 
 @app.command
 def schema(command: str, /, *, output: Output = PLAIN) -> int:
-    """Print the JSON Schema (draft 2020-12) of what a command prints with --json.
+    """Print the JSON Schema (draft 2020-12) of the --json output of a command.
 
     Where the output for several blocks differs, the schema has a branch for it. Required keys of a branch are in every
     output of its kind; options add further keys, whose values may be null. Units are in the table of keys

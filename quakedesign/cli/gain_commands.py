@@ -54,25 +54,25 @@ def synthesise(
         Objective sampled: preset or path of a .toml file.
     objective
         norm: smallest norm of the gains after scaling to |h'| <= 1 m/s^3. decay: shortest certified settling time from
-        all |e_i| ≤ L̄ (the value of --lipschitz; numbers in SI units). beta: widest certified range of the input gain
-        β. sampled: smallest simulated error of proved gains on a fault.
+        all errors |e_i| ≤ L̄ (L̄ the value of --lipschitz; numbers in SI units). beta: widest certified range of the
+        input gain β. sampled: smallest error of proved gains in a simulation of a fault.
     lipschitz
         Bound on |h'|, the rate of change of the matched perturbation h, in the unit of the control ν per second; by
         default 1, for sampled 1.1 times the largest |h'| of the fault.
     gain_range
-        b_m and b_M, the range of the input gain β; 1 1 by default, for sampled that of the fault. For beta
-        the certified range contains this range and has the same geometric mean.
+        b_m and b_M, the range of the input gain β; 1 1 by default, for sampled that of the fault. For beta the
+        certified range contains this range and has the same geometric mean.
     bound
-        Objectives decay and beta: largest norm of the gains; by default the smallest norm of gains from the literature.
+        Objectives decay and beta: largest norm of the gains; by default the smallest norm in the literature.
     degree
-        Degree of the Lyapunov function V; repeat for more. By default the two lowest; higher degrees find better gains
-        and take longer.
+        Degree of the Lyapunov function V; repeat the option for further degrees. By default the two lowest; higher
+        degrees yield better gains and take longer.
     starts
         Number of starting points, 4 by default; not for sampled.
     seed
         Seed of the random starting points, 0 by default.
     workers
-        Number of processes, 2 by default; results do not depend on it.
+        Number of processes, 2 by default; results do not depend on this number.
     step
         Objective sampled: sampling time T_s, in s or with a unit; the fault's by default.
     scheme
@@ -113,7 +113,7 @@ def _sampled(
     law: str, fault: str | None, lipschitz: str | None, gain_range: tuple[str, str] | None, degree: tuple[int, ...],
     options: Mapping[str, Any],
 ) -> tuple["Synthesis | None", dict[str, Any]]:  # fmt: skip
-    """Gains with the smallest error in a sampled run, and the settings of these runs."""
+    """Gains with the smallest error in a sampled run, and the settings of the runs."""
     from quakedesign.fault import load_fault
     from quakedesign.synthesis.simulated_error import sampling, synthesise_sampled
 
@@ -127,7 +127,7 @@ def _sampled(
 
 
 def _values(synthesis: "Synthesis | None") -> Json:
-    """Result as JSON: gains and ranges as strings, measured values as numbers."""
+    """Result as JSON: gains and ranges as strings, floating-point values as numbers."""
     if synthesis is None:
         return {"verdict": "undecided", "gains": None, "value": None, "compared": []}
     ranges = synthesis.certificate.loop.uncertain
@@ -161,7 +161,7 @@ def _print(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> 
     out.print(f"proved: {law} with {gains} for |h'| <= {ranges['d'][1]}{beta}")
     if more:
         of_run = "{scheme} run on {fault} with scale {scale}, T_s = {step:.4g} s, over {duration:.4g} s"
-        out.print(f"measured, not proved: {synthesis.objective} of one {of_run.format(**more)}")
+        out.print(f"simulated, not proved: {synthesis.objective} of one {of_run.format(**more)}")
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     unit = "" if synthesis.unit == "-" else f" [{synthesis.unit}]"
     for column in ("gains", f"{synthesis.objective}{unit}", "norm", "improvement factor"):
@@ -205,9 +205,9 @@ def gain_map(
 ) -> int:
     """Map where two gains are certified, at one or more levels of |h'|, with certificates, figure and table.
 
-    Every grid point is screened in floating point. At every level, all points at the edge of the screened region and a
-    random sample of its inner points are then proved exactly; figure and table distinguish screened from proved points.
-    Exit code 0 if some point passes the screening and every edge point is proved.
+    Every grid point is screened in floating point. At every level, exact proofs are then sought for all points at the
+    edge of the screened region and for a random sample of its inner points; figure and table distinguish screened from
+    proved points. Exit code 0 if some point passes the screening and every edge point is proved.
 
     Parameters
     ----------
@@ -222,15 +222,15 @@ def gain_map(
         --gains.
     lipschitz
         One or more bounds on |h'|, the rate of change of the matched perturbation h, in the unit of the control ν per
-        second; by default 25, 50, 75, 90 and 99 % of the largest |h'| for which any proof can exist.
+        second; by default 25, 50, 75, 90 and 99 % of the largest |h'| for which a proof for --gains can exist.
     gain_range
         b_m and b_M, the range of the input gain β.
     points
         Grid points along each axis.
     degree
-        Degree of the Lyapunov functions; by default the lowest that proves the given gains.
+        Degree of the Lyapunov functions; by default the lowest that proves --gains at the lowest level.
     interior
-        Number of random inner points to prove.
+        Number of random inner points for which a proof is sought.
     seed
         Seed of the choice of inner points.
     workers

@@ -1,7 +1,6 @@
 """Commands `guarantee` and `limits`.
 
-The first proves bounds of the sampled loop for all t ≥ 0; the second gives the performance limits of
-every controller.
+The first proves bounds of the sampled loop for all t ≥ 0; the second gives the performance limits of every controller.
 """
 
 from collections.abc import Iterator
@@ -70,9 +69,9 @@ def guarantee(
     """Prove bounds on slip, slip rate and pressure of the sampled loop.
 
     The bounds hold along the reference for every friction law and all constant parameters of the box, for every
-    disturbance of the class, for all t >= 0, and from rest or from bounded initial errors; for rate-and-state faults
-    during the slip of the task, from steady sliding. The controller is designed for the loop setup unless gains are
-    given. Exit code 0 only if every fault has a proof.
+    disturbance of the class, from rest or from bounded initial errors, for all t >= 0. For rate-and-state faults they
+    hold during the slip of the task, which begins in steady sliding. The controller is designed for the loop setup
+    unless gains are given. Exit code 0 only if every fault has a proof.
 
     Parameters
     ----------
@@ -82,10 +81,10 @@ def guarantee(
         Of a design. peak: the smallest certified slip rate (plant without stick: slip-rate error). tracking: a smaller
         slip error under a drifting disturbance, with a somewhat larger slip rate.
     gains
-        k1 to k4 of an e-LQR, whose integral is a sum over the samples; by default a law is designed that estimates the
-        disturbance instead of integral action. Of a sliding mode: base gains (λ = 1); the command chooses λ.
+        k1 to k4 of an e-LQR, whose integral is a sum over the samples; by default a law is designed with an estimate of
+        the disturbance instead of integral action. Of a sliding mode: base gains (λ = 1); the command chooses λ.
     law
-        File of your own sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
+        File of a user-defined sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
         Sliding modes: stick-slip (default), or compensated on the plant without stick; no other scheme has a guarantee.
         The e-LQR uses the scheme explicit.
@@ -96,7 +95,7 @@ def guarantee(
         amplitude: any disturbance bounded by the fault's amplitude; rate: its rate of change is bounded too, by the
         fault's amplitude times frequency, and it starts at 0.
     plant
-        stick-slip: friction holds the fault at rest, and it never slips backward (only for a designed e-LQR or a
+        stick-slip: friction holds the fault at rest, and the fault never slips backward (only for a designed e-LQR or a
         sliding mode, with an exactly measured slip rate and a pressure without delay); printed: the paper's plant,
         without stick. By default stick-slip where it has a proof, else printed; with --class rate printed.
     stress
@@ -181,10 +180,10 @@ def _lines(result: Any) -> list[str]:
 
 
 def _files(out: Path | None, names: list[str], *, force: bool) -> list[Path | None]:
-    """Certificate files, one a fault, rejected early if they cannot be written."""
-    again = next((name for name in names if names.count(name) > 1), None)
-    if again is not None:
-        raise ParameterError(f"faults must have different names. Received {again} twice. Rename one of them.")
+    """Paths of the certificate files, one per fault. Raises before the work begins if one cannot be written."""
+    repeated = next((name for name in names if names.count(name) > 1), None)
+    if repeated is not None:
+        raise ParameterError(f"faults must have different names. Received {repeated} twice. Rename one of them.")
     if out is None:
         return [None] * len(names)
     if len(names) == 1:
@@ -243,16 +242,16 @@ def limits(
         other options of the pump are for the proved designs alone.
     setup_options
         Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; with noise
-        the smallest slip-rate error of every controller is larger.
+        the limit on the slip-rate error is larger.
     stress
         Rate-and-state faults (limits of the plant linearised about slow sliding): bound of the shear stress
-        disturbance, such as '25 kPa'; by default about the largest with a guarantee, for several blocks none: then only
-        their unstable modes are listed.
+        disturbance, such as '25 kPa'; by default about the largest with a guarantee. For several blocks there is no
+        default; without this option only their unstable modes are listed.
     spread
         Rate-and-state faults: relative uncertainty of a, b and D_c in the proofs, such as 0.1; the limits are those of
         the nominal values.
     measured
-        Measurement of all controllers: slip-and-rate, or slip.
+        Measurements available to every controller: slip-and-rate, or slip.
     out
         Folder for a figure and results.json; by default nothing is written.
     """
@@ -260,11 +259,11 @@ def limits(
     from quakedesign.cli.block_commands import chain_at_step, chain_limits, several_blocks
     from quakedesign.fault import load_fault
 
-    spreads, accepted = setup_options.diffusivity, ("step", "stress", "pressure", "diffusivity")
+    given, accepted = setup_options.diffusivity, ("step", "stress", "pressure", "diffusivity")
     if (chain := several_blocks(fault, globals()["limits"], options, accepted, box)) is not None:
-        rock = None if spreads is None else float(rational(spreads))
+        value = None if given is None else float(rational(given))
         chain = chain_at_step(chain, replace(setup_options, diffusivity=None).setup())
-        return chain_limits(chain, output, stress=stress, pressure=pressure, diffusivity=rock)
+        return chain_limits(chain, output, stress=stress, pressure=pressure, diffusivity=value)
     loaded = load_fault(fault, box=box, disturbance=disturbance)
     if out is not None:
         from quakedesign.report.folder import prepare
@@ -277,9 +276,9 @@ def limits(
 
     result = all_limits(
         loaded,
-        replace(setup_options, diffusivity=(spreads or "1") if setup_options.well else None).setup(measured=measured),
+        replace(setup_options, diffusivity=(given or "1") if setup_options.well else None).setup(measured=measured),
         pressure=pressure,
-        diffusivity=float(rational(spreads or "1")),
+        diffusivity=float(rational(given or "1")),
         stress=stress,
         spread=spread,
     )

@@ -1,8 +1,8 @@
 """Option types of the command line, and options that several commands share.
 
-Chapters: numbers with units, exact numbers and gains; options of laws, runs and output; actuator and
-sensors; runs of faults with friction state. Quantities of the loop setup, and stages of actuators, declare unit and
-help text themselves (`quakedesign.loop`).
+Chapters: numbers with units, exact numbers and gains; options of laws, runs and output; actuator and sensors; runs of
+faults with friction state. Quantities of the loop setup, and stages of actuators, declare their unit and help text
+themselves (`quakedesign.loop`).
 """
 
 import math
@@ -51,7 +51,7 @@ Gains = Annotated[tuple[str, ...], Parameter(consume_multiple=True, converter=_g
 
 
 def quantity(unit: str) -> Callable[[object, Sequence[Token]], float]:
-    """Converter of an option's text, with a unit or a bare number in the SI unit."""
+    """Converter of an option's text: a number with a unit, or a bare number in the SI unit `unit`."""
 
     def read(_type: object, tokens: Sequence[Token]) -> float:
         return in_unit(tokens[0].value, unit, (tokens[0].keyword or "value").strip("-").replace("-", " "))
@@ -60,7 +60,7 @@ def quantity(unit: str) -> Callable[[object, Sequence[Token]], float]:
 
 
 def in_unit(text: str, unit: str, name: str) -> float:
-    """Number of a text with a unit, or a bare number in this SI unit."""
+    """Value in the SI unit `unit` of a text: a number with a unit, or a bare number."""
     try:
         return float(text)
     except ValueError:
@@ -68,7 +68,7 @@ def in_unit(text: str, unit: str, name: str) -> float:
 
 
 def whole(_type: object, tokens: Sequence[Token]) -> int:
-    """Whole number of an option's text."""
+    """Whole number from an option's text. Raises ParameterError for any other text."""
     text, name = tokens[0].value, (tokens[0].keyword or "value").strip("-").replace("-", " ")
     try:
         return int(text)
@@ -90,7 +90,7 @@ def _exact_reader(unit: str) -> Callable[[object, Sequence[Token]], str]:
     return read
 
 
-def rock(diffusion: str | None, well: str | None, diffusivity: str | None) -> str | None:
+def diffusion_time(diffusion: str | None, well: str | None, diffusivity: str | None) -> str | None:
     """Diffusion time L²/D [s], as given or from the distance L of a well [m] and the diffusivity D [m²/s].
 
     Raises
@@ -136,7 +136,7 @@ Pascals = Annotated[float, Parameter(converter=quantity("Pa"))]
 ExactSeconds = Annotated[str, Parameter(converter=_exact_reader("s"))]
 ExactPascals = Annotated[str, Parameter(converter=_exact_reader("Pa"))]
 Whole = Annotated[int, Parameter(converter=whole)]
-Push = Annotated[str, Parameter(allow_leading_hyphen=True)]
+Perturbation = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
 
 # ----------------------------------------------------------------------
@@ -170,7 +170,7 @@ Box = Annotated[
     str | None, Parameter(help="Uncertainty box: paper (friction alone) or ten-percent (also k/m, η/m and A/m).")
 ]
 Scheduler = Annotated[
-    str | None, Parameter(help="Address of a dask.distributed scheduler to use instead of processes of this machine.")
+    str | None, Parameter(help="Address of a dask.distributed scheduler to use instead of local processes.")
 ]
 Formats = Annotated[
     tuple[Literal["svg", "pdf", "png"], ...],
@@ -217,7 +217,7 @@ class Output:
             set_output(quiet=self.quiet, level=self.log_level)
 
     def show(self, values: Json, text: Iterable[str] | Callable[[], object]) -> None:
-        """Print facts as JSON, or else as text: lines, or a function that prints them."""
+        """Print a result as JSON, or else as text: lines, or a function that prints them."""
         if self.json:
             print_json(values)
         elif callable(text):
@@ -237,22 +237,22 @@ class LawOptions:
     Parameters
     ----------
     controller
-        cta, dia or elqr, or your own law as module:Class; none (not for export): a run without control.
+        cta, dia or elqr, or a user-defined law as module:Class; none (not for export): a run without control.
     gains
         published, designed (for the T_s of the command and, for an e-LQR, its delay, lag and diffusion), continuous
         (designed in continuous time), or the numbers of the gains in SI units (of a sliding mode: with scale λ = 1 and
-        control ν = p·μ_res·N̂_min, N̂_min the smallest N̂ of the box). Rate-and-state faults: designed, for T_s and
-        diffusion alone.
+        control ν = p·μ_res·N̂_min, p the pressure, μ_res the residual friction coefficient, N̂_min the smallest A/m of
+        the box). Rate-and-state faults: always designed, for T_s and the diffusion path alone.
     scale
         Scale λ of a sliding mode, decimal or p/q; replaces that of --gains.
     feedforward
-        none, nominal or centred: feed-forward of a sliding mode from the known plant; not with designed gains.
+        none, nominal or centred: feed-forward of a sliding mode from the plant model; not with designed gains.
     certificate
         Certificate file that guarantee --out wrote; it replaces the options above. The law runs with the T_s, pressure
         limit at rest, noise, delay, lag and diffusion path of the file. Runs in slow sliding have a sinusoidal shear
         stress of the certified amplitude; in simulate and campaign, --stress replaces this amplitude.
     law
-        File of your own sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
+        File of a user-defined sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
     """
 
     controller: str = "cta"
@@ -267,8 +267,8 @@ class LawOptions:
     ) -> "Choice | None":
         """Controller for a fault, with its certified bounds; None if none is requested.
 
-        A designed controller is for a T_s [s], by default the fault's, and a path, see
-        `quakedesign.studies.single_runs.choice`.
+        A controller is designed for `step` (T_s [s], by default the fault's) and `path` (delay, lag, diffusion [s]).
+        Raises ParameterError for a law file or a certificate together with another option of the law.
         """
         from quakedesign.laws import SampledLaw
         from quakedesign.studies.single_runs import Choice, certified_choice, optional_choice
@@ -315,27 +315,26 @@ class RunOptions:
     ----------
     scheme
         Sampled with a zero-order hold: explicit, implicit, semi-implicit, compensated or stick-slip; or continuous,
-        with the law in every stage of the integrator. By default continuous in simulate and explicit in campaign.
-        Designed laws have their own scheme.
+        with the law evaluated in every stage of the integrator. By default continuous in simulate and explicit in
+        campaign. Designed laws have their own scheme.
     method
         Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: radau (by
         default), dop853, cvodes or idas without control; cvodes (by default) or idas with control.
     plant
-        stick-slip (by default; friction holds the fault at rest) or printed (the paper's plant, without
-        stick). Rate-and-state faults never rest: smooth or quasi-dynamic (without inertia), by default
-        smooth for one block and quasi-dynamic for several.
+        stick-slip (by default; friction holds the fault at rest) or printed (the paper's plant, without stick).
+        Rate-and-state faults never rest: smooth or quasi-dynamic (without inertia), by default smooth for one block and
+        quasi-dynamic for several.
     step
         Sampling time T_s, or integration step of the scheme continuous; the fault's T_s by default.
     duration
-        Duration of the run; the operation time by default. Without a
-        controller and a duration, the run of a slip-weakening fault is its natural earthquake: without disturbance,
-        with a duration that is chosen automatically.
+        Duration of the run; the operation time by default. If neither a controller nor a duration is given, the run of
+        a slip-weakening fault is its natural earthquake, without disturbance and with an automatically chosen duration.
     substeps
         Integrator steps per sample.
     drift
         Loading velocity, such as '3 cm/year'; by default 0, for rate-and-state faults the reference rate.
     perturbation
-        Extra disturbance in m/s^2: an expression of slip, slip_rate and time.
+        Additional disturbance in m/s^2: an expression in slip, slip_rate and time.
     """
 
     scheme: str | None = None
@@ -345,7 +344,7 @@ class RunOptions:
     duration: Seconds | None = None
     substeps: Whole = 1
     drift: MetresPerSecond | None = None
-    perturbation: Push | None = None
+    perturbation: Perturbation | None = None
 
     def way(self, law: "Controller | None", usual: str = "explicit") -> "tuple[Any, float | None, dict[str, Any]]":
         """Scheme, step [s] and settings of a run, see `quakedesign.loop.schemes.scheme_of_run`."""
@@ -370,7 +369,7 @@ class StartOptions:
     initial_slip
         Initial slip, such as '7.5 mm'; 0 by default.
     initial_slip_rate
-        Initial slip rate, such as '1 mm/s'.
+        Initial slip rate, such as '1 mm/s'; 0 by default.
     target_slip
         Slip at the end of the task, such as '5 cm', instead of the fault's.
     """
@@ -380,12 +379,12 @@ class StartOptions:
     target_slip: Metres | None = None
 
     def state(self) -> dict[str, float]:
-        """Initial slip and slip rate, if given."""
+        """Initial slip [m] and slip rate [m/s], each only if not zero."""
         entries = {"initial_slip": self.initial_slip, "initial_slip_rate": self.initial_slip_rate}
         return {name: value for name, value in entries.items() if value}
 
     def task(self, fault: "Fault") -> "Fault":
-        """The fault with the given target."""
+        """The fault, with the target slip of these options if given."""
         if self.target_slip is None:
             return fault
         return replace(fault, reference=replace(fault.reference, target_slip=self.target_slip))
@@ -421,7 +420,7 @@ def _exact_option(unit: str, text: str) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class WellOptions:
-    """Diffusion path from the distance of a well."""
+    """Diffusion path given by the distance of a well and the diffusivity."""
 
     well: Annotated[
         str | None,
@@ -442,7 +441,7 @@ class WellOptions:
         """Loop setup of the options, with further fields of `LoopSetup`."""
         names = quantities()
         entries = {name: value for name, value in vars(self).items() if name in names}
-        entries["diffusion"] = rock(entries["diffusion"], self.well, self.diffusivity)
+        entries["diffusion"] = diffusion_time(entries["diffusion"], self.well, self.diffusivity)
         return IDEAL.with_given(**entries, **more)
 
 
@@ -477,7 +476,7 @@ def _annotation(option: Option) -> Any:
 @Parameter(name="*", group=_ACTUATOR)
 @_with_stage_options
 class ActuatorOptions:
-    """Options of the stages between law and fault, for schemes that sample; each stage declares its own."""
+    """Options of the stages between law and fault, for sampled schemes; each stage declares its own."""
 
     def values(self) -> dict[str, Any]:
         """Values in SI units, by the names of the options."""
@@ -489,7 +488,7 @@ class ActuatorOptions:
         return {name: values[name] for name in ("delay", "lag", "diffusion") if values[name]}
 
     def build(self, step: float, seed: int = 0) -> Actuator:
-        """Stages of an actuator in the order of the signal, for a sampling period [s] and a seed of the jitter.
+        """Actuator with its stages in signal order, for a sampling period [s] and a seed of the jitter.
 
         Raises
         ------
@@ -582,7 +581,7 @@ class SensorOptions(EstimateOptions):
     slip_quantum: Metres = 0.0
 
     def build(self, step: float, seed: int = 0) -> "Sensor":
-        """Measurement or sensor for a sampling period [s] and a seed of the noise; raises `ParameterError`."""
+        """Measurement or sensor for a sampling period [s] and a seed of the noise."""
         from quakedesign.loop.sensing import Measurement
         from quakedesign.studies.single_runs import sensor
 
@@ -627,7 +626,7 @@ def loop_elements(
 _GROUP = Group("Friction with a state (rate-and-state)")
 _BOTH = {"duration": "duration", "plant": "plant", "method": "method"}
 _FREE = {"drift": "loading_rate", **_BOTH}
-_HELD = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
+_CONTROLLED = {"step": "step", "lag": "lag", "diffusion": "diffusion", **_BOTH}
 _OF_LAW = ("step", "delay", "lag", "diffusion")  # given by a certificate
 _PUMP = ("delay", "jitter", "quantum", "saturation", "withdrawal", "rate_limit")
 _READING = {"slip_noise": "deviation", "bandwidth": "bandwidth", "slip_quantum": "quantum", "seed": "seed"}
@@ -637,7 +636,7 @@ _COMMON = ("fault", "controller", "gains", "state", "out", "force", "json")
 @Parameter(name="*", group=_GROUP)
 @dataclass(frozen=True, kw_only=True)
 class StateOptions:
-    """Initial state and pressure of a rate-and-state fault, whose spring is loaded at --drift or at the reference rate.
+    """Initial state, pressure and stress of a rate-and-state fault, loaded at --drift or the reference rate.
 
     Parameters
     ----------
@@ -648,7 +647,7 @@ class StateOptions:
         Initial state: steady (sliding; default), locked (far end of the spring at rest for --hold) or late (in the
         seismic cycle, see --share).
     hold
-        Time before the run in which the far end is at rest, such as '100 year'.
+        Time for which the far end is at rest before the run, such as '100 year'.
     share
         Fraction of the recurrence interval that has passed when the run starts; 0.9 by default.
     stress
@@ -669,7 +668,7 @@ class StateOptions:
         return [f"--{name}" for name in ("pressure", "start", "hold", "share") if getattr(self, name) is not None]
 
     def of_control(self) -> dict[str, Any]:
-        """Given options of a controlled run."""
+        """Given options of a controlled run. Raises ParameterError for options of a run without control."""
         if free := self.free_options():
             raise ParameterError(
                 "--pressure, --start, --hold and --share are for runs without a controller. Received "
@@ -678,7 +677,7 @@ class StateOptions:
         return specified({"stress": self.stress, "stress_period": self.stress_period})
 
     def of_free(self) -> dict[str, Any]:
-        """Given options of a run without control."""
+        """Given options of a run without control. Raises ParameterError for options of a controlled run."""
         from quakedesign.simulation import pressure_history
 
         if self.stress is not None or self.stress_period is not None:
@@ -693,7 +692,7 @@ NO_STATE = StateOptions()
 
 
 def require_no_state_options(state: StateOptions, fault: "Fault") -> None:
-    """Reject options that do not apply to friction without a state."""
+    """Raise ParameterError for given options that do not apply to friction without a state."""
     if state != NO_STATE:
         raise ParameterError(
             "pressure, start, hold, share and stress need friction with a state. "
@@ -742,8 +741,8 @@ class SpreadOptions:
     Parameters
     ----------
     spread
-        In slow sliding under a designed e-LQR: relative deviation of a, b and D_c, such as 0.1; normal stress,
-        stiffness and damping vary within the box.
+        Rate-and-state faults: largest relative deviation of a, b and D_c, such as 0.1; with --certificate by default
+        the certified one. Normal stress, stiffness and damping vary within the box.
     stress
         Largest amplitude of a sinusoidal shear stress, such as '25 kPa'; amplitude and phase vary from sample to
         sample. By default the certified bound of the design.
@@ -761,7 +760,8 @@ class SpreadOptions:
         """Law of a campaign and, for friction with a state, spread [-] and stress [Pa] of the samples.
 
         For friction with a state the law is that of the certificate or, without one, the law that `design` gives for
-        the nominal normal stress, stiffness and damping, for every box of the campaign.
+        the nominal normal stress, stiffness and damping, for every box of the campaign. Raises ParameterError if no
+        such law exists, the certificate is of another fault, or spread or stress is given without a friction state.
         """
 
         def tracking(fault: "Fault") -> tuple["Choice | None", dict[str, Any]]:
@@ -801,12 +801,12 @@ class SpreadOptions:
 
 
 def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
-    """Spread and stress of a campaign with the law of a certificate; by default the largest proved ones.
+    """Spread [-] and stress [Pa] of a campaign with the law of a certificate; by default the largest proved ones.
 
     Raises
     ------
     ParameterError
-        For a delay or noise, which campaigns of slow sliding do not have.
+        For a certificate with delay or slip noise, which campaigns of slow sliding do not simulate.
     """
     from quakedesign.exact import rational
 
@@ -822,15 +822,15 @@ def _of_proof(claim: Any, spread: str, stress: float | None) -> dict[str, Any]:
 
 
 def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """Entries of a run of a certified law on its fault, by default under the largest proved stress, a sine.
+    """Arguments of `run_sliding` for a certified law, by default under a sinusoidal stress of the certified amplitude.
 
-    The measurement error is at most the noise of the certificate: readings are rounded to multiples of twice this
-    noise bound.
+    By default readings are rounded to multiples of twice the certified noise bound, so that the measurement error is at
+    most this bound.
     """
     from quakedesign.loop.sensing import Transducer
 
     claim = options["law"].choose(fault).claim
-    reject({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, whose law has its own")
+    reject({name: changed.get(name) for name in _OF_LAW}, f"{certificate}, which specifies the loop")
     entries = {"stress": float(claim.task.stress)} | options["state"].of_control()
     entries |= _instruments(fault, {**changed, "step": float(claim.sampled_loop.step)}, options)
     if entries["transducer"] is None and claim.sampled_loop.slip_noise:
@@ -839,11 +839,11 @@ def _as_proved(fault: "Fault", certificate: Path, changed: dict[str, Any], optio
 
 
 def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]:
-    """Entries of a controlled run, with actuator stages and transducer built from their options."""
+    """Arguments of `run_sliding`, with actuator stages and transducer built from their options."""
     from quakedesign.loop.sensing import Transducer
 
     others = {name: value for name, value in changed.items() if name not in (*_PUMP, *_READING)}
-    entries = _named(fault, others, _HELD, (*_PUMP, *_READING))
+    entries = _named(fault, others, _CONTROLLED, (*_PUMP, *_READING))
     chain = options["actuator"].build(entries.get("step", fault.sampling_time), options["seed"])
     reading: dict[str, Any] = {_READING[name]: value for name, value in changed.items() if name in _READING}
     transducer = Transducer(**reading) if set(reading) - {"seed"} else None
@@ -851,9 +851,9 @@ def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any
 
 
 def _named(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()) -> dict[str, Any]:
-    """Given options under the argument names of a run; rejects options that do not apply."""
+    """Given options under the argument names of a run. Raises ParameterError for options that do not apply."""
     if foreign := [name for name in changed if name not in (*taken, *_COMMON)]:
-        kind = f"friction with a state in a run {'with' if taken is _HELD else 'without'} control"
+        kind = f"friction with a state in a run {'with' if taken is _CONTROLLED else 'without'} control"
         raise ParameterError(
             f"{', '.join(foreign)} cannot be used for {kind}. Received {fault.friction.name}. "
             f"Use {', '.join((*taken, *more))} and the options of friction with a state only."
@@ -865,7 +865,7 @@ def _require_designed(options: dict[str, Any]) -> None:
     if options["controller"] != "elqr" or tuple(options["gains"]) not in (("published",), ("designed",)):
         raise ParameterError(
             "friction with a state needs the controller elqr with designed gains; sliding modes do not apply, since "
-            f"the slip rate responds to the pressure without delay. Received {options['controller']} with the gains "
+            f"the slip rate responds to the pressure instantaneously. Received {options['controller']} with the gains "
             f"{' '.join(map(str, options['gains']))}. Give --controller elqr, and omit --gains."
         )
 

@@ -53,8 +53,8 @@ def certify(
         --lipschitz), beta (the upper end of the range of β), beta-factor (f in the range [b/f, b·f] of β) or decay (the
         decay rate; also gives a bound of the settling time).
     gain_range
-        Sliding mode: b_m and b_M, the range of the input gain β; 1 1 by default. For
-        --maximize beta give b_m twice, for beta-factor b, the centre of the range.
+        Sliding mode: b_m and b_M, the range of the input gain β; 1 1 by default. For --maximize beta give b_m twice;
+        for beta-factor give b, the centre of the range, twice.
     box
         e-LQR: uncertainty box, paper or ten-percent.
     feedback
@@ -139,8 +139,8 @@ def check(
     fault
         Preset or .toml file: the certificates must also cover its constants and ranges.
     rocq
-        For every valid certificate, write a file that Rocq's compiler, coqc, verifies. Exit code 1 if there is no such
-        file for the kind of a certificate.
+        For every valid certificate, write a file that Rocq's compiler, coqc, verifies. Exit code 1 if a certificate is
+        of a kind for which there is no such file.
     out
         With --rocq: output folder; ./quakedesign-rocq by default.
     """
@@ -179,7 +179,7 @@ def _write_rocq(files: list[Path], folder: Path, force: bool) -> dict[str, tuple
 
 
 # ----------------------------------------------------------------------
-# The command about plain polynomials.
+# Commands about polynomials and polynomial fields.
 
 Text = Annotated[str, Parameter(allow_leading_hyphen=True)]
 
@@ -205,14 +205,14 @@ def sos(
     Parameters
     ----------
     polynomial
-        Polynomial, such as "x^4 * y^2 + x^2 * y^4 + 1 - 3 * x^2 * y^2": numbers, names, + - * ^ ** and parentheses.
+        Polynomial, such as "x^4 * y^2 + x^2 * y^4 + 1 - 3 * x^2 * y^2": numbers, names, + - * / ^ ** and parentheses.
     on
-        A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat for more. By default all of ℝⁿ.
+        A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat the option for more. ℝⁿ by default.
     multiplier
         Positive polynomial multiplier, or auto to search for one and to try powers of 1 + x² + y² + … (x² + y² + … for
         forms).
     margin
-        Decide polynomial − margin·(1 + Σ x_i^d) instead, d its degree (without the 1 for forms).
+        Decide polynomial − margin·(1 + Σ x_i^d) instead (without the 1 for forms), d the degree of the polynomial.
     degree
         Largest degree of a summand; by default the smallest possible, and under constraints also the next even one.
     products
@@ -298,7 +298,7 @@ def attraction(
     out
         Proof file to write; the refutation if nothing is proved, unless --above is given.
     above
-        File for the point that refutes all higher levels.
+        File for the point that refutes every level above the value of V there.
     inclusion
         File for the proof that the sublevel set of the shape lies in the region.
     """

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 # Commands about one closed loop: simulate it, study the effect of sampling, export its controller.
 
 _DIRECT, _EXACT, _MEASURED = ActuatorOptions(), SensorOptions(), EstimateOptions()
-_BESIDE = ("scheme", "plant", "drift", "perturbation", "initial_slip", "initial_slip_rate", "weight", "authority")
+_RUN_OPTIONS = ("scheme", "plant", "drift", "perturbation", "initial_slip", "initial_slip_rate", "weight", "authority")
 _NONE, _LAW, _USUAL, _REST = NoLawOptions(), LawOptions(), RunOptions(), StartOptions()
 
 
@@ -82,8 +82,8 @@ def simulate(
     weight
         Weight of the disturbance estimate in the schemes compensated and stick-slip, above 0, at most 1.
     authority
-        Nominal input gain B0 of a sampled scheme in m^2/kg; guarantee prints weight and authority of the sliding
-        modes that it proves.
+        Nominal input gain B0 of a sampled scheme in m^2/kg; guarantee prints weight and authority of the sliding modes
+        that it proves.
     seed
         Seed of noise and jitter.
     out
@@ -103,7 +103,7 @@ def simulate(
         if free := state.free_options():
             raise ParameterError(
                 "--pressure, --start, --hold and --share do not apply to several blocks. Received "
-                f"{', '.join(free)}. Omit these."
+                f"{', '.join(free)}. Omit these options."
             )
         if blocks.has_state and law.controller != "none":
             raise ParameterError(
@@ -185,7 +185,7 @@ def _outside(changed: dict[str, Any], claim: Any, plant: str) -> list[str]:
     within |= {"plant"} if plant == claim.plant else set()
     kinds: tuple[Any, ...] = (ActuatorOptions, SensorOptions)
     groups = (option.name for kind in kinds for option in fields(kind))
-    return [name for name in (*_BESIDE, *groups) if name in changed and name not in within]
+    return [name for name in (*_RUN_OPTIONS, *groups) if name in changed and name not in within]
 
 
 def _values(trajectory: "Trajectory", fault: "Fault", premises: "Sequence[Premise]") -> Json:
@@ -237,8 +237,8 @@ def sampling(
     """Show effects of sampling on a law and on the published laws: errors by scheme, orders of accuracy, sensitivities.
 
     Runs are on the plant without stick. Errors are evaluated after the first quarter of a run; for the orders of
-    accuracy, in the second half of shorter runs. Runs with noise last a sixteenth of the duration. Writes
-    results.json and figures.
+    accuracy, in the second half of shorter runs. Runs with noise last 1/16 of the duration. Writes results.json and
+    figures.
 
     Parameters
     ----------
@@ -246,7 +246,8 @@ def sampling(
         cta, dia or elqr.
     gains
         designed or continuous (both: designed in continuous time), published, or the numbers of the gains (of a sliding
-        mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, N̂_min the smallest N̂ of the box).
+        mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, p the pressure, μ_res the residual friction coefficient,
+        N̂_min the smallest A/m of the box).
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes
@@ -357,7 +358,7 @@ _CAMPAIGN_DIRECT, _CAMPAIGN_EXACT, _CAMPAIGN_LAW, _CAMPAIGN_USUAL = (
     LawOptions(),
     RunOptions(),
 )
-_SAME = SpreadOptions()
+_NO_SPREAD = SpreadOptions()
 
 
 @app.command
@@ -373,7 +374,7 @@ def campaign(
     sensors: SensorOptions = _CAMPAIGN_EXACT,
     initial_slip: Metres = 0.0,
     initial_rate: MetresPerSecond = 0.0,
-    state: SpreadOptions = _SAME,
+    state: SpreadOptions = _NO_SPREAD,
     seed: Whole = 0,
     search: str | None = None,
     rerun: str | None = None,
@@ -386,20 +387,19 @@ def campaign(
 ) -> int:
     """Simulate many samples of the uncertainty box, disturbances, noise and initial states, and report the worst.
 
-    Finished batches are stored in the folder; after an interruption the same command continues from them, with the same
-    result.
+    Finished batches are stored in the folder; after an interruption the same command continues, with the same result.
 
-    Exit code 0 if all samples have a result (a diverged run is one), 1 if a batch failed. Give quantities with a unit,
-    such as '20 MPa', or as numbers in SI units.
+    Exit code 0 if all samples have a result (divergence counts as one), 1 if a batch failed. Give quantities with a
+    unit, such as '20 MPa', or as numbers in SI units.
 
     Parameters
     ----------
     samples
         Number of samples.
     initial_slip
-        Largest initial slip.
+        Largest initial slip; samples range from 0 to this value.
     initial_rate
-        Largest initial slip rate.
+        Largest initial slip rate; samples range from 0 to this value.
     seed
         Seed of samples and noise.
     search
@@ -423,11 +423,11 @@ def campaign(
     controller = chosen.controller if chosen else None
     way, step, own = run.way(controller)
     period = loaded.sampling_time if step is None else step
-    around = loop_elements(None if variation else chosen, period, run, actuator, sensors, 0)
+    elements = loop_elements(None if variation else chosen, period, run, actuator, sensors, 0)
     problem = campaign_problem(
         loaded,
         controller,
-        scheme=sampled_scheme(way, *around, **own),
+        scheme=sampled_scheme(way, *elements, **own),
         step=step,
         method=run.method,
         duration=run.duration,

@@ -91,7 +91,8 @@ def test_limits_of_slow_sliding_are_said_to_be_those_of_the_linearised_fault(cap
     said = capsys.readouterr().out
     assert said.splitlines()[1] == "(any shear stress of at most 25 kPa, T_s = 300 s)"
     said = " ".join(said.split())
-    assert "bounds of an e-LQR that was designed for this table behind a diffusion path of L^2/D = 833 s, for a" in said
+    behind = "behind a diffusion path of L^2/D = 833 s, for the given a"
+    assert f"bounds of an e-LQR that was designed for this table {behind}" in said
     assert "another design has other bounds" in said
     ranges = {
         name: (Fraction(95, 100) * low, Fraction(105, 100) * high) for name, (low, high) in known.task.ranges.items()
@@ -205,7 +206,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     assert run(*patch, "--well", "40 m", "--diffusivity", "2 m^2/s", "--lag", "5 s") == 0
     told = " ".join(capsys.readouterr().out.split())
     assert (
-        f"behind a diffusion path of L^2/D = {float(known.sampled_loop.diffusion):.4g} s, for a, b and D_c as they are"
+        f"behind a diffusion path of L^2/D = {float(known.sampled_loop.diffusion):.4g} s, for the given a, b and D_c"
         in told
     )
     assert "D = 2 m^2/s" in told
@@ -221,7 +222,7 @@ def test_designs_of_slow_sliding_are_proved_behind_the_lag_and_the_well_that_are
     told = " ".join(capsys.readouterr().out.split())
     assert "L^2/D = 1e+10 s: INFEASIBLE for every controller" in told
     assert (
-        f"behind a diffusion path of L^2/D = {float(known.sampled_loop.diffusion):.4g} s, for a, b and D_c as they are"
+        f"behind a diffusion path of L^2/D = {float(known.sampled_loop.diffusion):.4g} s, for the given a, b and D_c"
         in told
     )
     assert set(spreads) == {0}

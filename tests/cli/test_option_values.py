@@ -100,7 +100,7 @@ def test_gains_are_a_word_or_exact_numbers():
     ],
 )
 def test_diffusion_is_the_square_of_the_distance_over_the_diffusivity(given, value):
-    assert options.rock(*given) == value
+    assert options.diffusion_time(*given) == value
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_diffusion_is_the_square_of_the_distance_over_the_diffusivity(given, val
 )
 def test_a_well_that_is_none_is_refused(given, said):
     with pytest.raises(ParameterError, match=said):
-        options.rock(*given)
+        options.diffusion_time(*given)
 
 
 def test_a_setup_is_made_of_what_is_given():
@@ -420,7 +420,7 @@ def test_what_has_no_meaning_with_a_state_is_named():
         ParameterError,
         match=r"^drift cannot be used for friction with a state in a run with control\. .*, saturation and",
     ):
-        options._named(CRUSTAL, {"drift": 1.0}, options._HELD, ("saturation",))
+        options._named(CRUSTAL, {"drift": 1.0}, options._CONTROLLED, ("saturation",))
 
 
 def test_spread_and_stress_are_for_friction_with_a_state(monkeypatch):
@@ -494,7 +494,7 @@ def test_a_reading_is_off_by_the_noise_of_the_proof_unless_a_transducer_is_given
     stressed = {**command, "state": StateOptions(stress=7.0)}
     assert options._as_proved(CRUSTAL, "a.json", {}, stressed)["stress"] == 7.0
     for name in ("step", "delay", "lag", "diffusion"):
-        with pytest.raises(ParameterError, match=f"^{name} cannot be used with a.json, whose law has its own"):
+        with pytest.raises(ParameterError, match=f"^{name} cannot be used with a.json, which specifies the loop"):
             options._as_proved(CRUSTAL, "a.json", {name: 1.0}, command)
 
 

@@ -83,7 +83,7 @@ def test_the_smallest_sampled_error_on_a_fault(capsys, tmp_path, monkeypatch):
     assert min(c["ratio"] for c in found["compared"]) >= 1
     code, out, _ = run(capsys, *asked)
     assert code == 0
-    assert "measured, not proved" in out
+    assert "simulated, not proved" in out
     assert "max_slip_rate_error [m/s]" in out
 
 
@@ -189,7 +189,7 @@ def test_the_table_says_ranges_units_and_what_is_not_proved(capsys, monkeypatch,
     code, out, _ = run(capsys, "cta", "real-fault", "--objective", "sampled", "--step", "50 ms")
     first, measured, *_ = out.splitlines()
     assert first.startswith("proved: cta with k1 = 3/2")
-    assert "measured, not proved: decay of one explicit run on real-fault with scale" in measured
+    assert "simulated, not proved: decay of one explicit run on real-fault with scale" in measured
     assert "T_s = 0.05 s" in measured
     code, out, _ = run(capsys, "cta", "--json")
     answer = json.loads(out)

@@ -223,7 +223,7 @@ def test_a_law_is_designed_proved_run_and_drawn(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("guarantee", PATH, "--delay", "20 ms"), "Received --delay. Omit these."),
+        (("guarantee", PATH, "--delay", "20 ms"), "Received --delay. Omit these options."),
         (("guarantee", PATH, PATH), "takes one fault of several blocks at a time. Received more faults"),
         (("guarantee", PATH, "--delay", "20 ms"), "among --box, --controller, --force, --json, --lag, --out"),
         (("limits", PATH, "--measured", "slip"), "Received --measured"),

@@ -1,1 +1,1 @@
-"""Exact part of the engine, which decides in rational arithmetic without solver or floats."""
+"""Exact checks of proofs about polynomials, in rational arithmetic, without solver or floating point."""

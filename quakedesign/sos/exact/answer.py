@@ -1,4 +1,4 @@
-"""Result about a polynomial: a verdict with its proof, which is re-checked without a solver."""
+"""Verdict on the positivity of a polynomial, with its proof, which is re-checked without a solver."""
 
 from collections.abc import Mapping
 from dataclasses import field
@@ -14,7 +14,7 @@ from quakedesign.sos.exact.work_budget import limited
 
 
 class Positivity(Enum):
-    """Verdict on the positivity of a polynomial."""
+    """Verdict: proved by sums of squares, no such proof of this degree exists, negative at a point, or undecided."""
 
     SOS = "sos"
     NOT_SOS = "not-sos"
@@ -35,7 +35,7 @@ class Answer:
     Attributes
     ----------
     statement : Statement
-        The decided statement, with the multiplier and the degree that were used.
+        The statement, with the multiplier and the degree that were used.
     proof : SumOfSquares, Functional, Point or None
         Proof or refutation; None if the statement is undecided.
     blocks : mapping of str to list of int
@@ -64,8 +64,8 @@ class Answer:
     def set_is_empty(self) -> bool:
         """Whether the set is evidently empty, so that a proof of positivity on it is vacuous.
 
-        This is so if a negative constant is proved to be non-negative on it, or if a constraint has only even exponents
-        and a constant term, and all coefficients are negative (inequality) or of one sign (equality).
+        True if a negative constant is proved to be non-negative on the set, or if a constraint has only even exponents
+        and a constant term, and its coefficients are all negative (inequality) or all of one sign (equality).
         """
         statement = self.statement
         below = [
@@ -84,18 +84,18 @@ class Answer:
         Raises
         ------
         WorkError
-            When the check exceeds its work budget (proofs/FORMAT.md) and is undecided.
+            When the check exceeds its work budget (proofs/FORMAT.md).
         """
         with limited():
             return self.proof is None or holds(self.statement, self.proof)
 
     def save(self, path: str | Path) -> None:
-        """Write the file of FORMAT.md atomically.
+        """Write the proof file (proofs/FORMAT.md) atomically.
 
         Raises
         ------
         CertificateError
-            When nothing was decided, or the proof is too large for the format.
+            When the answer is undecided, or the proof is too large for the format.
         """
         save(self.statement, self.proof, path)
 

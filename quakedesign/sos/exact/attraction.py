@@ -1,8 +1,8 @@
 """Regions of attraction of polynomial fields by Lyapunov functions: claim, proof, files.
 
-The claim holds if V is a sum of squares, μ·(−V̇) = σ_0 + (level − V)·σ_1, all Gram matrices are positive definite,
-and the bases contain a pure power of every state; see the first chapter. Further chapters: files of regions
-(proofs/FORMAT.md) and of fields (TOML).
+The claim holds if V is a sum of squares, μ·(−V̇) = σ_0 + (level − V)·σ_1 with a positive polynomial μ, all Gram
+matrices are positive definite, and the bases contain a pure power of every state; see the first chapter. Further
+chapters: files of regions (proofs/FORMAT.md) and of fields (TOML).
 """
 
 import json
@@ -42,9 +42,9 @@ from quakedesign.sos.exact.work_budget import limited
 #
 # V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite and a polynomial μ whose
 # coefficients show that it is positive. If the bases of the squares of V contain a pure power of every state, V is
-# positive except at the origin and radially unbounded. If the bases of σ_0 and σ_1 contain one of every state, V̇ < 0
-# where V < level, except at the origin. Then {V < level} is bounded and invariant, and every solution in it tends to
-# zero.
+# positive except at the origin and radially unbounded. If the bases of σ_0 and σ_1 contain a pure power of every state,
+# V̇ < 0 where V < level, except at the origin. Then {V < level} is bounded and invariant, and every solution in it tends
+# to zero.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,11 +63,11 @@ class Attraction:
     ----------
     variables : tuple of str
     field : tuple of Polynomial
-        Time derivatives of the variables, in their order.
+        Time derivatives of the variables, in their order; they vanish at the origin.
     lyapunov : Polynomial
-        V.
+        V; it vanishes at the origin.
     level : Fraction or None
-        None for the whole space.
+        Positive; None for the whole space.
     multiplier : Polynomial
         μ.
     proof : LyapunovProof, Point or None
@@ -379,7 +379,7 @@ def read_field(path: str | Path) -> tuple[dict[str, str], str | None]:
     PolynomialError
         When the file is not readable, or has other keys or values.
     """
-    content = read_text(path, "a field's file", largest=_LARGEST, refusal=PolynomialError)
+    content = read_text(path, "a field file", largest=_LARGEST, refusal=PolynomialError)
     try:
         raw = parse_toml(content)
     except ValueError as error:

@@ -115,12 +115,12 @@ def monomial(values: Sequence[Fraction], exponents: Exponents) -> Fraction:
 
 
 def rescaled(polynomial: Polynomial, scale: Sequence[Fraction]) -> dict[Exponents, Fraction]:
-    """P(scale ∘ ũ) as a polynomial in ũ."""
+    """Polynomial in ũ that results from u_i = scale_i·ũ_i."""
     return {e: c * monomial(scale, e) for e, c in polynomial.items()}
 
 
 def times(left: Exponents, right: Exponents) -> Exponents:
-    """Product of two monomials in the same variables."""
+    """Exponents of the product of two monomials in the same variables."""
     return tuple(map(add, left, right))
 
 
@@ -140,7 +140,7 @@ def from_sympy(expression: Any, variables: Sequence[Any]) -> dict[Exponents, Fra
     Raises
     ------
     PolynomialError
-        When the expression is no such polynomial.
+        When the expression is not such a polynomial.
     """
     import sympy as sp
 
@@ -214,9 +214,9 @@ def positive_definite_integers(rows: Sequence[Sequence[int]]) -> bool:
 
 
 def nonnegative_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
-    """Whether a symmetric rational matrix is non-negative definite, by exact symmetric elimination.
+    """Whether a symmetric rational matrix is positive semidefinite, by exact symmetric elimination.
 
-    A zero pivot is allowed only with a zero row; the matrix is split into its connected blocks first.
+    The matrix is first split into its connected blocks. A zero pivot is admissible only if its row is zero.
 
     Parameters
     ----------

@@ -133,7 +133,7 @@ class SosFile(StatementEntries, rename={"proof": "sos"}):
 
 
 class NoSosFile(StatementEntries, rename={"proof": "not-sos"}):
-    """File of a polynomial that is no sum of squares with the given products."""
+    """File of a polynomial that is not a sum of squares with the given products."""
 
     proof: FunctionalEntries
 

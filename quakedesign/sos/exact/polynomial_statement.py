@@ -29,11 +29,11 @@ class Statement:
     variables : tuple of str
     polynomial : mapping of exponents to Fraction
     inequalities : tuple of Polynomial
-        g_i ≥ 0 on the set.
+        g_i ≥ 0 on the set; nonzero and different from each other.
     equalities : tuple of Polynomial
-        h_k = 0 on the set.
+        h_k = 0 on the set; nonzero.
     products : tuple of tuple of int
-        The index sets S, always including the empty one.
+        The index sets S, distinct and increasing, always including the empty one.
     degree : int
         Largest degree of a summand.
     multiplier : mapping of exponents to Fraction
@@ -53,9 +53,9 @@ class Statement:
         if len(set(self.variables)) != size or any(len(e) != size for p in polynomials for e in p):
             raise PolynomialError(f"every polynomial must be in the {size} different variables {self.variables}.")
         if not self.multiplier or not all(self.inequalities) or not all(self.equalities):
-            raise PolynomialError("multiplier, inequalities and equalities must not be zero. Drop a zero one.")
+            raise PolynomialError("multiplier, inequalities and equalities must not be zero. Omit each zero one.")
         if len({tuple(sorted(g.items())) for g in self.inequalities}) < len(self.inequalities):
-            raise PolynomialError("inequalities must differ from each other. Received one twice. Drop it.")
+            raise PolynomialError("inequalities must differ from each other. Received one twice. Omit one of the two.")
         allowed = range(len(self.inequalities))
         well_formed = all(i in allowed for s in self.products for i in s) and all(
             tuple(sorted(set(s))) == s for s in self.products
@@ -72,7 +72,7 @@ class Statement:
 
     @cached_property
     def structure(self) -> Structure:
-        """Statement without the coefficients of the target, on which the blocks do not depend."""
+        """Statement without the coefficients of the target; the blocks depend on this part only."""
         inequalities, equalities = (tuple(tuple(p.items()) for p in g) for g in (self.inequalities, self.equalities))
         return len(self.variables), frozenset(self.target), self.degree, self.products, inequalities, equalities
 
@@ -108,7 +108,7 @@ class Statement:
 
     @cached_property
     def dense(self) -> bool:
-        """Whether the set is ℝⁿ or an orthant, so that a multiplier may vanish on a subset of measure zero."""
+        """Whether the set is ℝⁿ or an orthant; a multiplier may then vanish on a subset of measure zero."""
         return not self.equalities and all(self.is_variable(g) for g in self.inequalities)
 
     @cached_property

@@ -1,7 +1,7 @@
 """Reading of polynomials and constraints from text, SymPy or mappings.
 
-Text is read by a dedicated grammar and never passed to an interpreter. Every limit on time and memory is
-checked before the operation that it limits.
+Text is parsed with a dedicated grammar and never passed to an interpreter. Every limit on time and memory is checked
+before the operation that it limits.
 """
 
 import re
@@ -187,7 +187,7 @@ class Expansion:
 # ----------------------------------------------------------------------
 # Polynomials and constraints read from text by a dedicated grammar, in bounded time and memory.
 #
-# A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. A product needs its *, an
+# A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. A product needs a *, an
 # exponent is a whole number from 0 to 60, and a divisor is a number. A constraint is two polynomials joined by >=, <=
 # or ==. A name that commonly denotes a number (pi, nan, …) is a variable only if the variables are given. Text is
 # never passed to an interpreter, and every limit is checked before the operation that it limits.
@@ -348,8 +348,7 @@ def _checked(variables: Sequence[str]) -> tuple[str, ...]:
     if not good or len(set(order)) != len(order) or len(order) > VARIABLES:
         raise PolynomialError(
             f"variables must be at most {VARIABLES} different names of at most {_NAME} ASCII letters, digits and "
-            "underscores, without a digit in front. "
-            f"Received {str(order)[:60]}. Rename them."
+            f"underscores, without a digit in front. Received {str(order)[:60]}. Rename them."
         )
     return order
 
@@ -453,7 +452,7 @@ def read(
     Raises
     ------
     PolynomialError
-        When an input is not readable, or a mapping is given without variables.
+        When an input is not readable, a variable occurs twice, or a mapping is given without variables.
     """
     if isinstance(on, str):
         on = (on,)

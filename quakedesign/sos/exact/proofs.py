@@ -1,7 +1,7 @@
 """Exact proofs about a polynomial: sum of squares, functional, and negative point.
 
-The first chapter defines squares bᵀQb with exact coefficients, their expansion and their definiteness. No
-solver is used.
+Chapters: monomials that the squares may contain; squares bᵀQb with exact coefficients, their expansion and the
+definiteness of Q; the three kinds of proof. No solver is used.
 """
 
 from collections import Counter, defaultdict
@@ -42,7 +42,13 @@ Bases = tuple[tuple[Exponents, ...], ...]
 
 
 def full_bases(statement: Statement) -> Bases:
-    """For every product of inequalities, all monomials whose squares times the product respect the degree bound."""
+    """All monomials whose squares, times a product of inequalities, respect the degree bound, for every product.
+
+    Raises
+    ------
+    PolynomialError
+        When a basis has more than 2000 monomials, or all bases together have more than 8·10⁶ pairs of monomials.
+    """
     size = len(statement.variables)
     halves = [(statement.degree - degree(w)) // 2 for w in statement.weights]
     counts = [comb(size + h, size) if h >= 0 else 0 for h in halves]
@@ -56,11 +62,6 @@ def full_bases(statement: Statement) -> Bases:
 
 def reduced_bases(statement: Statement) -> Bases:
     """Monomials that can occur in the squares of a proof, for every product of inequalities.
-
-    Raises
-    ------
-    PolynomialError
-        When the full bases have too many monomials.
 
     Returns
     -------
@@ -125,7 +126,7 @@ def equality_monomials(statement: Statement) -> set[Exponents]:
 
 
 def parity_classes(statement: Statement, basis: tuple[Exponents, ...]) -> list[tuple[int, ...]]:
-    """Indices of basis elements, grouped by their sign under the sign symmetries of the statement.
+    """Indices of basis elements, grouped by their signs under the sign symmetries of the statement.
 
     The Gram matrix may be chosen block diagonal in these classes (Löfberg 2009).
     """
@@ -197,7 +198,7 @@ def _bits(rows: Sequence[Sequence[int]]) -> int:
 
 
 def has_own_monomials(basis: Sequence[Element]) -> bool:
-    """Whether every element has a monomial with positive coefficient that no other has, hence linear independence."""
+    """Whether every element has a monomial with positive coefficient that no other has, so that all are independent."""
     if all(isinstance(b, tuple) for b in basis):
         return True
     polynomials = [as_polynomial(b) for b in basis]
@@ -362,7 +363,7 @@ def _identity_holds(statement: Statement, proof: SumOfSquares) -> bool:
 
 
 def multiplier_is_positive(statement: Statement, squares: tuple[Square, ...]) -> bool:
-    """Whether the multiplier is positive on a dense subset; on all of the set if the set may have no interior."""
+    """Whether the multiplier is proved positive on a dense subset, or on all of a set that may have no interior."""
     size = len(statement.variables)
     one = (0,) * size
     if not squares:
@@ -450,7 +451,7 @@ def _functional_holds(statement: Statement, proof: Functional) -> bool:
 def localizing_matrix(
     weight: Polynomial, basis: Sequence[Exponents], values: Mapping[Exponents, Fraction]
 ) -> list[list[Fraction]]:
-    """Matrix L(g·b bᵀ) (n × n) for one product g and a basis of monomials b."""
+    """Matrix L(g·b bᵀ) (n × n) of a functional L, for one product g and the vector b of n monomials."""
     bits = max(map(length, (*weight.values(), *values.values())), default=0)
     spend(len(basis) ** 2 * len(weight), 2 * bits)
     rows = [[Fraction(0)] * len(basis) for _ in basis]

@@ -37,7 +37,7 @@ def parse(text: str) -> Any:
     Raises
     ------
     CertificateError
-        When the text is no JSON, is nested too deeply, or has floats, long integers or duplicate keys.
+        When the text is not JSON, is nested too deeply, or has floats, long integers or duplicate keys.
     """
     if _depth(text) > _DEPTH:
         raise CertificateError(f"the file is nested deeper than {_DEPTH} levels.")
@@ -82,7 +82,7 @@ def need(condition: bool, reason: str) -> None:
 
 
 def headed(raw: object, kind: str = "") -> Json:
-    """Entries of a file after a check of its format and, if given, its kind, both of which are removed."""
+    """Entries of a file without format and, if given, kind. Raises CertificateError if one of these is wrong."""
     if not isinstance(raw, dict):
         _reject("the file must be an object")
     need(type(raw.get("format")) is int and raw["format"] == 1, "format must be 1")
@@ -110,7 +110,7 @@ def _rational(text: str) -> Fraction:
 
 
 def common_grid(gram: Iterable[Fraction]) -> None:
-    """Reject a Gram matrix whose common denominator would make exact arithmetic slow."""
+    """Raise CertificateError if the common denominator of a Gram matrix has more than 2¹⁴ bits."""
     common = 1
     for denominator in {entry.denominator for entry in gram}:
         common = math.lcm(common, denominator)
@@ -134,7 +134,7 @@ def read_polynomial(raw: object) -> dict[tuple[int, ...], Fraction]:
 
 
 def require_polynomial(polynomial: Mapping[tuple[int, ...], Fraction], what: str, variables: int, limit: int) -> None:
-    """Reject a polynomial with another number of variables, or with more terms than the limit."""
+    """Raise CertificateError for a polynomial with another number of variables, or more terms than the limit."""
     need(len(polynomial) <= limit, f"{what} is longer than {limit} terms")
     need(all(len(exponents) == variables for exponents in polynomial), f"{what} has another number of variables")
 
@@ -164,7 +164,7 @@ def read_as(kind: type[_Kind], raw: object, what: str = "the file") -> _Kind:
     Parameters
     ----------
     kind : type
-        An `Entries`, a dataclass, or a tuple of these, of rationals, integers and texts.
+        An `Entries` or a dataclass, whose fields are of such types, rationals, integers, texts, or tuples of these.
     raw : object
         Result of `parse`.
     what : str
@@ -209,7 +209,7 @@ def written(value: object) -> Any:
 
 @cache
 def _parts(kind: Any) -> tuple[tuple[str, str, Any], ...]:
-    """Name, key and default value, or a mark for none, of every field of an object; empty for other types."""
+    """Name, key and default value (or a marker for none) of every field of an object; empty for other types."""
     if issubclass(kind, msgspec.Struct):
         return tuple((part.name, part.encode_name, part.default) for part in msgspec.structs.fields(kind))
     return tuple((part.name, part.name, part.default) for part in fields(kind)) if is_dataclass(kind) else ()

@@ -19,7 +19,7 @@ _LONGEST = 200
 
 
 def polynomial_words(polynomial: Polynomial, variables: Sequence[str]) -> str:
-    """Polynomial as text, which `quakedesign.sos.exact.polynomial_text.parse` can read."""
+    """Text of a polynomial, which `quakedesign.sos.exact.polynomial_text.parse` can read."""
     parts = []
     for e, c in sorted(polynomial.items(), key=lambda item: (sum(item[0]), item[0]), reverse=True):
         powers = [n if x == 1 else f"{n}^{x}" for n, x in zip(variables, e, strict=True) if x]
@@ -110,7 +110,7 @@ def _short(text: str) -> str:
 
 
 def claim_words(claim: Attraction) -> list[str]:
-    """Sentences about a claim: field, V, and what is proved or refuted."""
+    """Sentences about a claim: field, V, and the proved or refuted statement."""
     names = claim.variables
     lines = [f"{name}' = {polynomial_words(f, names)}" for name, f in zip(names, claim.field, strict=True)]
     lines.append(f"V = {polynomial_words(claim.lyapunov, names)}")

@@ -1,6 +1,6 @@
 """Budget of work for a check, counted in arithmetic operations before they are done (proofs/FORMAT.md).
 
-Work is counted only within a `limited` block, so the duration of a search is not limited.
+Work is counted only within a `limited` block, so that searches are not limited.
 """
 
 from collections.abc import Iterable, Iterator
@@ -12,9 +12,9 @@ from math import lcm
 from quakedesign.errors import WorkError
 
 STEPS = 3 * 10**7
-"""Most steps of one check; a step is an operation on two numbers of up to about a thousand bits."""
+"""Largest number of steps of one check; a step is an operation on two numbers of up to about a thousand bits."""
 TERMS = 20_000
-"""Most terms of a polynomial, read or expanded."""
+"""Largest number of terms of a polynomial, as read and after expansion."""
 
 _left: ContextVar[int | None] = ContextVar("steps left", default=None)
 
@@ -47,7 +47,7 @@ def spend(steps: int, bits: int = 0) -> None:
 
 
 def counted() -> bool:
-    """Whether work is counted at present."""
+    """Whether a `limited` block is active."""
     return _left.get() is not None
 
 
@@ -69,6 +69,6 @@ def longest(numbers: Iterable[Fraction]) -> int:
 
 
 def expanded(terms: int) -> None:
-    """Raise WorkError for a polynomial with too many terms."""
+    """Raise WorkError for a polynomial with more than `TERMS` terms."""
     if counted() and terms > TERMS:
         raise WorkError(f"an expanded polynomial has more than {TERMS} terms. Split it.")

@@ -1,1 +1,1 @@
-"""The part of the engine that searches: floating point proposes, `sos.exact` decides."""
+"""Search for proofs about polynomials in floating point; `quakedesign.sos.exact` checks them."""

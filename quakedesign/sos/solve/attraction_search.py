@@ -1,7 +1,7 @@
 """Search for Lyapunov functions and the largest regions of attraction of polynomial fields.
 
-Chapters: points with V̇ ≥ 0 and lowest V; expansion of a region by alternation (W. Tan and A. Packard, IEEE
-Trans. Automat. Contr. 53, 2008); stability and the largest proved level.
+Chapters: points with V̇ ≥ 0 and lowest V; expansion of a region by alternation (W. Tan and A. Packard, IEEE Trans.
+Automat. Contr. 53, 2008); stability and the largest proved level.
 """
 
 import re
@@ -151,7 +151,7 @@ def other_equilibrium(claim: Attraction) -> Point | None:
 
 
 # ----------------------------------------------------------------------
-# Search for a Lyapunov function whose region of attraction contains the largest part of a shape, by alternation.
+# Search, by alternation, for a Lyapunov function whose region of attraction contains the largest set {shape ≤ β}.
 #
 # For the region V < 1, multipliers s and t with
 #
@@ -161,7 +161,7 @@ def other_equilibrium(claim: Attraction) -> Point | None:
 # (W. Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). The caller proves the level of every new V.
 
 _ROUNDS = 30
-_GROWTH = Fraction(1002, 1000)  # least growth of β in a round that continues the search
+_GROWTH = Fraction(1002, 1000)  # smallest growth of β in a round for which the search continues
 _INSIDE = Fraction(999999, 1000000)  # share of the level that V must not exceed where shape ≤ β
 # Shares of the β at which {shape ≤ β} touches the level set
 _SHARES = tuple(Fraction(s) for s in ("99999/100000", "999/1000", "99/100", "9/10"))
@@ -192,7 +192,7 @@ def with_shape(region: Region, shape: Polynomial) -> Region:
 
 
 def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
-    """Enlarge β of a proved region, where {shape ≤ β} lies in it, by searching V of degree up to `top`.
+    """Enlarge the β for which {shape ≤ β} lies in a proved region, by a search for V of degree up to `top`.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attr
 
 
 def _improved(region: Region, shape: Polynomial, top: int) -> Iterator[Attraction]:
-    """Unproved claims with new candidates for V, from multipliers computed with small, then with large slack."""
+    """Unproved claims with new candidates for V, from multipliers computed first with small, then with large slack."""
     claim, beta = region.proved, region.shape_level
     if claim is None or claim.level is None or beta is None:
         return
@@ -308,7 +308,7 @@ _LEVEL_SHARES = tuple(
 )
 # levels tried if the search finds no refuting point
 _UNBOUNDED = tuple(Fraction(10) ** power for power in range(6, -7, -1))
-_FINEST = 1e-6  # finest step for which the levels of the bisection have few digits
+_FINEST = 1e-6  # smallest relative width for which the levels of the bisection have few digits
 
 
 def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int] = (2, 4)) -> Attraction:
@@ -355,7 +355,7 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
 def region_of_attraction(
     field: Mapping[Any, Any], V: Any = None, *, relative: float = 1e-4, degree: int | None = None, shape: Any = None
 ) -> Region:
-    """Find the largest ρ for which {V < ρ} is a region of attraction of the origin.
+    """Find the largest ρ for which {V < ρ} is proved to be a region of attraction of the origin.
 
     Parameters
     ----------
@@ -364,8 +364,8 @@ def region_of_attraction(
     relative : float
         Relative width of the final bracket of the bisection, in [1e-6, 1).
     degree : int, optional
-        Even degree up to which other V are tried, starting from `V` or its default, so that the region contains a
-        larger part of the shape.
+        Even degree up to which other V are tried, starting from `V` or its default, so that the region contains
+        {shape ≤ β} for a larger β.
     shape : str, SymPy expression or mapping, optional
         A polynomial that is positive except at the origin. The result contains the largest β found for which
         {shape ≤ β} is proved to lie in the region. By default Σ x_i² if a degree is given, otherwise none.
@@ -378,7 +378,7 @@ def region_of_attraction(
     Raises
     ------
     PolynomialError
-        As for `stability`, or when the width or the degree is invalid.
+        As for `stability`, or when the shape is not readable, `relative` is out of range, or `degree` is not even.
     """
     if not _FINEST <= relative < 1:
         raise PolynomialError(
@@ -433,7 +433,7 @@ def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:
 
 
 def _refuted(claim: Attraction) -> Attraction | None:
-    """Claim refuted by the point with the lowest V. Its level is just above V there; None (whole space) if V ≤ 0."""
+    """Claim refuted by the point with the lowest V found, at a level just above V there (None if V ≤ 0), or None."""
     refuted = replace(claim, proof=lowest_crossing(claim))
     if refuted.height is None:
         return None
@@ -511,7 +511,7 @@ def _of_linearised(claim: Attraction) -> dict[Exponents, Fraction] | None:
 
 
 def _searched(claim: Attraction, top: int) -> Attraction | NoSolution:
-    """Claim with a V of given degree for which V − Σ x_i² and −V̇ are sums of squares, or the reason without one."""
+    """Claim with a V of given degree for which V − Σ x_i² and −V̇ are sums of squares, or the reason for the failure."""
     size = len(claim.variables)
     terms = list(monomials(size, top, 2))
     program = Program(claim.variables, decision_names(claim.variables, len(terms)))

@@ -16,7 +16,7 @@ from quakedesign.sos.solve.moment import MomentProgram, options, pairs, useful
 if TYPE_CHECKING:
     import cvxpy as cp
 
-_handed: ContextVar["dict[int, cp.Problem] | None"] = ContextVar("handed", default=None)
+_collected: ContextVar["dict[int, cp.Problem] | None"] = ContextVar("collected", default=None)
 
 
 @contextmanager
@@ -35,28 +35,28 @@ def stated_problems() -> "Iterator[list[cp.Problem]]":
     """
     by_number: dict[int, cp.Problem] = {}
     problems: list[cp.Problem] = []
-    token = _handed.set(by_number)
+    token = _collected.set(by_number)
     try:
         yield problems
     finally:
-        _handed.reset(token)
+        _collected.reset(token)
         problems.extend(by_number.values())
 
 
 def collecting() -> bool:
     """Whether a `stated_problems` block is active."""
-    return _handed.get() is not None
+    return _collected.get() is not None
 
 
 def record(problem: "cp.Problem") -> None:
     """Record a problem for the active `stated_problems` block."""
-    handed = _handed.get()
-    if handed is not None:
-        handed.setdefault(id(problem), problem)
+    collected = _collected.get()
+    if collected is not None:
+        collected.setdefault(id(problem), problem)
 
 
 def solve(problem: "cp.Problem", **chosen: Any) -> bool:
-    """Run Clarabel; return whether its solution is usable, which does not prove feasibility."""
+    """Run Clarabel; return whether its solution is usable, which is no proof of feasibility."""
     import cvxpy as cp
 
     record(problem)
@@ -113,7 +113,7 @@ class Compiled:
         return form, chain, inverse
 
     def solve(self, accuracy: float = 1e-8, *, anew: bool = True) -> bool:
-        """Run Clarabel; return whether its solution is usable. If so, variables and dual variables are set.
+        """Run Clarabel and return whether its solution is usable; if it is, variables and dual variables are set.
 
         Parameters
         ----------

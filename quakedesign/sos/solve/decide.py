@@ -27,11 +27,12 @@ from quakedesign.sos.solve.moment import MomentProgram, MomentSolution
 from quakedesign.sos.solve.points import local_minima, negative_point, polished_zeros, rational_zeros
 from quakedesign.sos.solve.rounding import Scaled, decimal_units, relations, rounded, scaled
 
-_STRICT = 1e-7
+_STRICT = 1e-7  # for a margin below -_STRICT a refutation is tried before the faces
 _ROUNDS = 4
-# largest number of entries of the triangular factor in the solver, dense for every block: about 6 GB
+# largest number of entries of the triangular factor in the solver, dense for every block
 _ENTRIES = 50_000_000
 _ACCURACIES = (1e-9, 1e-12)
+# Eigenvalue threshold and rounding tolerance of numerical kernels, tried in turn
 KERNELS = ((1e-6, 1e-5), (1e-6, 1e-7), (1e-6, 1e-3), (1e-4, 1e-4), (1e-4, 1e-2), (1e-2, 1e-3), (1e-2, 3e-2))
 
 
@@ -54,7 +55,7 @@ class StatementSearch:
         self.blocks = modulo(initial_blocks(self.statement), self.relations)
 
     def run(self) -> Proof | None:
-        """Checked proof of the statement; None if none is found."""
+        """Proof of the statement; None if none is found."""
         solution, program = self._solve(self.blocks)
         if solution is not None and (solution.margin > 0 or self._determined()):
             proof = self._finish(rounded(self.statement, self.blocks, solution))
@@ -111,7 +112,7 @@ class StatementSearch:
         return [[solution.functional[u] / mass for u in units]]
 
     def _finish(self, proof: Proof | None) -> Proof | None:
-        """Checked proof of the original statement, from one in scaled variables."""
+        """Proof of the original statement from one in scaled variables; points and functionals are checked again."""
         if proof is None:
             return None
         restored = self.moved.restore(proof)
@@ -120,7 +121,7 @@ class StatementSearch:
         return restored if holds(self.original, restored) else None
 
     def _outside(self, program: MomentProgram | None) -> Proof | None:
-        """Refutation by a monomial of the target that no product or equality contains."""
+        """Refutation by a monomial of the target that no product and no multiple of an equality contains."""
         covered = set() if program is None else set(program.index)
         target = self.statement.target
         for e in target:
@@ -177,7 +178,7 @@ class StatementSearch:
 
 
 def strict_proof(statement: Statement) -> SumOfSquares | None:
-    """Sum-of-squares identity in monomials, checked exactly, for a statement with a margin; None if not found.
+    """Exactly checked sum-of-squares identity in monomials for a statement with a positive margin, or None.
 
     The caller must check that the multiplier is positive.
     """

@@ -1,4 +1,4 @@
-"""Search for a proof of positivity: methods, multipliers, and the undecided answer.
+"""Search for a proof of positivity: methods and multipliers.
 
 Methods: Gram matrices by conic programming with rounding, and factorisation into a square and a cofactor.
 Multipliers are powers of 1 + Σx_i² (or a similar sum), or sums of squares found in floating point. Exact arithmetic
@@ -48,11 +48,11 @@ from quakedesign.sos.solve.rounding import scaled
 # ----------------------------------------------------------------------
 # Multipliers of a polynomial P on ℝⁿ: powers of 1 + Σx_i², and sums of squares found by a search.
 #
-# Let σ be a sum of squares of given degree. That σ·P is also a sum of squares is a linear conic condition on σ. σ is
-# computed in floating point and scaled variables, rounded, and proved to be a sum of squares. The caller decides σ·P
-# exactly.
+# For a sum of squares σ of given degree, the condition that σ·P is a sum of squares is a linear conic constraint on σ.
+# σ is computed in floating point and scaled variables, rounded, and proved to be a sum of squares. The caller decides
+# σ·P exactly.
 
-_TERMS = 40  # most terms of σ, so that the programme is solved within seconds
+_TERMS = 40  # largest number of terms of σ, so that the programme is solved within seconds
 _GRID = 2**8  # denominator of its coefficients
 _LEAST = 1e-5  # least margin of σ, whose coefficients are at most one
 
@@ -126,7 +126,7 @@ def methods() -> tuple[Method, ...]:
 
 _GROWTH = (0, 2)
 _SEARCHED = (2, 4)  # degrees of searched multipliers
-_LARGEST_RETRY = 60  # most monomials in a basis for a further attempt, so that it ends within seconds
+_LARGEST_RETRY = 60  # largest number of monomials in a basis for a further attempt, which then takes seconds
 
 
 def prove(
@@ -149,9 +149,8 @@ def prove(
         Constraints of the set such as ``"x >= 0"``, ``"x^2 + y^2 <= 1"``, ``"x*y == 1"``; ℝⁿ unless given.
     multiplier : str, SymPy expression or mapping, optional
         multiplier · polynomial is decided instead. ``"auto"`` tries powers of 1 + Σx_i² (of Σx_i² for forms, of Σx_i
-        for forms on the orthant) up to the third. On ℝⁿ the sums contain only variables of
-        the polynomial without its square factor, and before the first and the second power a search proposes a sum of
-        squares of the same degree.
+        for forms on the orthant) up to the third. On ℝⁿ the sums contain only variables of the polynomial without its
+        square factor, and before the first and the second power a search proposes a sum of squares of the same degree.
     variables : sequence of str or Symbol, optional
         Variables in order; by default in order of appearance.
     margin : rational, optional
@@ -171,7 +170,8 @@ def prove(
     Raises
     ------
     PolynomialError
-        When the input is not readable, or the multiplier is not proved to be positive.
+        When the input is not readable, the multiplier is not proved to be positive, the margin is negative or given
+        for an odd degree, or the Gram matrices are too large for the solver.
     """
     start = perf_counter()
     names, given, inequalities, equalities, factor = read(polynomial, on, multiplier, variables)
@@ -201,7 +201,7 @@ def prove(
 
 
 def _largest_basis(statement: Statement) -> int:
-    """Number of monomials up to half the degree; on ℝⁿ for the squarefree cofactor and its variables."""
+    """Number of monomials up to half the degree; on ℝⁿ for the cofactor without square factor and its variables."""
     if statement.inequalities or statement.equalities or not statement.target:
         return _basis_size(statement.degree, len(statement.variables))
     rest = square_factor(statement.target, len(statement.variables))[1]
@@ -218,7 +218,7 @@ def decide(statement: Statement) -> Answer:
     Raises
     ------
     PolynomialError
-        When the multiplier is not proved to be positive.
+        When the multiplier is not proved to be positive, or the Gram matrices are too large for the solver.
     """
     squares, start = _squares_of_multiplier(statement), perf_counter()
     none = Answer(statement=statement, proof=None, blocks=block_sizes(statement), versions=versions())
@@ -259,7 +259,7 @@ def _with_margin(polynomial: Polynomial, margin: Any, size: int) -> Polynomial:
 
 
 def _multipliers(names: Any, polynomial: Any, factor: Any, inequalities: Any, equalities: Any) -> Iterator[Any]:
-    """Multipliers to try: the given one, or else 1, searched multipliers and powers of increasing degree."""
+    """Multipliers to try: the given one, or for ``"auto"`` 1, then searched multipliers and powers by degree."""
     if factor != "auto":
         yield factor
         return

@@ -1,4 +1,4 @@
-"""Facial reduction: rational zeros of the target, or a rational kernel of the Gram matrix, shrink the basis.
+"""Facial reduction: rational zeros of the target, or a rational kernel of the Gram matrix, reduce the basis.
 
 A wrong guess costs time only, as the final proof is checked against the full statement.
 """
@@ -18,7 +18,7 @@ from quakedesign.sos.exact.proofs import Element, as_element
 from quakedesign.sos.solve.moment import Shape
 
 Row = tuple[Fraction, ...]
-_SIMPLE = 20_000
+_SIMPLE = 20_000  # a fraction counts as simple if its numerator or denominator is smaller
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class Block:
         return Shape(weight=weight, basis=self.monomials, face=face)
 
     def restricted(self, kernel: Sequence[Row]) -> "Block | None":
-        """Block whose Gram matrix has the given vectors, in the present basis, in its kernel; None if empty."""
+        """Block whose Gram matrix has given vectors, in the present basis, in its kernel; None if no basis remains."""
         if not kernel:
             return self
         reduced, rank = fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in kernel]).rref()
@@ -162,7 +162,7 @@ def at_kernels(
     tolerance : float
         Relative tolerance of the fractions of the kernel.
     scale : sequence of Fraction
-        Scales of the variables.
+        Unit of every variable in which the fractions are simple, see `decimal_units`.
     """
     reduced, smaller_face = [], False
     for block, gram in zip(blocks, grams, strict=True):
@@ -175,7 +175,7 @@ def at_kernels(
 
 
 def _kernel(block: Block, gram: np.ndarray, threshold: float, tolerance: float, scale: Sequence[Fraction]) -> list[Row]:
-    """Rational basis of the eigenspace of small eigenvalues, in simplest fractions of the unscaled variables."""
+    """Rational basis of the eigenspace of small eigenvalues, in simplest fractions in the units `scale`."""
     values, vectors = np.linalg.eigh(gram)
     space = vectors[:, values < threshold].T
     if not len(space):

@@ -2,7 +2,7 @@
 
 If a polynomial p(d), affine in the decisions d, is in the cone, it is in the span of the products that the cone
 allows. A monomial that no product contains therefore has the coefficient zero, which is an equation on d. Its exact
-solution may cancel further coefficients; then diagonal Gram entries vanish (`reduction`), and the products contain
+solution may cancel further coefficients; then diagonal Gram entries vanish (`reduced_bases`), and the products contain
 fewer monomials. This is repeated until nothing changes. If a Gram matrix has a numerical kernel for every d, the
 rounded kernel restricts the basis likewise. These equations are a guess, but the resulting decisions are proved like
 all others.
@@ -115,7 +115,7 @@ class Forced:
         return ""
 
     def _with(self, equation: Affine, rule: str, names: Sequence[str]) -> "Forced":
-        """Result of one more equation, equation·(1, d) = 0."""
+        """Result with one more equation, equation·(1, d) = 0."""
         if self.contradiction or not any(equation):
             return self
         pivot = next((j for j, c in enumerate(equation[1:]) if c), None)

@@ -124,7 +124,7 @@ class _Stated:
     def __init__(self, shapes: Sequence[MomentProgram], count: int, rows: int, shares: int) -> None:
         import cvxpy as cp
 
-        self._alone = Lock()
+        self._lock = Lock()
         size = sum(len(shape.keys) for shape in shapes)
         sizes: dict[str, Any] = {"costs": size, "margin": size, "parts": (count, size), "radii": count}
         sizes |= ({"rows": (rows, count), "bounds": rows} if rows else {}) | ({"shares": shares} if shares else {})
@@ -147,7 +147,7 @@ class _Stated:
 
     def solve(self, values: Mapping[str, object]) -> Proposal | None:
         """Proposal for the values of all Parameters."""
-        with self._alone:
+        with self._lock:
             for name, parameter in self.given.items():
                 parameter.value = values[name]
             if not self.compiled.solve():

@@ -1,9 +1,9 @@
 """Membership in a cone as a semidefinite programme over functionals, passed to Clarabel directly.
 
-    minimise L(target) + 4y  subject to  L(g_S·b bᵀ) ⪰ 0 for every block,  Σ traces + y = 1,  y ≥ 0,  L(m·h) = 0.
+    minimise L(target) + 4y  subject to  L(g_S·b bᵀ) ⪰ 0 for every block, Σ tr L(g_S·b bᵀ) + y = 1, y ≥ 0, L(m·h) = 0.
 
-Its value t is the largest margin: target = Σ g_S·bᵀ(Z + t·I)b + Σ q·h with the dual Z ⪰ 0. One solution yields the
-Gram matrices if t > 0 and a refuting functional if t < 0. There is one unknown per monomial, far fewer than Gram
+Its value t is the largest margin up to 4: target = Σ g_S·bᵀ(Z + t·I)b + Σ q·h with the dual Z ⪰ 0. One solution yields
+the Gram matrices if t > 0 and a refuting functional if t < 0. There is one unknown per monomial, far fewer than Gram
 entries, and between polynomials of one shape only the cost changes.
 """
 
@@ -24,7 +24,7 @@ from quakedesign.sos.exact.polynomial import Exponents
 
 Array = np.ndarray
 Sided = tuple[sparse.csc_matrix, np.ndarray]  # matrix and right-hand side
-# upper bounds imposed on the margin in turn; without one it is infinite if every polynomial is in the cone
+# upper bounds imposed on the margin in turn; without a bound it is infinite if every polynomial is in the cone
 _LARGEST_MARGINS = (4.0, 1e-2, 1e-5)
 
 
@@ -95,13 +95,13 @@ class MomentProgram:
     def solve(self, target: Mapping[Exponents, float], accuracy: float = 1e-9) -> MomentSolution | None:
         """Largest margin for a target whose coefficients are about one; None if the solver fails.
 
-        If the solver fails, smaller upper bounds on the margin are tried: without an interior, it may not be attained.
+        If the solver fails, smaller bounds are tried: without an interior, the largest margin may not be attained.
         """
         answers = (self._answer(target, (accuracy, True), most) for most in _LARGEST_MARGINS)
         return next((self._solution(answer) for answer in answers if answer is not None), None)
 
     def margin(self, target: Mapping[Exponents, float], accuracy: float) -> float | None:
-        """Margin as from `solve`, first without iterative refinement, which takes two thirds of the time."""
+        """Margin as in `solve`; the first attempt omits iterative refinement, which takes two thirds of the time."""
         quick = self._answer(target, (accuracy, False), _LARGEST_MARGINS[0])
         if quick is not None:
             return -float(quick.z[0])
@@ -150,7 +150,7 @@ class MomentProgram:
     def _matrix(self, more: Sequence[tuple[int, int, float]], *, equations: int, limits: int) -> Sided:
         """Sparse matrix and right-hand side: trace, relations, further rows, then minus the localizing matrices.
 
-        The unknowns are the values of L and one more; `more` lists further entries (row, column, value).
+        The unknowns are the values of L and one further scalar; `more` lists further entries (row, column, value).
         """
         rows, columns, values, diagonal = self.localizing
         first = equations + limits
@@ -212,7 +212,7 @@ class MomentProgram:
 
 
 def useful(answer: DefaultSolution) -> bool:
-    """Whether a solution of the solver is usable; its status is no verdict."""
+    """Whether a solution of the solver is usable, which is no verdict on the problem."""
     finite = np.all(np.isfinite(answer.x)) and np.all(np.isfinite(answer.z))
     return str(answer.status) in _USEFUL and bool(finite)
 

@@ -1,7 +1,7 @@
 """Points of semialgebraic sets in floating point: minima, interior and boundary, zeros.
 
-Points are candidates for a negative value or a rational zero, which exact code checks. The first chapter
-evaluates polynomials and their derivatives as arrays.
+Points are candidates for a negative value or a rational zero, which exact code checks. The first chapter evaluates
+polynomials and their derivatives as arrays.
 """
 
 from collections.abc import Iterator, Sequence
@@ -117,10 +117,10 @@ def lowest_samples(statement: Statement) -> list[list[float]]:
 
 
 def inwards(statement: Statement, x: Sequence[float]) -> Iterator[tuple[list[float], float]]:
-    """Points strictly inside the set with a negative polynomial, each with its step from x; largest step first.
+    """Points strictly inside the set where the polynomial is negative, each with its step from x; largest step first.
 
-    The direction is the one in which the slowest active constraint increases fastest, with coordinates of at most 1;
-    without an active constraint the point is x itself; none if there is no such direction.
+    In the direction of these steps, whose coordinates are at most 1, the slowest active constraint increases fastest.
+    Without an active constraint the points are x itself. Without such a direction there are no points.
     """
     point = np.asarray(x, dtype=float)
     direction = _into(statement, point)
@@ -193,18 +193,18 @@ def _on_sphere(statement: Statement, hints: Sequence[Sequence[float]]) -> Iterat
     p = statement.polynomial
     top = degree(p)
     homogeneous = all(sum(e) == top for e in p)
-    signed = [
+    square = [
         any(g.keys() == {tuple(int(i == j) for j in range(size))} for g in statement.inequalities) for i in range(size)
     ]
-    lift = {(*(2 * x if s else x for x, s in zip(e, signed, strict=True)), 2 * (top - sum(e))): c for e, c in p.items()}
+    lift = {(*(2 * x if s else x for x, s in zip(e, square, strict=True)), 2 * (top - sum(e))): c for e, c in p.items()}
     form = Arrays(lift, size + 1)
 
     def value(v: np.ndarray) -> tuple[float, np.ndarray]:
         full = np.append(v, 1.0) if homogeneous else v
-        x = _state(full[:-1], signed)
+        x = _state(full[:-1], square)
         level = float(x @ x) + (0.0 if homogeneous else full[-1] ** 4)
         gradient = form.gradient(full)
-        grown = np.where(signed, 4 * np.abs(full[:-1]) ** 3 * np.sign(full[:-1]), 2 * full[:-1])
+        grown = np.where(square, 4 * np.abs(full[:-1]) ** 3 * np.sign(full[:-1]), 2 * full[:-1])
         if not homogeneous:
             grown = np.append(grown, 4 * full[-1] ** 3)
         gradient = gradient[:-1] if homogeneous else gradient
@@ -213,14 +213,14 @@ def _on_sphere(statement: Statement, hints: Sequence[Sequence[float]]) -> Iterat
         return number / scale, gradient / scale - number / scale * (top / 2) * grown / level
 
     random = np.random.default_rng(_POINT_SEED)
-    begin = [*(_lifted(h, signed, homogeneous) for h in hints)]
+    begin = [*(_lifted(h, square, homogeneous) for h in hints)]
     count = size if homogeneous else size + 1
     begin += [random.standard_normal(count) for _ in range(_STARTS)]
     for v in begin:
         if not float(np.linalg.norm(v)) > 0:
             continue
         answer = minimize(value, np.asarray(v) / np.linalg.norm(v), jac=True, method="BFGS", options={"gtol": 1e-10})
-        x = _state(answer.x[:size], signed)
+        x = _state(answer.x[:size], square)
         last = 1.0 if homogeneous else float(answer.x[-1]) ** 2
         if homogeneous:
             yield (x / np.abs(x).max()).tolist()
@@ -231,12 +231,12 @@ def _on_sphere(statement: Statement, hints: Sequence[Sequence[float]]) -> Iterat
                 yield (x / np.abs(x).max() * far).tolist()
 
 
-def _state(v: np.ndarray, signed: list[bool]) -> np.ndarray:
-    return np.where(signed, v**2, v)
+def _state(v: np.ndarray, square: list[bool]) -> np.ndarray:
+    return np.where(square, v**2, v)
 
 
-def _lifted(hint: Sequence[float], signed: list[bool], homogeneous: bool) -> np.ndarray:
-    x = np.where(signed, np.sqrt(np.abs(hint)), hint)
+def _lifted(hint: Sequence[float], square: list[bool], homogeneous: bool) -> np.ndarray:
+    x = np.where(square, np.sqrt(np.abs(hint)), hint)
     return x if homogeneous else np.append(x, 1.0)
 
 
@@ -276,7 +276,7 @@ def _constrained(statement: Statement, hints: Sequence[Sequence[float]]) -> Iter
 def negative_point(
     statement: Statement, candidates: Sequence[Sequence[float]], scale: Sequence[Fraction]
 ) -> Point | None:
-    """Point of the set with small fractions where the polynomial is negative; None if no candidate yields one."""
+    """Rational point of the set where the polynomial is negative, with small denominators; None if none is found."""
     for x in by_value(statement, candidates)[:12]:
         for coordinates in chain(_near(statement, x, scale), _inside(statement, x, scale)):
             point = Point(coordinates=coordinates)
@@ -355,7 +355,7 @@ def _leads(statement: Statement, x: Sequence[float]) -> list[float]:
 
 
 def rationalised(x: Sequence[float], scale: Sequence[Fraction], tolerance: float) -> tuple[Fraction, ...]:
-    """Simplest fractions in the unscaled variables, within a tolerance relative to the largest coordinate."""
+    """Point whose products with `scale` are simplest fractions; tolerance relative to the largest coordinate of x."""
     size = max(1e-2, *map(abs, x))  # scaled variables are about one
     return tuple(
         Fraction(0) if abs(v) <= tolerance * size else simplest(v * float(s), tolerance * min(1.0, size / abs(v))) / s

@@ -64,7 +64,7 @@ def rounded(
     SumOfSquares or None
         Checked proof.
     """
-    decision = checked or (lambda proof: proof if identity_holds(statement, proof) else None)
+    check = checked or (lambda proof: proof if identity_holds(statement, proof) else None)
     system = System(statement, blocks)
     floats = system.flat(solution)
     largest = max((len(b.basis) for b in blocks), default=1)
@@ -77,14 +77,14 @@ def rounded(
         correction = system.correction(residual(statement, proof.squares, proof.cofactors))
         if correction is None:
             return None
-        point = decision(system.proof([a + correction[i] if i in correction else a for i, a in enumerate(values)]))
-        if point is not None:
-            return point
+        valid = check(system.proof([a + correction[i] if i in correction else a for i, a in enumerate(values)]))
+        if valid is not None:
+            return valid
     return None
 
 
 def relations(statement: Statement) -> Iterator[tuple[int, Exponents, dict[Exponents, Fraction]]]:
-    """Equality, monomial and their product, for all products within the degree bound; for forms, at the bound."""
+    """Index of an equality, monomial and their product, for all products up to (forms: of) the degree bound."""
     size = len(statement.variables)
     for k, h in enumerate(statement.equalities):
         most = statement.degree - degree(h)
@@ -193,7 +193,7 @@ class System:
 
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
-    """Statement in ũ = u/scale; scales are powers of two, every polynomial is divided by its largest coefficient."""
+    """Statement in ũ = u/scale; scales are powers of two; each polynomial is divided by its largest |coefficient|."""
 
     statement: Statement
     scale: tuple[Fraction, ...]

@@ -1,7 +1,4 @@
-"""Exact verification of Gram matrices from other solvers, and their files.
-
-Gram matrices are read from JSON or MATLAB's .mat files, then rounded and corrected exactly.
-"""
+"""Exact verification of Gram matrices from other solvers, given as arrays or in JSON or MATLAB's .mat files."""
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
@@ -37,7 +34,7 @@ from quakedesign.text import shown
 
 Array = np.ndarray
 Matrixed = tuple[Block, Array]
-_NEAR = Fraction(1, 100)  # largest error over largest coefficient; beyond, the matrix is for another polynomial
+_NEAR = Fraction(1, 100)  # ratio of error to largest coefficient above which the matrix counts as wrong
 
 
 def verify(
@@ -69,7 +66,8 @@ def verify(
     Raises
     ------
     PolynomialError
-        When an input is not readable, or the sizes of matrix and basis differ.
+        When an input is not readable, a constraint is an equality or occurs twice, the numbers of matrices or bases are
+        wrong, the sizes of matrix and basis differ, or a basis is linearly dependent.
     """
     start = perf_counter()
     names, exact, inequalities, equalities, _ = read(polynomial, on, None, variables)
@@ -121,7 +119,7 @@ def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, .
 
 
 def _matrix(gram: Any, size: int) -> Any:
-    """Symmetric part of a matrix."""
+    """Symmetric part of a matrix as floats."""
     try:
         matrix = np.asarray(gram, dtype=object).astype(float)  # by entry, so that complex numbers raise
     except (TypeError, ValueError, OverflowError):
