@@ -260,11 +260,7 @@ class FaultPlant:
         Constants of the fault and its reference must be the same; friction, ranges and disturbance must lie within
         those of this plant. The name is not compared.
         """
-        return [
-            *_differing_constants(self, other),
-            *_wider_ranges(self, other),
-            *_rougher(self.friction, other.friction),
-        ]
+        return [*_differing(self, other), *_wider_ranges(self, other), *_rougher(self.friction, other.friction)]
 
 
 def _hull(values: Iterable[Fraction]) -> Range:
@@ -319,7 +315,7 @@ _SAME = {
 _SPREADS = ("stiffness", "damping", "authority")
 
 
-def _differing_constants(proved: FaultPlant, required: FaultPlant) -> list[str]:
+def _differing(proved: FaultPlant, required: FaultPlant) -> list[str]:
     """Constants that differ."""
     pairs = {f"{name} [{unit}]": (getattr(proved, name), getattr(required, name)) for name, unit in _SAME.items()}
     pairs["static friction [-]"] = proved.friction.static, required.friction.static

@@ -423,18 +423,18 @@ def called(function: ca.Function, work: Instruction) -> Called:
     NotPortableError
         If the call is neither a repetition nor a branch, or is ambiguous.
     """
-    candidates = [
+    matching = [
         f for f in function.find_functions(0) if f.nnz_in() == len(work.taken) and f.nnz_out() == len(work.given)
     ]
-    name = candidates[0].name() if len(candidates) == 1 else ""
+    name = matching[0].name() if len(matching) == 1 else ""
     if name.startswith("fold_"):
         inner = name.removeprefix("fold_")
         (all_of_them,) = map(
-            candidates[0].get_function, candidates[0].get_function()
+            matching[0].get_function, matching[0].get_function()
         )  # its name varies with the number of calls
-        return Called(candidates[0].find_function(inner), int(all_of_them.size2_out(0)))
+        return Called(matching[0].find_function(inner), int(all_of_them.size2_out(0)))
     if name == "where_needed":
-        return Called(candidates[0].find_function("solved"), 0)
+        return Called(matching[0].find_function("solved"), 0)
     raise NotPortableError(f"a call in {function.name()} is neither a repetition nor a branch")
 
 

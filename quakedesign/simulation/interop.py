@@ -184,7 +184,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     import control
 
     scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})
-    control_function, unknown = control_step(scheme.__class__, DiscreteLaw.of(controller, 0.0)), ca.SX.sym("unknown")
+    stepped, unknown = control_step(scheme.__class__, DiscreteLaw.of(controller, 0.0)), ca.SX.sym("unknown")
     own = [symbol.name for symbol in integral_symbols(controller)]
     names = [*own, *(f"memory_{i}" for i in range(len(scheme.initial_memory))), "held"]
     state, seen = ca.SX.sym("state", len(names)), ca.SX.sym("seen", len(_SEEN))
@@ -196,8 +196,8 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
         scheme.authority or unknown,
         state[-1],
     ]
-    numbers = ca.DM(control_function.numbers)
-    pressure, after, memory, _ = control_function.function(
+    numbers = ca.DM(stepped.numbers)
+    pressure, after, memory, _ = stepped.function(
         ca.vertcat(*signals), state[: len(own)], numbers, state[len(own) : -1]
     )
     later = ca.vertcat(after, memory, pressure)
@@ -467,12 +467,9 @@ class _FrequencyResponse:
     def of(cls, loop: Any) -> "_FrequencyResponse":
         """Frequency response from far below the poles and zeros to far above them."""
         roots = np.concatenate([loop.poles(), loop.zeros()])
-        logarithms = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
-        logarithms = np.log(logarithms[logarithms > 1e-9 * np.max(logarithms, initial=1.0)])
-        ends = (
-            np.min(logarithms, initial=0.0) - 7,
-            math.log(math.pi) if loop.dt else np.max(logarithms, initial=0.0) + 7,
-        )
+        places = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
+        places = np.log(places[places > 1e-9 * np.max(places, initial=1.0)])
+        ends = (np.min(places, initial=0.0) - 7, math.log(math.pi) if loop.dt else np.max(places, initial=0.0) + 7)
         return cls(loop, np.linspace(*ends, _FREQUENCIES))
 
     def at(self, places: Any) -> Any:

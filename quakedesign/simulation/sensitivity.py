@@ -269,8 +269,8 @@ def _study(
 ) -> Study:
     errors = {}
     for scheme in schemes:
-        errors_of_levels = [_errors(run(scheme, level), matched) for level in levels]
-        errors[scheme] = {name: tuple(values[name] for values in errors_of_levels) for name in errors_of_levels[0]}
+        by_level = [_errors(run(scheme, level), matched) for level in levels]
+        errors[scheme] = {name: tuple(values[name] for values in by_level) for name in by_level[0]}
     label, unit = parameter
     return Study(title=title, label=label, unit=unit, levels=levels, errors=errors)
 

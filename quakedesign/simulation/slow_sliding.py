@@ -228,23 +228,21 @@ class _Loop:
         """Planned pressure [Pa] at a time [s]."""
         return self.pressure_per_slip * self.reference.slip(time)
 
-    def pressure(
-        self, time: Any, pressure_sample: Any, since: Any, modes: Any, exp: Callable[[Any], Any] = np.exp
-    ) -> Any:
-        """Fault pressure [Pa] at `time` [s], `since` [s] after the hold changed to `pressure_sample` [Pa]."""
-        direct, layered = pressure_sample * (1 - sum(self.share)), 0
+    def pressure(self, time: Any, sample: Any, since: Any, modes: Any, exp: Callable[[Any], Any] = np.exp) -> Any:
+        """Fault pressure [Pa] at `time` [s], `since` [s] after the hold changed to `sample` [Pa]."""
+        direct, layered = sample * (1 - sum(self.share)), 0
         for i, (rate, share) in enumerate(zip(self.decay, self.share, strict=True)):
-            layered = layered + share * (pressure_sample + (modes[i] - pressure_sample) * exp(-rate * since))
+            layered = layered + share * (sample + (modes[i] - sample) * exp(-rate * since))
         return self.planned(time) + direct + layered
 
     def rates(self) -> ca.Function:
         """CasADi Function (t, y, (held pressure, time of its change, modes)) → dy/dt."""
-        time, y, pressure_sample = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("pressure_sample", 2 + len(self.decay))
-        pressure = self.pressure(time, pressure_sample[0], time - pressure_sample[1], pressure_sample[2:], ca.exp)
+        time, y, sample = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("sample", 2 + len(self.decay))
+        pressure = self.pressure(time, sample[0], time - sample[1], sample[2:], ca.exp)
         turn = 2 * math.pi / self.tide.period
         load = self.tide.amplitude * turn * ca.cos(turn * time + self.tide.phase) / self.slider.stiffness
         field = self.slider.rates(y, ca.vertcat(load, pressure, ca.jacobian(pressure, time)))[0]
-        return ca.Function("rates", [time, y, pressure_sample], [ca.densify(field)])
+        return ca.Function("rates", [time, y, sample], [ca.densify(field)])
 
 
 def _followed(
@@ -254,7 +252,7 @@ def _followed(
     sizes = [float(loop.slider.law.critical_slip)] * 2 + [1.0, 1.0]  # type: ignore[attr-defined]
     flow = adaptive_integrators()[method].flow(loop.rates(), sizes, _SHARES, rtol=TIGHT_RTOL)
     own, fed, output = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output))
-    z, y, pressure_sample, modes = np.zeros(len(output)), loop.start, 0.0, np.zeros(len(loop.decay))
+    z, y, sample, modes = np.zeros(len(output)), loop.start, 0.0, np.zeros(len(loop.decay))
     rows, step = [[0.0, *y, 0.0, 0.0]], instruments.step
     for k in range(math.ceil(length / step)):
         now = k * step
@@ -262,20 +260,18 @@ def _followed(
         commanded = float(output @ z) + float(law.feedback[0]) * error
         z = own @ z + fed[:, 0] * error
         acting = instruments.pump(commanded, loop.planned(now))
-        for begin, lasting, changed in instruments.sections(now, pressure_sample, acting):
-            before, after = (loop.pressure(begin, p, 0.0, modes) for p in (pressure_sample, changed))
+        for begin, lasting, changed in instruments.sections(now, sample, acting):
+            before, after = (loop.pressure(begin, p, 0.0, modes) for p in (sample, changed))
             if after >= loop.slider.normal_stress:
                 return np.array(rows), {"opening": begin}
-            y, pressure_sample = loop.slider.stepped(y, before, after), changed
+            y, sample = loop.slider.stepped(y, before, after), changed
             try:
-                samples = flow.follow(begin, lasting, y, (pressure_sample, begin, *modes))[0]
+                samples = flow.follow(begin, lasting, y, (sample, begin, *modes))[0]
             except StoppedError:
                 return np.array(rows), {"diverged": begin}
             for passed, values in zip(lasting * np.array(_SHARES), samples.T, strict=True):
-                rows.append(
-                    [begin + passed, *values, commanded, loop.pressure(begin + passed, pressure_sample, passed, modes)]
-                )
-            y, modes = samples[:, -1], pressure_sample + (modes - pressure_sample) * np.exp(-loop.decay * lasting)
+                rows.append([begin + passed, *values, commanded, loop.pressure(begin + passed, sample, passed, modes)])
+            y, modes = samples[:, -1], sample + (modes - sample) * np.exp(-loop.decay * lasting)
         progress(min(1.0, (now + step) / length))
     return np.array(rows), {}
 

@@ -291,15 +291,13 @@ def _modes(
         turned = np.linalg.svd(rows @ felt)[0].conj().T
         shapes = columns @ np.linalg.inv(turned)
         for row, shape in zip(turned @ rows, shapes.T, strict=True):
-            largest_effect, steady = np.abs(row @ felt).sum(), np.abs(row @ B).sum()
-            reached = bool(largest_effect and steady > _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B))
+            effect, steady = np.abs(row @ felt).sum(), np.abs(row @ B).sum()
+            reached = bool(effect and steady > _UNREACHED * np.linalg.norm(row) * np.linalg.norm(B))
             sized = reached and not wave and size is not None
             yield UnstableMode(
                 pole=float(pole.real),
                 frequency=wave,
                 shape=tuple(np.real(shape / shape[np.argmax(np.abs(shape))]).tolist()),
                 reached=reached,
-                pressure=size * float(np.abs(row @ entries).sum() / largest_effect)
-                if sized and size is not None
-                else None,
+                pressure=size * float(np.abs(row @ entries).sum() / effect) if sized and size is not None else None,
             )

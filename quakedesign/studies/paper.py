@@ -139,8 +139,7 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
     task = uncertain_plant(fault)
     designs = {"peak": design_sampled_law(task, step, objective="peak")}
     designs |= {
-        f"tracking, {allowance:g} times the peak": design_sampled_law(task, step, allowance=allowance)
-        for allowance in ROOMS
+        f"tracking, {factor:g} times the peak": design_sampled_law(task, step, allowance=factor) for factor in ROOMS
     }
     length = min(_PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
     return tuple(

@@ -207,12 +207,10 @@ class _Floats:
 def _farthest(ahead: np.ndarray, points: np.ndarray, maps: list[np.ndarray], pushes: list[np.ndarray]) -> np.ndarray:
     """Farthest image of the points and their negatives in every direction."""
     row, images = np.arange(len(ahead)), list[tuple[np.ndarray, np.ndarray]]()
-    for step, input_map in zip(maps, pushes, strict=True):
+    for step, added in zip(maps, pushes, strict=True):
         heights = ahead @ step @ points.T
         best = np.abs(heights).argmax(axis=1)
-        after = (
-            np.sign(heights[row, best])[:, None] * (points[best] @ step.T) + np.sign(ahead @ input_map.T) @ input_map
-        )
+        after = np.sign(heights[row, best])[:, None] * (points[best] @ step.T) + np.sign(ahead @ added.T) @ added
         images.append(((ahead * after).sum(axis=1), after))
     choice = np.array([height for height, _ in images]).argmax(axis=0)
     return np.asarray(np.array([after for _, after in images])[choice, row])

@@ -80,7 +80,7 @@ _SHRUNK, _LITTLE_LESS = 60, 2e-5
 _SNAPPED = 1e-3  # largest factor of the slip that counts as 0, over that of e1
 _INSIDE = 1e-4  # least distance of an interior point from all facets, over the size
 _DIGITS = 7
-_ENLARGED = Fraction(3, 2)  # enlargement of extents for ranges of the plant before the polytope is known
+_WIDTH = Fraction(3, 2)  # enlargement of extents for ranges of the plant before the polytope is known
 
 
 def _float_exponential(rows: tuple[tuple[Fraction, ...], ...]) -> list[list[Any]]:
@@ -176,13 +176,8 @@ class _Start:
         kinds = product(task.beta, (Fraction(0), task.reference_rates[0]), plant.slope)
         beta, reference, slope = np.array(list(kinds), dtype=float).T
         target = reference - float(law.return_rate) * (slip + noise - float(sampled_loop.slip_noise))
-        excess_pressure = (
-            float(law.rate_gain) * rate - float(law.target_gain) * target + level + float(law.slip_gain) * noise
-        )
-        force, scaled = (
-            beta * float(task.authority) * excess_pressure,
-            float(task.authority * task.beta[0]) * excess_pressure,
-        )
+        pressure = float(law.rate_gain) * rate - float(law.target_gain) * target + level + float(law.slip_gain) * noise
+        force, scaled = (beta * float(task.authority) * pressure, float(task.authority * task.beta[0]) * pressure)
         predicted = np.maximum(target, 0)
         return cls(task, sampled_loop, noise, slip, rate, level, reference, beta, slope, predicted, scaled, force)
 
@@ -427,13 +422,11 @@ def _dyadic(value: float) -> Fraction:
 @lru_cache(maxsize=64)
 def _wide_periods(task: FaultPlant, sampled_loop: SampledStickSlip, size: tuple[float, ...]) -> list[Period]:
     """Periods with widened ranges for states of a given size."""
-    law, (slip, rate, level) = sampled_loop.law, (_ENLARGED * short(v, 4) for v in size)
-    most = law.target_gain * (
-        law.return_rate * slip + _ENLARGED * (task.reference_rates[0] + sampled_loop.target_noise)
-    )
+    law, (slip, rate, level) = sampled_loop.law, (_WIDTH * short(v, 4) for v in size)
+    most = law.target_gain * (law.return_rate * slip + _WIDTH * (task.reference_rates[0] + sampled_loop.target_noise))
     most = most + law.rate_gain * rate + level + sampled_loop.pressure_noise
     plant = ranges(task, slip, (-most, most), rate * sampled_loop.longest)
-    return Period.deciding(FLOATS, task, sampled_loop, plant, rate / _ENLARGED, (-most / _ENLARGED, most / _ENLARGED))
+    return Period.deciding(FLOATS, task, sampled_loop, plant, rate / _WIDTH, (-most / _WIDTH, most / _WIDTH))
 
 
 @lru_cache(maxsize=64)

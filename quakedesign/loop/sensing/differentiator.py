@@ -349,15 +349,13 @@ class OutputFeedback(Sensor):
         own, past = iter(numbers), iter(memory)
         slip, memories = x[0], []
         for stage in self.stages:
-            slip, after = stage.pass_on(
-                _taken(own, len(stage.numbers(self.step))), _taken(past, len(stage.start)), slip
-            )
+            slip, after = stage.pass_on(_next(own, len(stage.numbers(self.step))), _next(past, len(stage.start)), slip)
             memories += after
         estimates, after = self.differentiator.estimate(list(own), list(past), slip)
         return ca.vertcat(estimates[0], estimates[1]), [*memories, *after]
 
 
-def _taken(entries: Iterator[ca.SX], count: int) -> Entries:
+def _next(entries: Iterator[ca.SX], count: int) -> Entries:
     return [next(entries) for _ in range(count)]
 
 
