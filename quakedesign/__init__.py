@@ -1,7 +1,7 @@
 """Design controllers that let a fault slip slowly instead of in an earthquake, and prove that they do.
 
 The public names are those of ``__init__.pyi``. They and the stub itself load on first use, so that
-``import quakedesign`` costs nothing.
+``import quakedesign`` takes almost no time.
 """
 
 from importlib import import_module as _import_module

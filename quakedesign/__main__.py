@@ -7,7 +7,7 @@ from quakedesign.parallel import ending, leave
 from quakedesign.streams import has_memory, lack_memory, lacks_memory, open_all, widen
 
 _OBJECTS = 100_000
-"""Allocations between two garbage collections: loading the libraries makes as many objects, none of them garbage."""
+"""Allocations between garbage collections: loading the libraries makes about as many objects, none of them garbage."""
 
 
 def main() -> None:

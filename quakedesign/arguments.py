@@ -41,16 +41,21 @@ _REMEDIES = {
     "float": "Give it in SI units.",
 }
 _Value = TypeVar("_Value")
-_MOST_ENTRIES = 16  # entries of a collection that are checked, so that a large one costs nothing
+_MOST_ENTRIES = 16  # entries of a collection that are checked, so that large ones cost little
 
 
 def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
-    """Load the public names of a package on first use, see `lazy_loader.attach_stub`; they check their arguments.
+    """Load the public names of a package on first use, see `lazy_loader.attach_stub`; they then check their arguments.
 
     Parameters
     ----------
     package, file : str
         ``__name__`` and ``__file__`` of the package; its stub lists the names.
+
+    Returns
+    -------
+    tuple
+        ``__getattr__``, ``__dir__`` and ``__all__`` of the package.
     """
     load, listed, names = lazy_loader.attach_stub(package, file)
 
@@ -62,10 +67,9 @@ def attach(package: str, file: str) -> tuple[Callable[[str], Any], Callable[[], 
 
 
 def checked(value: _Value) -> _Value:
-    """Public name that checks its arguments; a function is also replaced in its module, so that it can be pickled.
+    """Function or class that checks its arguments; functions are also replaced in their module, so that pickling works.
 
-    For a class, its construction and its public methods check their arguments; classes derived from SymPy are not
-    changed.
+    The constructor and the public methods of a class check their arguments; classes derived from SymPy are not changed.
     """
     if isfunction(value):
         replaced: Any = _checked(value)
@@ -191,10 +195,10 @@ def _hint(function: Callable[..., object], name: str) -> Any:
     if not isinstance(hint, str):
         return Any if hint is Parameter.empty else hint
     home = function.__module__  # the `__init__` of a dataclass has further names
-    known = getattr(function, "__globals__", {}) | vars(sys.modules[home])
+    names = getattr(function, "__globals__", {}) | vars(sys.modules[home])
     for late in (dict, partial(_late, home)):
         with suppress(NameError, TypeError, OSError):
-            return eval(hint, known, late())
+            return eval(hint, names, late())
     return Any
 
 
@@ -235,7 +239,7 @@ def _test_of_class(hint: type) -> Callable[[object], bool]:
         if type(value) is hint:
             return True
         if numbers is not None and isinstance(value, numbers):
-            return not isinstance(value, bool) and (hint is not float or _is_float(value))
+            return not isinstance(value, bool) and (hint is not float or _fits_float(value))
         return isinstance(value, hint) or (hint is bool and type(value).__name__ == "bool")
 
     return test
@@ -265,7 +269,7 @@ def _native(value: Any) -> Any:
     return value
 
 
-def _is_float(value: Any) -> bool:
+def _fits_float(value: Any) -> bool:
     try:
         float(value)
     except OverflowError:

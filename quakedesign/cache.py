@@ -6,9 +6,9 @@ on them each time.
 
 The folder is ``QUAKEDESIGN_CACHE`` if set (``off`` for no cache), else ``quakedesign`` in ``XDG_CACHE_HOME`` if set,
 else in ``~/.cache`` (``~/Library/Caches`` on macOS). There is no cache on Windows. Folder and files are used only if
-they belong to this user and no other user may write them; a corrupt file is ignored. Files are written whole, and the
-oldest are deleted if their total size is too large. After a failure, such as a folder without write permission, the
-result is computed anew.
+they belong to this user and no other user may write them; a corrupt file is ignored. Files are written atomically, and
+the oldest are deleted if their total size exceeds 200 MB. After a failure, such as a folder without write permission,
+the result is computed anew.
 """
 
 import io
@@ -93,10 +93,10 @@ def store(kind: str, content: bytes, *key: bytes) -> None:
 
 def once(kind: str, work: Callable[[], bytes], *key: bytes) -> bytes:
     """Cached result for a key, else the result of `work`, which is then cached."""
-    if (known := load(kind, *key)) is None:
-        known = work()
-        store(kind, known, *key)
-    return known
+    if (content := load(kind, *key)) is None:
+        content = work()
+        store(kind, content, *key)
+    return content
 
 
 def search_once(search: Callable[[], Any], *inputs: Any) -> Any:

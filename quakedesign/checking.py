@@ -51,7 +51,7 @@ def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tu
     Returns
     -------
     dict of str to (str, list of str)
-        By path.
+        Verdict and lines of the statement, by path; no lines for ``undecided`` and ``invalid``.
 
     Raises
     ------
@@ -66,23 +66,23 @@ def check_files(paths: Sequence[Path], fault: str | None = None) -> dict[str, tu
 
 def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
     try:
-        known = path.is_file()
+        is_file = path.is_file()
     except (OSError, ValueError):
-        known = False
-    if not known:
+        is_file = False
+    if not is_file:
         raise CertificateError(f"certificate must be a file. Received {path}, which is not a file. Check the path.")
     try:
         raw = read_json(path)
         kind = kind_of(raw)
         if kind in (GUARANTEE, SLOW_SLIDING, STICK_SLIP):
-            return _running(raw, fault)
+            return _guarantee(raw, fault)
         if kind == UNCERTAIN_PLANT:
             return _plant(raw, fault)
         if kind != LOOP:
             verdict_of, said = _attraction(raw) if kind == ATTRACTION else _polynomial(raw)
             return verdict_of, said if fault is None else [
                 *said,
-                f'names no fault: not compared with "{fault.name}"',
+                f'the file names no fault: not compared with "{fault.name}"',
             ]
         certificate = Certificate.of(evidence_of(raw))
         verdict = certificate.check()
@@ -94,7 +94,7 @@ def _checked(path: Path, fault: "Fault | None") -> tuple[str, list[str]]:
     return str(verdict), [*statement(certificate), *more]
 
 
-def _running(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
+def _guarantee(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     """Verdict on a file about a sampled loop, and whether its data are those of a fault."""
     claim: Any = guarantees.read_guarantee(raw)
     if claim.check() is not Verdict.PROVED:
@@ -128,12 +128,12 @@ def _plant(raw: Any, fault: "Fault | None") -> tuple[str, list[str]]:
     lines = [claim.sentence(), *entry_lines(guarantees.guarantee_document(claim))]
     return str(Verdict.PROVED), lines if fault is None else [
         *lines,
-        f'names no fault: not compared with "{fault.name}"',
+        f'the file names no fault: not compared with "{fault.name}"',
     ]
 
 
 def _other_step(claim: Any, fault: "Fault") -> str:
-    """The box, and a remark if the loop has another sampling time than the fault."""
+    """The box, and a remark if the sampling time of the loop differs from that of the fault."""
     if claim.slides:
         return ""
     text = f", box {fault.box.name}"
@@ -179,10 +179,10 @@ def statement(certificate: Certificate) -> list[str]:
     lines += [f"argument of a nested power: {lift} = {written(terms)}" for lift, terms in loop.lifts.items()]
     lines += [f"{state}' = {written(terms)}" for state, terms in loop.field.items()]
     if certificate.refutation is not None:
-        found = certificate.refutation
-        point = ", ".join(f"{name}: {v}" for name, v in found.point.items())
+        equilibrium = certificate.refutation
+        point = ", ".join(f"{name}: {v}" for name, v in equilibrium.point.items())
         lines.append(f"Filippov equilibrium away from the origin, in cell coordinates {point}")
-        for of, values in (("parameters", found.parameters), ("weights of the cells", found.weights)):
+        for of, values in (("parameters", equilibrium.parameters), ("weights of the cells", equilibrium.weights)):
             lines += [f"{of}: {', '.join(f'{name} = {v}' for name, v in values.items())}"] if values else []
         return lines
     lines.append("V = " + " + ".join(f"({written([term])})" for term in certificate.lyapunov))

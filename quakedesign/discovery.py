@@ -17,7 +17,7 @@ Kind = TypeVar("Kind")
 _allowed: ContextVar[bool] = ContextVar("allowed", default=False)
 _imported: set[str] = set()
 """Names of the user-defined modules whose classes have been loaded by `named`."""
-_OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}
+_OURS = {__name__.partition(".")[0], *sys.stdlib_module_names}  # this package and the standard library
 
 
 def discovered(package: str, kind: type) -> dict[str, Any]:
@@ -37,7 +37,7 @@ def allow_code(allowed: bool) -> None:
 
 @contextmanager
 def user_code() -> Iterator[None]:
-    """Turn every exception of user code into one error, except interruptions and errors of quakedesign."""
+    """Turn every exception of user code into a `UserCodeError`, except interruptions and errors of quakedesign."""
     try:
         yield
     except (KeyboardInterrupt, MemoryError, QuakedesignError):
@@ -51,10 +51,11 @@ def user_code() -> Iterator[None]:
 def _raised_by(error: BaseException) -> str | None:
     """Name of the user module in the traceback of an error, or None.
 
-    For an error that is no `Exception`, which only user code raises: "a user-defined module" if no name is known.
+    For an error that is not an `Exception`, which only user code raises, "a user-defined module" if no name is known.
     """
     through = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
-    by_others = isinstance(error, Exception) or not _imported or through[-1].startswith("rich.")  # closed pipe
+    # rich exits at a closed pipe
+    by_others = isinstance(error, Exception) or not _imported or through[-1].startswith("rich.")
     others = None if by_others else "a user-defined module"
     return next((module for module in reversed(through) if module in _imported), others)
 
@@ -66,6 +67,8 @@ def named(
 
     Parameters
     ----------
+    name : str
+        Name, or ``module:Class``.
     known : mapping of str to type
         Classes of the package.
     kind : type
@@ -80,7 +83,8 @@ def named(
     Raises
     ------
     UnknownNameError
-        For an unknown name, or a module or class that cannot be imported.
+        For an unknown name, a module or class that cannot be imported, a class in ``__main__`` or not of the kind, or
+        code named in a file without permission.
     """
     if name in known:
         return known[name]
@@ -97,7 +101,7 @@ def named(
     if "" not in sys.path:  # an installed script does not search the current folder
         sys.path.append("")
     try:
-        found: Any = getattr(import_module(module), attribute)
+        loaded: Any = getattr(import_module(module), attribute)
     except (KeyboardInterrupt, MemoryError):
         raise
     except BaseException as error:  # from user code: SystemExit would set the exit code
@@ -105,10 +109,10 @@ def named(
             f"{what} must be module:Class of a module that can be imported. Received {shown(name)}, which fails with "
             f"{type(error).__name__}: {error}. Run in the folder of the module, or add it to PYTHONPATH."
         ) from error
-    if not isclass(found) or not issubclass(found, kind) or isabstract(found) or not hasattr(found, "name"):
+    if not isclass(loaded) or not issubclass(loaded, kind) or isabstract(loaded) or not hasattr(loaded, "name"):
         raise UnknownNameError(
             f"{what} must be a concrete class derived from {kind.__name__}, with an attribute name. "
             f"Received {shown(name)}. Define its abstract methods and name."
         )
-    _imported.update(base.__module__ for base in found.__mro__ if base.__module__.partition(".")[0] not in _OURS)
-    return cast(type[Kind], found)
+    _imported.update(base.__module__ for base in loaded.__mro__ if base.__module__.partition(".")[0] not in _OURS)
+    return cast(type[Kind], loaded)

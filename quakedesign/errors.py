@@ -36,7 +36,7 @@ class QuakedesignError(Exception):
 
 
 class ParameterError(QuakedesignError, ValueError):
-    """An unphysical or meaningless value."""
+    """An argument of the wrong type, or with an unphysical or meaningless value."""
 
 
 class UnitError(QuakedesignError, ValueError):
@@ -48,7 +48,7 @@ class ScenarioError(QuakedesignError, ValueError):
 
 
 class RecordError(QuakedesignError, ValueError):
-    """A record of an experiment that cannot be read, is incomplete, or is unsuitable for the analysis."""
+    """A record of an experiment that cannot be read, is incomplete, or does not suit the analysis."""
 
 
 class UnknownNameError(QuakedesignError, KeyError):
@@ -96,7 +96,7 @@ def is_whole(value: object, least: float, most: float = math.inf) -> bool:
 
 
 def require_whole(least: int, **values: object) -> None:
-    """Raise unless all values are whole numbers of at least `least`; keywords are their names in the message."""
+    """Raise `ParameterError` unless all values are whole numbers ≥ `least`; keywords are their names in the message."""
     for name in (name for name, value in values.items() if not is_whole(value, least)):
         raise ParameterError(f"{name} must be a whole number of at least {least}. Received {values[name]!r}.")
 
@@ -110,8 +110,12 @@ def require_known(
     ----------
     name : object
         As received.
+    known : iterable of str
+        Valid names.
     what : str
         Kind of the name, such as ``"controller"``.
+    refusal : type of QuakedesignError
+        Class of the error.
 
     Raises
     ------

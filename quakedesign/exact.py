@@ -41,8 +41,8 @@ def rational(value: float | str | Fraction, name: str = "value") -> Fraction:
     Raises
     ------
     ParameterError
-        When the value is not finite; has more than 300 characters or 308 digits (a `Fraction` may have any length); or
-        has a real type that is not rational (such as a long double) and no float equals it.
+        When the value is not a finite number; has more than 300 characters or 308 digits (a `Fraction` may have any
+        length); or has a real type that is not rational (such as a long double) and no float equals it.
     """
     if isinstance(value, Fraction):
         return value if type(value) is Fraction else Fraction(value)
@@ -243,7 +243,7 @@ class Bound(Fraction):
         return rounded, rounded.adjusted()
 
     def _whole(self, factor: int) -> int:
-        """Number of multiples of 1/factor in the bound, rounded outward."""
+        """The bound in units of 1/factor, rounded outward."""
         return (math.ceil if self._side == ROUND_CEILING else math.floor)(self * factor)
 
     def _scientific(self, digits: int) -> str:

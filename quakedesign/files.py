@@ -51,7 +51,7 @@ def parse_toml(text: str) -> Json:
 def read_text(
     path: str | Path, what: str, *, largest: int, refusal: type[QuakedesignError], marked: bool = True
 ) -> str:
-    """Text of a file in UTF-8; `marked` accepts and removes a byte-order mark; other parameters as in `read_bytes`."""
+    """Text of a file in UTF-8; `marked` accepts and removes a byte-order mark; otherwise as `read_bytes`."""
     try:
         return read_bytes(path, what, largest=largest, refusal=refusal).decode("utf-8-sig" if marked else "utf-8")
     except UnicodeDecodeError:
@@ -69,7 +69,7 @@ def read_bytes(path: str | Path, what: str, *, largest: int, refusal: type[Quake
     largest : int
         Largest size [byte].
     refusal : type of QuakedesignError
-        Error that is raised when the file cannot be read, is larger, or is a pipe, a device or a folder.
+        Class of the error that is raised when the file cannot be read, is larger, or is a pipe, a device or a folder.
     """
     try:
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as handle:
@@ -127,7 +127,7 @@ def lock_of(target: Path) -> tuple[Path, int | None]:
     """Lock a path until `unlock`, by a temporary folder in its parent folder; return this folder and its descriptor.
 
     A command on another machine does not see the lock. The descriptor is None on a file system without locks, or if
-    the folder cannot be made; then other processes are not kept out.
+    the folder cannot be made; then other processes are not excluded.
 
     Raises
     ------
@@ -250,9 +250,9 @@ def _discard(folder: Path) -> None:
         aside = list((folder / ASIDE).glob("*"))
     except OSError:  # the path cannot exist
         aside = []
-    for held in aside:
-        if not (place := folder.parent / held.name).exists():
-            os.replace(held, place)
+    for moved in aside:
+        if not (place := folder.parent / moved.name).exists():
+            os.replace(moved, place)
     shutil.rmtree(folder, ignore_errors=True)
     _mine.discard(folder)
 
@@ -265,7 +265,13 @@ _LONGEST_NAME = 200  # of the 255 bytes of most systems; the rest is for added p
 
 
 def require_writable(path: Path) -> None:
-    """Reject a path that cannot be written, before the work begins, and clean up after killed processes there."""
+    """Reject a path that cannot be written, before the work begins, and clean up after killed processes there.
+
+    Raises
+    ------
+    OutputError
+        If the name is longer than 200 bytes, or the folder cannot be written.
+    """
     parent, length = path.absolute().parent, len(path.name.encode(errors="surrogatepass"))
     if length > _LONGEST_NAME:
         raise OutputError(
@@ -293,6 +299,11 @@ def lock_folder(folder: Path, *, make: bool = False) -> bool:
     ----------
     make : bool
         Make missing parent folders.
+
+    Raises
+    ------
+    OutputError
+        If another command writes the folder, or it cannot be written.
     """
     place = Path(os.path.realpath(folder))
     if place in _held:

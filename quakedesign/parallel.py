@@ -1,6 +1,6 @@
 """Executors for independent tasks, worker processes, and handling of interrupts.
 
-Chapters: background thread; signals that end a command (exit code of the shell, temporary folders removed);
+Chapters: background thread; signals that end a command (exit code as in a shell, temporary folders removed);
 worker processes that end with their parent; the choice between this process, local workers and any executor
 of `concurrent.futures`.
 """
@@ -43,7 +43,7 @@ _REPORT_INTERVAL = 0.2  # time between two reports of progress [s]
 
 
 class Background:
-    """Queue of runs in a second thread; they proceed in parallel, since compiled code releases the interpreter lock."""
+    """Queue of runs in a second thread, parallel to the caller, since compiled code releases the interpreter lock."""
 
     def __init__(self, executor: Executor) -> None:
         self._executor = executor
@@ -99,8 +99,8 @@ PATIENCE = 3.0  # longest wait [s] for a library that swallows the signal or doe
 class Interruption(KeyboardInterrupt):
     """Exception raised by a signal that ends the command.
 
-    It is a subclass because Python ends itself with SIGINT, and ignores a requested exit code, after a plain
-    `KeyboardInterrupt` inside ``exec`` of a text, as in generated classes.
+    After a plain `KeyboardInterrupt` inside ``exec`` of a text, as in generated classes, Python ends itself with SIGINT
+    and ignores a requested exit code; after a subclass it does not.
     """
 
 
@@ -174,8 +174,9 @@ class _Ending:
         number = self._number or signal.SIGINT
         if not self._said:
             self._said = True
-            kept = "nothing was written" if number_placed() == self._before else "all files written so far are complete"
-            _say(one_line(f"quakedesign: {SIGNALS[number]}; {self.remedy or kept}."))
+            nothing = number_placed() == self._before
+            files = "nothing was written" if nothing else "all files written so far are complete"
+            _say(one_line(f"quakedesign: {SIGNALS[number]}; {self.remedy or files}."))
         return 128 + number
 
 
@@ -330,9 +331,9 @@ class Crew(ABC):
             try:
                 futures = {self.submit(task, *given): place for place, given in waiting.items()}
                 for future in as_completed(futures):
-                    answer = future.result()
+                    result = future.result()
                     del waiting[futures[future]]
-                    yield futures[future], answer
+                    yield futures[future], result
                 return
             except BrokenExecutor:
                 self.renew()
@@ -360,6 +361,13 @@ class Processes(Crew):
         Number of processes; by default one per core that this process may use.
     begin : callable, optional
         Called in every process before its first task, with `arguments`.
+    arguments : tuple
+        Arguments of `begin`.
+
+    Raises
+    ------
+    ParameterError
+        If the count is not a positive whole number.
     """
 
     def __init__(
@@ -382,7 +390,7 @@ class Processes(Crew):
         with signals_delayed():  # so that every started process is registered
             try:
                 return self._pool.submit(task, *arguments)
-            except (OSError, ValueError) as error:  # the death of a process closed the pipes of the starting one
+            except (OSError, ValueError) as error:  # the death of a process closed the pipes of the one being started
                 raise BrokenProcessPool("a process of the pool died while another was started") from error
 
     def renew(self) -> None:
@@ -409,7 +417,7 @@ def cores() -> int:
 
 
 def require_workers(count: int) -> int:
-    """Return a number of workers, or raise `ParameterError` if it is no positive whole number."""
+    """Return a number of workers, or raise `ParameterError` if it is not a positive whole number."""
     require_whole(1, workers=count)
     return count
 
@@ -481,6 +489,8 @@ class UserExecutor(Crew):
 
     Parameters
     ----------
+    executor : Executor
+        Executor of the tasks.
     width : int or None
         Number of simultaneous tasks; by default one per core.
     """
@@ -610,7 +620,7 @@ def crew_of(workers: int | None, scheduler: str | None = None, executor: Executo
     ParameterError
         For both a scheduler and an executor, or an invalid number of workers.
     SimulationError
-        When the scheduler cannot be reached.
+        When dask.distributed is not installed, or the scheduler cannot be reached or has no workers.
     """
     if scheduler and executor:
         raise ParameterError("give a scheduler or an executor. Received both. Omit one of them.")

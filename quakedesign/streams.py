@@ -11,9 +11,9 @@ if sys.platform != "win32":
 
 LACKS_MEMORY = 4
 """Exit code of a command that ran out of memory, without a result."""
-_NARROWEST, _WIDEST = 20, 1000  # columns; below 3 help layout loops endlessly; huge widths fill the memory with blanks
+_NARROWEST, _WIDEST = 20, 1000  # columns; below 3 the layout of help never ends, and huge widths fill the memory
 _LEAST = 600 * 2**20  # bytes of address space
-_SAID = ("cannot allocate memory", "failed to map", "out of memory", "can't start new thread", "std::bad_alloc")
+_MESSAGES = ("cannot allocate memory", "failed to map", "out of memory", "can't start new thread", "std::bad_alloc")
 
 
 def open_all() -> None:
@@ -74,7 +74,7 @@ def lacks_memory(error: BaseException | None) -> bool:
         if (
             isinstance(error, MemoryError)
             or number == errno.ENOMEM
-            or any(said in str(error).lower() for said in _SAID)
+            or any(said in str(error).lower() for said in _MESSAGES)
         ):
             return True
         error = error.__cause__ or error.__context__

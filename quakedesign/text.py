@@ -8,7 +8,8 @@ from itertools import takewhile
 from math import floor, log10
 from unicodedata import category
 
-_CONTROL_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}  # controls, formats, surrogates, separators of lines
+# controls, formats, surrogates, private and unassigned characters, separators of lines and paragraphs
+_CONTROL_CATEGORIES = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}
 _LONG = 8  # least length of a name that may be the beginning of a longer one
 _LONGEST_WORD = 200
 _LONGEST_MESSAGE = 2000
@@ -26,7 +27,7 @@ def visible(text: str) -> str:
 
 
 def one_line(message: str) -> str:
-    """Message in one visible line; the middle of long words, such as paths, and of long messages is cut out."""
+    """Message as one line of visible characters; the middle of long words (such as paths) and messages is cut out."""
     short = re.sub(rf"\S{{{_LONGEST_WORD + 1},}}", lambda word: _shortened(word[0], _LONGEST_WORD), message)
     return _shortened(visible(" ".join(short.split())), _LONGEST_MESSAGE)
 
@@ -64,7 +65,7 @@ def _place(division: tuple[int, int]) -> int:
 
 
 def nearest_name(name: str, known: Iterable[str]) -> str:
-    """Question at the end of a message whether the nearest known name is meant; empty if none is near.
+    """Suggestion " Did you mean NAME?" of the nearest known name, for the end of a message; empty if none is near.
 
     Case is ignored. Of equally near names the one with the longest common beginning is chosen; for a long name that is
     the beginning of others, the first of these in alphabetical order.
@@ -127,7 +128,7 @@ def power_of(value: float) -> int:
 
 
 def plain(value: float, digits: int = 3) -> str:
-    """Number with significant digits; without a power of ten from 1e-4 to 1e15."""
+    """Number with `digits` significant digits, without a power of ten from 1e-4 to 1e15."""
     return f"{float(f'{value + 0.0:.{digits}g}'):.15g}"
 
 

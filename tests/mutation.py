@@ -131,7 +131,7 @@ def is_text(parent: ast.AST, name: str, index: int | None) -> bool:
             return True
         case ast.Call(func=ast.Name(id="need" | "require")):
             return name == "args" and index != 0
-        case ast.Call(func=ast.Name(id="refuse" | "_refuse" | "reject" | "_reject" | "_without")):
+        case ast.Call(func=ast.Name(id="refuse" | "_refuse" | "reject" | "_reject" | "_unsupported")):
             return name == "args"
     return name in ("annotation", "returns", "decorator_list", "format_spec", "ctx")
 

@@ -50,7 +50,7 @@ def test_a_proof_about_a_polynomial_says_nothing_about_a_fault(tmp_path):
     assert verdict == "proved"
     assert not any(line.endswith("exact arithmetic") for line in said)
     about = checked(path, "lab-fault")
-    assert about == ("proved", [*said, 'names no fault: not compared with "lab-fault"'])
+    assert about == ("proved", [*said, 'the file names no fault: not compared with "lab-fault"'])
     raw = json.loads(path.read_text())
     first = next(iter(raw["polynomial"]))
     raw["polynomial"][first] = "7"

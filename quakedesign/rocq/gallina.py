@@ -67,7 +67,7 @@ def in_integers(
         and is not scaled. By default the common denominator of the polynomial and its constraints.
     """
     common = clearing(statement) if constraints is None else constraints
-    grams = [_over_wholes(square, common) for square in squares]
+    grams = [_cleared_gram(square, common) for square in squares]
     shares = [scaled(q, Fraction(1, common)) for q in cofactors]
     scale = lcm(1, *(v.denominator for rows in grams for row in rows for v in row), *map(denominator, shares))
     factor = denominator(statement.multiplier)
@@ -87,7 +87,7 @@ def scaled(polynomial: Polynomial, factor: int | Fraction) -> Polynomial:
     return {e: c * factor for e, c in polynomial.items()}
 
 
-def _over_wholes(square: Square, common: int) -> list[list[Fraction]]:
+def _cleared_gram(square: Square, common: int) -> list[list[Fraction]]:
     """Gram matrix for constraints scaled by a number and a basis scaled by its denominators."""
     weight = common ** len(square.product)
     basis = [denominator(as_polynomial(b)) for b in square.basis]
@@ -130,7 +130,7 @@ def multiplier_reason(statement: Statement, squares: Sequence[Square]) -> Reason
     Raises
     ------
     CertificateError
-        If its Gram matrix is not positive definite.
+        If the Gram matrix of the multiplier is not positive definite.
     """
     if not squares:
         return Reason()
@@ -182,7 +182,7 @@ def listed(entries: Iterable[str], joint: str = "; ") -> str:
 
 
 def integer(number: int) -> str:
-    """Integer as a literal; hexadecimal from ten digits on, which coqc reads in half the time."""
+    """Integer as a literal; from ten digits on hexadecimal, which coqc reads in half the time."""
     short = abs(number) < 10**9
     text = str(abs(number)) if short else hex(abs(number))
     return f"-{text}" if number < 0 else text

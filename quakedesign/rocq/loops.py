@@ -17,7 +17,7 @@ _POINTS = "forall x, nowhere_zero x ->"
 class Columns:
     """Variables of the loop in Rocq, in order: states, lifts with a variable, V if a decay is claimed, other lifts.
 
-    Of the other lifts only the sign is used. `weights` are the homogeneity weights of all variables, by name.
+    Lifts are arguments of nested powers; of the others, only the sign is used. `weights`: homogeneity weights by name.
     """
 
     weights: Mapping[str, int]
@@ -56,7 +56,7 @@ def _power(exponent: Fraction, kind: str) -> str:
 def loop_theorems(evidence: Evidence) -> Iterator[str]:
     """Definitions of a loop on cells, and theorems about V and its derivative along the field.
 
-    They follow the definition `questions` and the theorem `certificate` that all these questions hold.
+    In the file, they follow the definition `questions` and the theorem `certificate` that all these questions hold.
     """
     loop, obligations = evidence.loop, Obligations(evidence.loop, evidence.lyapunov)
     m = obligation_degree([p for _, p in obligations.function()], "V")
@@ -67,9 +67,9 @@ def loop_theorems(evidence: Evidence) -> Iterator[str]:
     for claim, names in claims.items():
         if claim in evidence.claims:
             yield _bound(claim, columns.magnitudes(evidence.claims[claim], names, m))
-    yield _fall("decrease", columns.magnitudes(evidence.claims["decrease"], loop.states, n))
+    yield _decrease("decrease", columns.magnitudes(evidence.claims["decrease"], loop.states, n))
     if "decay" in evidence.claims:
-        yield _fall("decay", columns.magnitudes(evidence.claims["decay"], (_POTENTIAL,), n))
+        yield _decrease("decay", columns.magnitudes(evidence.claims["decay"], (_POTENTIAL,), n))
     everything = ", ".join(["certificate", *(c for c in (*claims, "decrease", "decay") if c in evidence.claims)])
     yield f"Definition everything := ({everything}).\nPrint Assumptions everything."
 
@@ -120,7 +120,7 @@ def _bound(claim: str, margin: str) -> str:
     )
 
 
-def _fall(claim: str, margin: str) -> str:
+def _decrease(claim: str, margin: str) -> str:
     data = f"columns arguments ranges questions function field margin_{claim}"
     derivative = "derivable_pt_lim (fun t => expression_value (update x i t) (listed p) function) (x i) (d i)"
     return "\n".join(

@@ -27,7 +27,7 @@ from quakedesign.guarantees.exact.stick_slip_set import (
 from quakedesign.rocq import gallina
 
 _BITS, _GRAIN = 80, 40  # binary places of numbers and of multipliers in polytope.v
-_CLOSE = 2.0**-30  # a bound by multipliers is used if below 1 − this; otherwise the facet's own inequality is used
+_CLOSE = 2.0**-30  # a bound by multipliers is used if below 1 − `_CLOSE`; otherwise the facet's own inequality is used
 _DIGITS = 12  # significant digits of the ends of ranges, rounded outward
 _OFF = 77  # bits of accuracy of the polynomials for the impulse responses
 _MOST_TERMS = 400
@@ -36,34 +36,37 @@ _PAIRS = {0: (0, 0), 1: (0, 1), 2: (1, 0), 3: (1, 1), 4: (2, 0), 7: (2, 1), 5: (
 
 
 def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
-    """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant."""
-    task, loop, reach = claim.task, claim.sampled_loop, claim.invariant_set
+    """Loop, facets, responses, multipliers and theorem of a guarantee on the stick–slip plant.
+
+    Raises `UnsupportedError` for aperiodic sampling, or a sampling time that is too long (see `_terms`).
+    """
+    task, loop, polytope = claim.task, claim.sampled_loop, claim.invariant_set
     if loop.longest_step:
         raise UnsupportedError("Rocq verifies only periodic sampling. Received aperiodic sampling. Use check.py.")
     with ctx.workprec(BITS):
-        push, moved = _outward(*feedback_range(task, loop, reach)), task.reference_rates[0] * loop.step
-        bounds = ranges(task, reach.box[0] + moved, push, reach.box[1] * loop.step)
+        feedback, moved = _outward(*feedback_range(task, loop, polytope)), task.reference_rates[0] * loop.step
+        bounds = ranges(task, polytope.box[0] + moved, feedback, polytope.box[1] * loop.step)
         bounds = replace(bounds, **{name: _outward(*getattr(bounds, name)) for name in ("slope", "damping", "chord")})
-        (period,) = periods = Period.deciding(BALLS, task, loop, bounds, reach.box[1], push)
-        deciding = verifiers(task, loop, reach, bounds)
-        sliding, resting = (_hints(deciding, rows) for rows in facet_rows(periods, reach))
+        (period,) = periods = Period.deciding(BALLS, task, loop, bounds, polytope.box[1], feedback)
+        deciding = verifiers(task, loop, polytope, bounds)
+        sliding, resting = (_hints(deciding, rows) for rows in facet_rows(periods, polytope))
         yield _loop(period)
         yield (
             "Definition facets : list facet :=\n  "
-            + gallina.listed(map(_facet, reach.facets, reach.multipliers), ";\n   ")
+            + gallina.listed(map(_facet, polytope.facets, polytope.multipliers), ";\n   ")
             + "."
         )
         yield f"Definition known : responses near :=\n  {_responses(period)}."
-        count, falls = len(reach.facets), [row[2] <= 0 for row in reach.facets]
+        count, falls = len(polytope.facets), [row[2] <= 0 for row in polytope.facets]
         by_slide, by_rest = _by_slide(sliding, count), _by_rest(resting, falls)
-        pushed = _pushed(deciding[:3], period)
+        pairs = _feedback_bounds(deciding[:3], period)
     for name, kind, entries in (
         ("hints_of_slides", "list (list hint)", by_slide),
         ("hints_of_rests", "list (list pair)", by_rest),
     ):
         yield f"Definition {name} : list ({kind}) :=\n  " + gallina.listed(entries, ";\n   ") + "."
-    low, high = map(gallina.rational, push)
-    yield f"Definition proposed : proposals :=\n  Proposals hints_of_slides hints_of_rests {low} {high}\n  {pushed}."
+    low, high = map(gallina.rational, feedback)
+    yield f"Definition proposed : proposals :=\n  Proposals hints_of_slides hints_of_rests {low} {high}\n  {pairs}."
     stated = (getattr(claim.claims, one.name) for one in fields(claim.claims))
     numbers = map(gallina.rational, (*stated, *bounds.rest_pressure))
     yield f"Definition claimed : claims := Claims {' '.join(numbers)}."
@@ -79,7 +82,7 @@ def polytope_theorem(claim: StickSlipProof) -> Iterator[str]:
 
 
 def _outward(low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
-    """A range rounded outward to ends with few digits; 0 stays."""
+    """A range rounded outward to ends with few digits; an end of 0 is unchanged."""
     size = max(abs(low), abs(high))
     unit = Fraction(10) ** (ceil(log10(size)) - _DIGITS) if size else Fraction(1)
     return (floor(low / unit) - 1) * unit if low else low, (ceil(high / unit) + 1) * unit if high else high
@@ -120,12 +123,7 @@ def _terms(period: Period) -> str:
     """Text "terms n": number of terms of the Taylor polynomials of the impulse responses, and n with e^(KT) <= 3^n.
 
     K is the growth rate of the error of the polynomials [1/s] and T the sampling time [s].
-
-
-    Raises
-    ------
-    UnsupportedError
-        For a period that is too long compared with the time scales of the plant.
+    Raises `UnsupportedError` for a sampling time that is too long compared with the time scales of the plant.
     """
     step, (s, w) = (
         period.sampled_loop.step,
@@ -224,7 +222,8 @@ def _by_rest(given: Iterator[tuple[Rows, dict[int, _Hint]]], falls: list[bool]) 
     return texts
 
 
-def _pushed(slices: list[Verifier], period: Period) -> str:
+def _feedback_bounds(slices: list[Verifier], period: Period) -> str:
+    """Multipliers that bound the feedback U = p* − p at a sample below and above, for the first three verifiers."""
     law = period.sampled_loop.law
     row = law.target_gain * law.return_rate, law.rate_gain, Fraction(1)
     factors = EXACT.middle(EXACT.array([[-v for v in row], row]))

@@ -78,7 +78,7 @@ def write_rocq(paths: Iterable[Path], folder: Path, *, force: bool = False) -> d
     Raises
     ------
     OutputError
-        If a file exists or cannot be written, or two certificates would have the same file NAME.v.
+        If a file exists (without `force`) or cannot be written, or two certificates would have the same file NAME.v.
     CertificateError
         If a certificate cannot be read, or violates a rule of FORMAT.md.
     """

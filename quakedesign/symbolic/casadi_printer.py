@@ -14,7 +14,7 @@ from sympy.codegen.cfunctions import expm1
 from quakedesign.errors import ParameterError
 from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower
 
-Value = ca.SX | np.ndarray | float  # of an expression, by the symbols in it
+Value = ca.SX | np.ndarray | float  # value of a symbol or an expression
 Values = Mapping[sp.Symbol, Value]
 Operations = Mapping[type[sp.Basic], Callable[..., Value]]
 
@@ -25,7 +25,7 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Values, motion: Sequence[c
     Parameters
     ----------
     expressions : sequence of Expr
-        Expressions of signed and absolute powers, sums, products, powers, comparisons and elementary functions.
+        Of signed and absolute powers, sums, products, powers, Max, Min, Abs, sign, Piecewise and elementary functions.
     values : mapping of Symbol to SX
         Value of every free symbol.
     motion : sequence of SX
@@ -42,14 +42,14 @@ def to_casadi(expressions: Sequence[sp.Expr], values: Values, motion: Sequence[c
     Raises
     ------
     ParameterError
-        If a symbol has no value, or an operation is not supported.
+        If a symbol has no value, an operation is not supported, or the last branch of a Piecewise is conditional.
     """
     table = {**_casadi_operations(), **(_kinks(ca.vertcat(*motion)) if motion else {})}
     return [ca.SX(item) for item in _translate(expressions, values, table)]
 
 
 def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Value]) -> list[Value]:
-    """Evaluate expressions at floats or at NumPy arrays of one shape, with the operations of `to_casadi`.
+    """Values of expressions at floats or at NumPy arrays of one shape, with the operations of `to_casadi`.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def to_numpy(expressions: Sequence[sp.Expr], values: Mapping[sp.Symbol, Value]) 
     Raises
     ------
     ParameterError
-        If a symbol has no value, or an operation is not supported.
+        As in `to_casadi`.
     """
     return _translate(expressions, values, _numpy_operations())
 
@@ -122,8 +122,8 @@ def _power(library: ModuleType, base: Value, exponent: sp.Expr) -> Value:
 
 def _powers(library: ModuleType) -> dict[type[sp.Basic], Callable[..., Value]]:
     def signed(x: Value, a: sp.Expr) -> Value:
-        way: Value = library.sign(x)
-        return way if a == 0 else way * _power(library, library.fabs(x), a)
+        sign: Value = library.sign(x)
+        return sign if a == 0 else sign * _power(library, library.fabs(x), a)
 
     def absolute(x: Value, a: sp.Expr) -> Value:
         return _power(library, library.fabs(x), a)
@@ -214,7 +214,7 @@ def vectorised(function: ca.Function) -> Callable[..., "np.ndarray"]:
     ParameterError
         If the function contains an unsupported CasADi operation.
     """
-    steps: list[tuple[int, list[int], Any]] = []  # operation, places of results, places of arguments or a constant
+    steps: list[tuple[int, list[int], Any]] = []  # operation, indices of results, and of arguments (or a constant)
     for k in range(function.n_instructions()):
         code, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
         if code not in (ca.OP_CONST, ca.OP_INPUT, ca.OP_OUTPUT) and code not in _INSTRUCTIONS:

@@ -28,7 +28,7 @@ from quakedesign.symbolic.signed_power import AbsolutePower, SignedPower, slope_
 #
 # Rational operations are exact, so that an attained bound has no rounding error; python-flint rounds the others
 # outwards to `_BITS` bits. At a jump of `Heaviside` or `sign`, from derivatives of Max, Min and Abs, the enclosure
-# contains every value between both sides; if a box only touches the jump, only the value on the side of the box.
+# contains every value between both sides; if the box only touches the jump, only the value on its own side.
 
 End = Fraction | float  # the only floats are −inf and inf
 Interval = tuple[End, End]
@@ -40,7 +40,7 @@ _BITS = 256
 _LONGEST = 3 * _BITS  # bits of a numerator or denominator beyond which an end is rounded
 _LARGEST = 16 * _BITS  # largest magnitude of a binary exponent of an end; see `upper_end`
 _POWERS = sp.Pow, SignedPower, AbsolutePower
-_RISING: dict[type[sp.Basic], Interval] = {  # with their limits at −inf and inf
+_RISING: dict[type[sp.Basic], Interval] = {  # increasing functions, with their limits at −inf and inf
     sp.exp: (_ZERO, inf),
     sp.log: EVERYTHING,
     sp.asinh: EVERYTHING,
@@ -51,7 +51,7 @@ _RISING: dict[type[sp.Basic], Interval] = {  # with their limits at −inf and i
 
 
 def interval(expression: sp.Expr, box: Box) -> Interval:
-    """Interval that contains every value of an expression on a box; (−∞, ∞) if the expression may be undefined there.
+    """Interval that contains every value of an expression on a box; (−∞, ∞) for an undefined power or logarithm.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def interval(expression: sp.Expr, box: Box) -> Interval:
         Built from numbers, real symbols, +, ·, powers, exp, log, sin, cos, asinh, sinh, tanh, Abs, Max, Min, signed
         powers, and the functions in the derivatives of these.
     box : mapping of Symbol to (low, high)
-        Fractions, or −inf and inf.
+        Range of every symbol; ends are Fractions, −inf or inf.
 
     Raises
     ------
@@ -70,10 +70,10 @@ def interval(expression: sp.Expr, box: Box) -> Interval:
 
 
 def regular(expression: sp.Expr, box: Box) -> bool:
-    """Whether an expression has no pole, no boundary point of its domain and no jump of a signed power on a box.
+    """Whether the arguments of logarithms, and of powers with exponents other than 1, 2, 3, …, do not vanish on a box.
 
-    If so, its derivatives off the kinks determine its monotonicity; jumps of `Heaviside` and `sign` appear in them as
-    `DiracDelta`.
+    The expression then has no pole and no jump of a signed power on the box, and its derivatives off the kinks
+    determine its monotonicity; jumps of `Heaviside` and `sign` appear in them as `DiracDelta`.
     """
     intervals = _intervals(expression, box)
     ends = [intervals[node.args[0]] for node in intervals if _singular_at_zero(node)]
@@ -117,10 +117,10 @@ def _operate(node: sp.Basic, walk: Callable[[sp.Basic], Interval]) -> Interval:
         return _OPERATIONS[node.func]([walk(argument) for argument in node.args])
     if node.func in _RISING:
         return _rising(node.func, walk(node.args[0]))
-    return _without(str(node) if node.is_Symbol else node.func.__name__)
+    return _unsupported(str(node) if node.is_Symbol else node.func.__name__)
 
 
-def _without(what: str) -> NoReturn:
+def _unsupported(what: str) -> NoReturn:
     raise UnsupportedError(
         f"no enclosure for {what}: use rational powers, exp, log, sin, cos, asinh, sinh, tanh, Abs, Min and Max only."
     )
@@ -154,7 +154,7 @@ def _product(a: End, b: End) -> End:
     return a * b
 
 
-def _size(a: Interval) -> Interval:
+def _magnitude(a: Interval) -> Interval:
     return max(a[0], -a[1], _ZERO), max(-a[0], a[1])
 
 
@@ -168,12 +168,12 @@ def _reciprocal(a: Interval) -> Interval:
 
 def _power(base: Interval, exponent: sp.Expr) -> Interval:
     if not exponent.is_Rational:
-        _without(f"the exponent {exponent}")
+        _unsupported(f"the exponent {exponent}")
     if exponent < 0:
         return _reciprocal(_power(base, -exponent))
     if not exponent.is_Integer:
         return EVERYTHING if base[0] < 0 else (_root(base[0], exponent, up=False), _root(base[1], exponent, up=True))
-    n, (low, high) = int(exponent), base if exponent % 2 else _size(base)
+    n, (low, high) = int(exponent), base if exponent % 2 else _magnitude(base)
     return low**n, high**n
 
 
@@ -186,7 +186,7 @@ def _signed_power(x: Interval, exponent: sp.Expr, *, signed: bool) -> Interval:
     if exponent == 0:
         return _sign([x])
     if not signed or x[0] >= 0:
-        return _power(_size(x), exponent)
+        return _power(_magnitude(x), exponent)
     if x[1] <= 0:
         return negative(_power(negative(x), exponent))
     return negative(_power((_ZERO, -x[0]), exponent))[0], _power((_ZERO, x[1]), exponent)[1]
@@ -272,10 +272,10 @@ _OPERATIONS: dict[type[sp.Basic], Callable[[list[Interval]], Interval]] = {
     sp.Mul: lambda arguments: reduce(times, arguments),
     sp.Max: _extreme(max),
     sp.Min: _extreme(min),
-    sp.Abs: lambda arguments: _size(arguments[0]),
+    sp.Abs: lambda arguments: _magnitude(arguments[0]),
     sp.sin: _wave("sin"),
     sp.cos: _wave("cos"),
-    sp.cosh: lambda arguments: _rising(sp.cosh, _size(arguments[0])),
+    sp.cosh: lambda arguments: _rising(sp.cosh, _magnitude(arguments[0])),
     sp.Heaviside: _step,
     sp.sign: _sign,
     sp.DiracDelta: _impulse,
@@ -283,7 +283,7 @@ _OPERATIONS: dict[type[sp.Basic], Callable[[list[Interval]], Interval]] = {
 
 
 def _rounded(a: Interval) -> Interval:
-    """Interval with ends of too many bits rounded outwards."""
+    """Interval whose ends are rounded outwards if they have more than `_LONGEST` bits."""
 
     def end(x: End, *, up: bool) -> End:
         if isinstance(x, float) or max(x.numerator.bit_length(), x.denominator.bit_length()) <= _LONGEST:
@@ -298,7 +298,7 @@ def _rounded(a: Interval) -> Interval:
 
 BallBox = Mapping[sp.Symbol, tuple[Fraction, Fraction]]
 Operation = Callable[[list[arb]], Any]
-Work = list[tuple[int, Operation, list[int]]]
+Work = list[tuple[int, Operation, list[int]]]  # index of the result, operation, indices of its arguments
 
 
 def ball(low: Fraction, high: Fraction) -> arb:
@@ -329,7 +329,7 @@ def enclose(expression: sp.Expr, box: BallBox) -> arb:
 
 
 class _Operations:
-    """An expression as a list of ball operations, with each subexpression once."""
+    """An expression as a list of ball operations; each subexpression occurs once."""
 
     def __init__(self, expression: sp.Expr) -> None:
         places: dict[sp.Expr, int] = {}
@@ -361,19 +361,19 @@ class _Operations:
         results = self._start.copy()
         for symbol, index in self._places.items():
             results[index] = balls[symbol]
-        return _worked(results, self._work)
+        return _evaluated(results, self._work)
 
     def moved(self, results: list[arb], symbol: sp.Symbol, changed: arb) -> list[arb]:
         """Results for another ball of one symbol: only subexpressions with this symbol are recomputed."""
         results = results.copy()
         results[self._places[symbol]] = changed
-        return _worked(results, self._after[symbol])
+        return _evaluated(results, self._after[symbol])
 
 
 _compiled = lru_cache(maxsize=64)(_Operations)
 
 
-def _worked(results: list[arb], work: Work) -> list[arb]:
+def _evaluated(results: list[arb], work: Work) -> list[arb]:
     for i, operation, arguments in work:
         results[i] = operation([results[j] for j in arguments])
     return results
@@ -414,11 +414,11 @@ def _operation(e: sp.Expr) -> Operation:
         return _monotone(e.args[1], signed=e.func is SignedPower)
     methods = {sp.exp: "exp", sp.sin: "sin", sp.cos: "cos", sp.log: "log", sp.asinh: "asinh", sp.Abs: "__abs__"}
     if (method := methods.get(type(e))) is None:
-        return _without_ball(type(e).__name__)
+        return _unsupported_ball(type(e).__name__)
     return lambda values: getattr(values[0], method)()
 
 
-def _without_ball(what: str) -> Operation:
+def _unsupported_ball(what: str) -> Operation:
     def reject(values: list[arb]) -> arb:
         raise UnsupportedError(f"no enclosure for {what}: use rational powers, exp, log, sin, cos, asinh, Min, Max.")
 
@@ -434,7 +434,7 @@ def _ball_power(exponent: sp.Expr) -> Operation:
     if exponent.is_Rational:
         power = arb(fmpq(int(exponent.p), int(exponent.q)))
         return lambda values: values[0] ** power
-    return _without_ball(f"the exponent {exponent}")
+    return _unsupported_ball(f"the exponent {exponent}")
 
 
 def _integer_power(base: arb, n: int) -> arb:
@@ -452,7 +452,7 @@ def _integer_power(base: arb, n: int) -> arb:
 
 def _monotone(exponent: sp.Expr, *, signed: bool) -> Operation:
     if not exponent.is_Rational:
-        return _without_ball(f"the exponent {exponent}")
+        return _unsupported_ball(f"the exponent {exponent}")
     power = arb(fmpq(int(exponent.p), int(exponent.q)))
     negative, jumps = bool(exponent < 0), signed and bool(exponent == 0)
 
@@ -495,7 +495,7 @@ def upper_bound(
     pieces : int
         Largest number of subdivisions; the bound is rigorous even if this number is reached.
     limit : Fraction, optional
-        Stop as soon as the bound is below the limit, or an attained value shows that it cannot be.
+        Stop as soon as the bound is below the limit, or an attained value is not below it.
 
     Raises
     ------
@@ -523,7 +523,7 @@ def upper_bound(
     result = -heap[0][0]
     if result == float("inf"):
         raise ParameterError(
-            f"no finite bound was found in {pieces} subdivisions of the box. The expression may be undefined in it. "
+            f"no finite bound was found in {pieces} subdivisions of the box. The expression may be undefined there. "
             "Narrow the ranges."
         )
     return Fraction(result)
@@ -536,7 +536,7 @@ def _balls(box: BallBox) -> dict[sp.Symbol, arb]:
 def _halves(
     operations: _Operations, box: dict[sp.Symbol, tuple[Fraction, Fraction]], values: list[arb]
 ) -> list[tuple[dict[sp.Symbol, tuple[Fraction, Fraction]], list[arb]]]:
-    """Halves of the box along the side that lowers the bound most, with the balls of all subexpressions."""
+    """Halves of the box along the side whose bisection lowers the bound most, with the balls of all subexpressions."""
     best: list[tuple[dict[sp.Symbol, tuple[Fraction, Fraction]], list[arb]]] = []
     least: End | None = None
     for symbol, (low, high) in box.items():
@@ -563,7 +563,7 @@ def _upper(enclosure: arb) -> End:
 # ----------------------------------------------------------------------
 # Decision whether an expression stays below a limit on a box, by subdivision in interval arithmetic.
 
-PIECES = 600
+PIECES = 600  # largest number of subdivisions
 FURTHEST = 10**60  # beyond this a half-line is not divided further
 
 
@@ -666,7 +666,7 @@ class _Form:
     def upper_face(self, box: Box) -> Box:
         """Face of a box on which the expression is largest, by the signs of its derivatives if these are definite.
 
-        With jumps in the expression, the half of the box at this face, so that the side of the jump stays known.
+        If the expression may jump, it is the half of the box at this face, which lies on one side of a jump there.
         """
         if not regular(self.expression, box):
             return box

@@ -16,7 +16,7 @@ from quakedesign.symbolic.rate_and_state_plant import without_overflow
 from quakedesign.symbolic.signed_power import SignedPower, slope_off_kinks
 
 SLACK = Fraction(1, 10**9)  # relative tolerance for declared values that are rounded inward
-_NOTHING = Fraction(0)
+_ZERO = Fraction(0)
 _UNITS = {"slip": "m", "rate": "m/s"}
 
 
@@ -27,8 +27,8 @@ class FrictionBounds:
     # least, most: Bounds of the friction coefficient [-], 0 < least
     least: Fraction
     most: Fraction
-    slip_slope: Fraction  # Largest chord slope in slip [1/m]; with state variables, along a motion in which they evolve
-    rate_slope: Fraction  # Largest chord slope in slip rate [s/m], at a fixed state
+    slip_slope: Fraction  # Largest |chord slope| in slip [1/m]; with states, along a motion in which they evolve
+    rate_slope: Fraction  # Largest |chord slope| in slip rate [s/m], at a fixed state
     weakens: bool  # Whether friction is proved not to grow with slip
 
 
@@ -54,28 +54,28 @@ def friction_bounds(law: FrictionLaw) -> FrictionBounds:
     Raises
     ------
     ParameterError
-        If the law exceeds a declared value, or friction may vanish.
+        If the law exceeds a declared value, or its lower bound is not positive.
     UnsupportedError
-        If this cannot be decided.
+        If the law may jump or has a function without an enclosure, or subdivision gives no decision.
     """
     exact = law.exact()
-    courses = list(_friction_ranges(law, exact))
+    ranges = list(_friction_ranges(law, exact))
     low, high = exact.bounds
     bounds = FrictionBounds(
-        least=-_confirmed(law, courses, "the lower bound", -_declared(low), lambda c: [-c.friction]),
-        most=_confirmed(law, courses, "the upper bound", _declared(high), lambda c: [c.friction]),
+        least=-_confirmed(law, ranges, "the lower bound", -_declared(low), lambda c: [-c.friction]),
+        most=_confirmed(law, ranges, "the upper bound", _declared(high), lambda c: [c.friction]),
         slip_slope=_confirmed(
-            law, courses, "slip_slope", _declared(exact.slip_slope), lambda c: [c.slip_slope, -c.slip_slope]
+            law, ranges, "slip_slope", _declared(exact.slip_slope), lambda c: [c.slip_slope, -c.slip_slope]
         ),
         rate_slope=_confirmed(
-            law, courses, "rate_slope", _declared(exact.rate_slope), lambda c: [c.rate_slope, -c.rate_slope]
+            law, ranges, "rate_slope", _declared(exact.rate_slope), lambda c: [c.rate_slope, -c.rate_slope]
         ),
-        weakens=all(upper_limit(c.slip_slope, c.box, _NOTHING, _NOTHING) == 0 for c in courses),
+        weakens=all(upper_limit(c.slip_slope, c.box, _ZERO, _ZERO) == 0 for c in ranges),
     )
     if bounds.least <= 0:
         raise ParameterError(
             f"friction of {law.name} must stay positive. Its lower bound is {float(bounds.least):.4g}. "
-            "Raise the residual friction; without friction a pressure has no effect."
+            "Raise the residual friction; without friction, pressure has no effect."
         )
     return bounds
 
@@ -115,37 +115,37 @@ def _continuous(law: FrictionLaw, friction: sp.Expr) -> sp.Expr:
 
 def _confirmed(
     law: FrictionLaw,
-    courses: list[_FrictionRange],
+    ranges: list[_FrictionRange],
     what: str,
     declared: Fraction,
     parts: Callable[[_FrictionRange], list[sp.Expr]],
 ) -> Fraction:
     """A declared bound of a law, if no part exceeds it."""
     bound = declared
-    for course in courses:
-        for part in parts(course):
+    for each in ranges:
+        for part in parts(each):
             try:
-                answer = upper_limit(part, course.box, declared, SLACK * abs(declared))
+                result = upper_limit(part, each.box, declared, SLACK * abs(declared))
             except UnsupportedError as error:
                 raise UnsupportedError(f"no bounds of {law.name} can be proved: {error}") from None
-            if isinstance(answer, Excess):
-                raise ParameterError(_disagreement(law, what, declared, answer))
-            if isinstance(answer, Undecided):
-                raise UnsupportedError(_undecided(law, what, declared, answer))
-            bound = max(bound, answer)
+            if isinstance(result, Excess):
+                raise ParameterError(_disagreement(law, what, declared, result))
+            if isinstance(result, Undecided):
+                raise UnsupportedError(_undecided(law, what, declared, result))
+            bound = max(bound, result)
     return bound
 
 
-def _disagreement(law: FrictionLaw, what: str, declared: Fraction, answer: Excess) -> str:
-    at = ", ".join(f"{x} {float(value):.4g} {_UNITS.get(str(x), '')}".rstrip() for x, value in answer.at.items())
+def _disagreement(law: FrictionLaw, what: str, declared: Fraction, result: Excess) -> str:
+    at = ", ".join(f"{x} {float(value):.4g} {_UNITS.get(str(x), '')}".rstrip() for x, value in result.at.items())
     return (
         f"{what} of {law.name} contradicts the law: declared {float(abs(declared)):.6g}, but "
-        f"{'at ' + at if at else 'everywhere'} it is {float(abs(answer.value)):.6g}. Correct the declared value."
+        f"{'at ' + at if at else 'everywhere'} it is {float(abs(result.value)):.6g}. Correct the declared value."
     )
 
 
-def _undecided(law: FrictionLaw, what: str, declared: Fraction, answer: Undecided) -> str:
-    at = ", ".join(f"{x} from {float(low):.3g} to {float(high):.3g}" for x, (low, high) in answer.where.items())
+def _undecided(law: FrictionLaw, what: str, declared: Fraction, result: Undecided) -> str:
+    at = ", ".join(f"{x} from {float(low):.3g} to {float(high):.3g}" for x, (low, high) in result.where.items())
     return (
         f"no bounds of {law.name} can be proved: {what}, declared as {float(abs(declared)):.6g}, is undecided for "
         f"{at}. Write the law in another form, or limit the slip with Min."

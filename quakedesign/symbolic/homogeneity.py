@@ -28,7 +28,7 @@ _TRIES = 50
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identity:
-    """left = right for every state and every ε > 0: the expression at the dilated point, and its required value."""
+    """Claim that left = right for every state and every ε > 0."""
 
     # left, right: In the states and ε
     left: sp.Expr
@@ -81,6 +81,7 @@ class Homogeneity:
     proof : tuple of Identity
         One identity for a function, one for every component of a field; empty without a proof.
     counterexample : Counterexample or None
+        Point at which a necessary identity fails.
     switching : tuple of (Expr, Rational)
         Arguments of signs with their degrees: the switching surfaces are invariant under dilation. An identity that
         holds for every choice of the signs therefore also holds for set-valued signs.
@@ -115,7 +116,7 @@ def dilation(weights: Weights, factor: sp.Expr = epsilon) -> dict[sp.Symbol, sp.
     Raises
     ------
     ParameterError
-        If a weight or the factor is not known to be positive.
+        If a weight is not a positive rational, or the factor is not known to be positive.
     """
     exact = {state: sp.sympify(weight) for state, weight in weights.items()}
     wrong = {state: weight for state, weight in exact.items() if not (weight.is_Rational and weight > 0)}
@@ -157,7 +158,7 @@ def homogeneous(
     Raises
     ------
     ParameterError
-        If a weight is missing or not positive.
+        If a weight is missing or not a positive rational.
     """
     rates = subject if isinstance(subject, Mapping) else {None: subject}
     components = {s: normal_form(r) for s, r in rates.items()}
@@ -220,10 +221,10 @@ def _claims(
         return
     for e in components.values():
         twice = e.subs(dilation(weights, epsilon**2), simultaneous=True)
-        yield Identity(left=twice * e, right=at[e] ** 2), f"f(Δ²x)·f(x) = f(Δx)², for any degree of f = {e}"
+        yield Identity(left=twice * e, right=at[e] ** 2), f"f(Δ²x)·f(x) = f(Δx)², necessary for any degree, for f = {e}"
     for (s, e), (other, f) in combinations(components.items(), 2):
         left, right = epsilon ** weights[other] * at[e] * f, epsilon ** weights[s] * at[f] * e
-        yield Identity(left=left, right=right), f"the same degree for the components of {s} and {other}"
+        yield Identity(left=left, right=right), f"equality of the degrees of the components of {s} and {other}"
 
 
 def _search(identity: Identity, meaning: str, weights: Mapping[Any, Any]) -> Counterexample | None:
@@ -278,20 +279,20 @@ def weights_for(rates: Mapping[sp.Symbol, sp.Expr], degree: int | sp.Rational) -
     for state, rate in rates.items():
         for term in sp.Add.make_args(normal_form(rate)):
             if any(f.has(*rates) for f in term.atoms(sp.Function) - term.atoms(SignedPower, AbsolutePower)):
-                raise ParameterError(f"{term} is not a product of signed powers, so that it has no degree.")
+                raise ParameterError(f"{term} is not a product of signed powers and has no degree.")
             if term != 0:
                 equations.append(size_of(term, unknown, equations) - unknown[state] - degree)
     solution = sp.linsolve([e for e in equations if e != 0], *unknown.values())
     values = next(iter(solution), ())
     if not values or not all(v.is_Rational and v > 0 for v in values):
         raise ParameterError(
-            f"the terms impose no unique positive weights for degree {degree}. Solving gives {solution}. "
+            f"the terms determine no unique positive weights for degree {degree}. Solving gives {solution}. "
             "Try another degree."
         )
     weights = dict(zip(rates, values, strict=True))
     if not homogeneous(rates, weights, degree):
         raise ParameterError(
-            f"with the weights {weights} that the terms impose, homogeneity of degree {degree} is not proved."
+            f"with the weights {weights} that the terms determine, homogeneity of degree {degree} is not proved."
         )
     return weights
 
@@ -300,6 +301,7 @@ def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.E
     """Degree of an expression from the degrees of its symbols; degrees add up in products.
 
     Conditions for sums, Max, Min and arguments of functions are appended to `equations`, as expressions that must be 0.
+    Raises `ParameterError` for an exponent that is not rational.
 
     Parameters
     ----------

@@ -24,16 +24,15 @@ from quakedesign.fault import Fault, FrictionLaw
 
 
 def _read(text: str) -> sp.Basic:
-    """Expression from its ``srepr``, which omits that the functions of the plant are real."""
+    """Expression from its ``srepr``, which does not record that the functions of the plant are real."""
     return eval(text, vars(sp) | {"Function": lambda name: sp.Function(name, real=True)})
 
 
 # ----------------------------------------------------------------------
 # Stored derivations, which are the same for every fault.
 #
-# `derived.json` contains the results that take SymPy half a second or more, with the names of function and states as
-# key; the others are derived at run time.
-# A test derives every entry again and compares; ``write_whole(FILE, derived_again())`` updates the file.
+# `derived.json` contains the results that take SymPy half a second or more, keyed by the names of function and states;
+# the others are derived at run time. A test derives all again; ``write_whole(FILE, derived_again())`` updates the file.
 
 FILE = Path(__file__).parent / "derived.json"
 _Given = ParamSpec("_Given")
@@ -43,7 +42,7 @@ _Result = TypeVar("_Result")
 def stored(derivation: Callable[_Given, _Result]) -> Callable[_Given, _Result]:
     """Decorator that reads stored results of a derivation, whose only positional argument, if any, is the state names.
 
-    With keyword options, as for a result that is not stored, the derivation is run.
+    With keyword options, or without a stored result, the derivation is run.
     """
     home = derivation.__module__.rpartition(".")[2]
 
@@ -118,7 +117,7 @@ def force_balance() -> sp.Eq:
 
 @stored
 def shifted_acceleration() -> sp.Expr:
-    """x2' of eq. shift: the force balance measured from the equilibrium without pressure and disturbance."""
+    """x2' [m/s²] of eq. shift: slip is relative to the equilibrium without pressure and disturbance."""
     z, v, acceleration, far, z_star = sp.symbols("z v a delta_far z^*", real=True)
     balance = force_balance()
     rest = balance.subs({acceleration: 0, v: 0, p: 0, z: z_star})
@@ -214,7 +213,7 @@ def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
 
 
 def hatted_parameters(fault: Fault, values: Mapping[str, Any]) -> dict[sp.Symbol, Any]:
-    """k̂, η̂, N̂ and σ'_n from values or symbols of `PARAMETERS`, with m = nρh³, A = nh², k = nGh (see `Fault`)."""
+    """k̂, η̂, N̂ and σ'_n from values (SI) or symbols of `PARAMETERS`, with m = nρh³, A = nh², k = nGh (see `Fault`)."""
     rho, G, damping, stress = (values[name] for name in PARAMETERS)
     h = sp.Rational(str(rational(fault.side)))
     mass, shared = rho * h**3, damping / sp.Rational(str(fault.squares))
@@ -231,7 +230,7 @@ acceleration_error = sp.Symbol(r"\dot{e}_2", real=True)
 def matched_rate() -> sp.Expr:
     """Rate h' [m/s³] along a solution, from friction and its slopes, the reference and its derivatives, e1, e2 and e2'.
 
-    The disturbance enters by its value φ, its explicit rate φ_t and its growth φ_1 in slip and φ_2 in slip rate. The
+    The disturbance enters by its value φ and its partial derivatives φ_t in time, φ_1 in slip and φ_2 in slip rate. The
     control acts on h' through e2' = β(ν + h) (ERRATA 16).
     """
     a, b = sp.Function("a", real=True)(t), sp.Function("b", real=True)(t)
@@ -265,14 +264,14 @@ def matched_rate_in_parts() -> sp.Tuple:
     """h' [m/s³] as two parts: the contribution of the friction slopes (collected), and the rest (expanded)."""
     slopes = (slip_slope, rate_slope)
     total = sp.expand(matched_rate())
-    flat = sp.expand(total.subs(dict.fromkeys(slopes, 0)))
-    bending = sp.factor_terms(sp.collect(sp.expand(total - total.subs(dict.fromkeys(slopes, 0))), slopes))
-    return sp.Tuple(bending, flat)
+    without_slopes = sp.expand(total.subs(dict.fromkeys(slopes, 0)))
+    with_slopes = sp.factor_terms(sp.collect(sp.expand(total - total.subs(dict.fromkeys(slopes, 0))), slopes))
+    return sp.Tuple(with_slopes, without_slopes)
 
 
 @stored
 def sensitivities() -> sp.Tuple:
-    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time, each as the part with the slope of friction and the rest.
+    """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time, each as two parts: the term in the friction slope, and the rest.
 
     Slopes are chord slopes where friction has no derivative.
     """
@@ -282,12 +281,12 @@ def sensitivities() -> sp.Tuple:
     h = matched_perturbation().replace(lambda e: e.func in kinds, lambda e: kinds[e.func])
     parts = []
     for error, slope, growth in ((e1, slip_slope, phi_1), (e2, rate_slope, phi_2)):
-        bent = h.diff(error).subs({value.diff(error): slope, force.diff(error): growth})
-        bent = sp.expand(_named(bent.subs({value: friction_value, force: phi})))
-        part = sp.expand(bent.coeff(slope))
+        derivative = h.diff(error).subs({value.diff(error): slope, force.diff(error): growth})
+        derivative = sp.expand(_named(derivative.subs({value: friction_value, force: phi})))
+        part = sp.expand(derivative.coeff(slope))
         # separate parts, so that N̂ cancels where possible and occurs once elsewhere
         stressed = sp.simplify(part.coeff(sigma)) * sigma
-        parts += [slope * (stressed + sp.factor(part.coeff(sigma, 0))), bent.coeff(slope, 0)]
+        parts += [slope * (stressed + sp.factor(part.coeff(sigma, 0))), derivative.coeff(slope, 0)]
     return sp.Tuple(*parts)
 
 

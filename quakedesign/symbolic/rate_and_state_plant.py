@@ -46,11 +46,10 @@ def _state_rates(names: tuple[str, ...]) -> list[sp.Expr]:
 
 @stored
 def sliding_acceleration(names: tuple[str, ...] = ()) -> sp.Expr:
-    """v' [m/s²] of the force balance, measured from sliding at v_∞ without pressure and disturbance.
+    """v' [m/s²] from the force balance about steady sliding at v_∞ without pressure and disturbance.
 
-    x1 is the slip relative to steady sliding [m],
-    v the slip rate [m/s], and μ a function of x1, v and the states `names`.
-    The far end moves at v_∞, so that the stretch of the spring is constant and balances μ* and the damping.
+    x1 is the slip relative to steady sliding [m], v the slip rate [m/s], and μ a function of x1, v and the states
+    `names`. The far end moves at v_∞; in steady sliding, the constant spring stretch balances μ* and the damping.
     """
     z, v, acceleration, far, z_star, far_start = sp.symbols("z v a delta_far z^* far", real=True)
     ahead = {z: z_star + loading_rate * plant.t + plant.x1, v: rate}
@@ -85,7 +84,7 @@ def slope_symbols(names: tuple[str, ...] = ()) -> dict[sp.Expr, sp.Symbol]:
 
 @stored
 def jacobian(names: tuple[str, ...] = ()) -> sp.Matrix:
-    """Jacobian of (x1, v, states) in the slopes of `slope_symbols`, at an equilibrium with pressure p."""
+    """Jacobian of the rates of (x1, v, states) in the symbols of `slope_symbols`, at an equilibrium with pressure p."""
     quiet = sliding_acceleration(names).replace(plant.disturbance, lambda *_: sp.Integer(0))
     field = sp.Matrix([rate - loading_rate, quiet, *_state_rates(names)])
     J = field.jacobian([plant.x1, rate, *state_symbols(names)]).subs(slope_symbols(names))
@@ -111,7 +110,7 @@ def slopes(law: FrictionLaw, at_rate: sp.Expr = loading_rate) -> dict[sp.Symbol,
 
 
 def _tidy(expression: sp.Expr) -> sp.Expr:
-    """Factor a rational function; return any other expression unchanged, which SymPy would make longer."""
+    """Factor a rational function; return any other expression unchanged, since factoring would lengthen it."""
     return sp.factor(expression) if expression.is_rational_function() else expression
 
 
@@ -119,8 +118,8 @@ def _tidy(expression: sp.Expr) -> sp.Expr:
 def characteristic(names: tuple[str, ...] = (), *, inertia: bool = True) -> tuple[sp.Expr, ...]:
     """Coefficients of det(λE − J), highest power first, in the slopes and `effective_stress`.
 
-    E is the identity; without inertia its entry for the acceleration is 0: the balance of forces is then a constraint
-    that gives the rate, and the degree is one lower.
+    E is the identity; without inertia its entry for the acceleration is 0: the force balance is then a constraint
+    that gives the slip rate, and the degree is one lower.
     """
     J = jacobian(names).subs(sigma, p + effective_stress)
     E = sp.eye(len(names) + 2)
@@ -133,9 +132,9 @@ def characteristic(names: tuple[str, ...] = (), *, inertia: bool = True) -> tupl
 def stability_conditions(names: tuple[str, ...] = (), *, inertia: bool = True) -> tuple[sp.Expr, ...]:
     """Expressions that are all positive if and only if all eigenvalues have negative real part (Hurwitz 1895).
 
-    The leading coefficient (unless it is 1), the leading minors of Hurwitz's matrix except the last, and the last
-    coefficient. If one of them is negative, an eigenvalue has positive real part. Without inertia, a negative leading
-    coefficient stands for an eigenvalue that tends to +∞ as the inertia tends to 0.
+    They are the leading coefficient (unless it is 1), the leading minors of the Hurwitz matrix except the last, and the
+    last coefficient. If one of them is negative, an eigenvalue has positive real part. Without inertia, a negative
+    leading coefficient corresponds to an eigenvalue that tends to +∞ as the inertia tends to 0.
     """
     a = characteristic(names, inertia=inertia)
     n = len(a) - 1
@@ -220,7 +219,7 @@ def nucleation_length(law: FrictionLaw) -> sp.Expr:
 
 
 def quasi_dynamic_rates(law: FrictionLaw) -> tuple[sp.Expr, ...]:
-    """(v', θ', …) of the plant without inertia, from the time derivative of the balance of forces.
+    """(v', θ', …) of the plant without inertia, from the time derivative of the force balance.
 
     Pressure is constant and the disturbance is zero. Requires η̂ + N̂(σ' − p)μ_v > 0; otherwise the slip rate jumps
     (Rice and Ben-Zion 1996).
@@ -263,8 +262,8 @@ def is_steady(law: FrictionLaw) -> bool:
     variables = (plant.x1, rate, *state_symbols(law.state_names))
     parts = [sp.sympify(f) for f in (law.coefficient(*variables), *law.state_rates(*variables))]
     at = dict(zip(variables[2:], law.steady_state(rate), strict=True))
-    resting = [g.subs(at) for g in parts[1:]] + [f.diff(plant.x1) for f in parts]
-    return all(f == 0 or sp.simplify(f) == 0 for f in resting)
+    changes = [g.subs(at) for g in parts[1:]] + [f.diff(plant.x1) for f in parts]
+    return all(f == 0 or sp.simplify(f) == 0 for f in changes)
 
 
 def without_overflow(friction: sp.Expr) -> sp.Expr:
@@ -305,15 +304,15 @@ class SlidingErrors:
     @cached_property
     def slopes(self) -> tuple[sp.Expr, sp.Expr]:
         """∂μ/∂y and ∂μ/∂z [-] in steady sliding: a and b of the logarithmic laws."""
-        return self._at_rest(self.friction_change, log_rate), self._at_rest(self.friction_change, log_state)
+        return self._when_steady(self.friction_change, log_rate), self._when_steady(self.friction_change, log_state)
 
     @cached_property
     def decays(self) -> tuple[sp.Expr, sp.Expr]:
         """−∂z′/∂y and −∂z′/∂z [1/s] in steady sliding."""
-        return -self._at_rest(self.log_state_rate, log_rate), -self._at_rest(self.log_state_rate, log_state)
+        return -self._when_steady(self.log_state_rate, log_rate), -self._when_steady(self.log_state_rate, log_state)
 
     @staticmethod
-    def _at_rest(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
+    def _when_steady(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
         return sp.simplify(expression.diff(variable).subs({log_rate: 0, log_state: 0}))
 
 
@@ -354,7 +353,7 @@ def _tidy_sliding(change: sp.Expr) -> sp.Expr:
 
 
 def operating_rate(fault: Fault, rate: float | str | Fraction | None = None) -> Fraction:
-    """Slip rate [m/s] of the equilibrium for linearisation and stability, checked against the law.
+    """Slip rate [m/s] of the equilibrium, checked against the law; by default the law's ``operating_rate``.
 
     Raises
     ------

@@ -22,7 +22,7 @@ _ALLOW_KINKS: ContextVar[bool] = ContextVar("allow_kinks", default=False)
 
 @contextmanager
 def off_kinks() -> Iterator[None]:
-    """Allow derivatives that hold only where no argument of a signed power vanishes."""
+    """Allow derivatives that hold only where no argument of a signed or absolute power vanishes."""
     token = _ALLOW_KINKS.set(True)
     try:
         yield
@@ -32,7 +32,7 @@ def off_kinks() -> Iterator[None]:
 
 
 def slope_off_kinks(expression: sp.Expr, variable: sp.Symbol) -> sp.Expr:
-    """Derivative that holds where no argument of a signed power vanishes."""
+    """Derivative that holds where no argument of a signed or absolute power vanishes."""
     with off_kinks() if expression.has(_Power) else nullcontext():
         return expression.diff(variable)
 
@@ -50,7 +50,7 @@ class _Power(sp.Function):  # type: ignore[misc]
         Raises
         ------
         KinkError
-            If the derivative is unbounded or jumps at zero, unless inside `off_kinks`.
+            If the derivative is unbounded or jumps at zero, unless inside `off_kinks`; always for the exponent.
         """
         x, a = self.args
         if argindex != 1:
@@ -77,7 +77,7 @@ class SignedPower(_Power):
     ----------
     x : Expr
     a : Expr
-        Exponent; a negative one arises only from derivatives off the kinks, and has no value at zero.
+        Exponent; negative exponents arise only from derivatives off the kinks, and the power then has no value at zero.
     """
 
     _brackets = (r"\left\lceil ", r"\right\rfloor")
@@ -103,7 +103,7 @@ class AbsolutePower(_Power):
     ----------
     x : Expr
     a : Expr
-        Exponent; a negative one arises only from derivatives off the kinks.
+        Exponent; negative exponents arise only from derivatives off the kinks.
     """
 
     is_nonnegative = True
@@ -211,7 +211,7 @@ def _spread_factor(kind: type, factor: sp.Expr, a: sp.Expr) -> sp.Expr:
 
 
 def _content(inner: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Common factor and remainder of an expanded sum; the factor has integer powers of symbols that may be negative."""
+    """Common factor and remainder of an expanded sum; symbols of unknown sign have integer exponents in the factor."""
     terms = sp.Add.make_args(inner)
     if len(terms) == 1:
         return sp.Integer(1), inner

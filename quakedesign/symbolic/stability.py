@@ -101,14 +101,15 @@ def stability(
     loading_rate : number or text, optional
         Slip rate v_∞ [m/s] of steady sliding; without it the law's ``operating_rate`` (rest for a law without state).
     inertia : bool
-        Whether the plant has mass; without it the plant is quasi-dynamic.
+        Whether the plant has inertia; without it, the plant is quasi-dynamic.
     uncertain : bool
         Whether stiffness, damping and control authority vary over the fault's uncertainty box.
 
     Raises
     ------
     ParameterError
-        If the pressure opens the fault, or the rate is outside the law's domain.
+        If the pressure is not below σ', a range of pressures does not ascend, the rate is outside the law's working
+        range, or sliding at this rate is not steady.
     """
     at = operating_rate(fault, loading_rate)
     pressures = _interval(pressure, fault)

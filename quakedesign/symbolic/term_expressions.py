@@ -151,7 +151,7 @@ def signed_monomials(weights: Mapping[str, int], degree: int, domain: str) -> tu
     degree : int
         Weighted degree of every product.
     domain : str
-        ``"cells"``, or ``"reals"`` for polynomials only.
+        ``"cells"`` for all such products, or ``"reals"`` for polynomials only.
 
     Returns
     -------

@@ -8,8 +8,7 @@ from typing import Any
 from quakedesign.errors import CertificateError
 from quakedesign.exact import exact_text
 
-Factor = tuple[str, Fraction, str]
-"""State, exponent, kind: ``s`` for ⌈x⌋^a, ``a`` for |x|^a."""
+Factor = tuple[str, Fraction, str]  # state, exponent, kind: ``s`` for ⌈x⌋^a, ``a`` for |x|^a
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -55,10 +54,10 @@ def lie_terms(function: Term, field: Mapping[str, tuple[Term, ...]]) -> Iterator
     for state, a, kind in function.factors:
         others = [f for f in function.factors if f[0] != state]
         slope = (state, a - 1, "s" if kind == "a" else "a")
-        for speed in field[state]:
-            factors = multiplied([*others, slope, *speed.factors])
-            coefficient = function.coefficient * a * speed.coefficient
-            yield Term(coefficient, (*function.parameters, *speed.parameters), factors)
+        for rate in field[state]:
+            factors = multiplied([*others, slope, *rate.factors])
+            coefficient = function.coefficient * a * rate.coefficient
+            yield Term(coefficient, (*function.parameters, *rate.parameters), factors)
 
 
 def written(terms: Iterable[Term]) -> str:

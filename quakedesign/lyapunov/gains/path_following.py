@@ -117,7 +117,7 @@ def neighbourhood(
     others = [values_of(other) for other in changed]
     demands, fixed = [], []
     for row, template, whole in _templates(key, scale, required is not None):
-        parts = [_faster(row, j, values, required, 1 / float(size)) for j, size in enumerate(sizes)]
+        parts = [_part_in_v(row, j, values, required, 1 / float(size)) for j, size in enumerate(sizes)]
         moves = [_moved(row, present, values, other, required) for other in others]
         rest = _rest(row, required)
         grown = [{e: c * float(_power(whole, e)) for e, c in p.items()} for p in (*parts, *moves, rest)]
@@ -146,7 +146,7 @@ def _columns(row: FormRow, j: int | None, values: Values, weights: Sequence[floa
     return columns
 
 
-def _faster(
+def _part_in_v(
     row: FormRow,
     j: int | None,
     values: Values,
@@ -174,9 +174,9 @@ def _faster(
 def _moved(
     row: FormRow, present: Sequence[float], values: Values, other: Values, required: RequiredRate | None
 ) -> Form:
-    """Change of a row with the current V when the numbers of the loop change."""
-    before = _faster(row, None, values, required, 1.0, present)
-    after = _faster(row, None, other, required, 1.0, present)
+    """Change of a row at the current V when the values of the loop change."""
+    before = _part_in_v(row, None, values, required, 1.0, present)
+    after = _part_in_v(row, None, other, required, 1.0, present)
     return {e: after.get(e, 0.0) - before.get(e, 0.0) for e in {**before, **after}}
 
 
@@ -298,7 +298,7 @@ def degrees_of(obligations: Obligations) -> tuple[int, int]:
 def required_rate(loop: Loop, lyapunov: tuple[Term, ...], speed: float, power: int) -> RequiredRate:
     """Rate with which V ≤ 1 of degree m = `power` settles within T = 1/speed: κ = speed·m/(m−n), for n < m.
 
-    w is fitted on every cell to the root V^{1/m} of a nearby V, whose degree may differ.
+    w is fitted on every cell to the root V^{1/m} of the given `lyapunov`, whose degree may differ from `power`.
     """
     obligations = Obligations(loop, lyapunov)
     m, n = degrees_of(obligations)
@@ -366,8 +366,8 @@ def _lifted(points: np.ndarray, one: Obligation) -> tuple[np.ndarray, np.ndarray
 def _form(potential: Polynomial, m: int) -> dict[tuple[int, ...], float]:
     """Linear form with coefficients > 0 near the m-th root of a form, by least squares of relative errors."""
     points = _points(potential, m)
-    wanted = np.maximum(_values(potential, points), 1e-300) ** (1 / m)
-    coefficients, _ = nnls(points / wanted[:, None], np.ones(len(points)))
+    roots = np.maximum(_values(potential, points), 1e-300) ** (1 / m)
+    coefficients, _ = nnls(points / roots[:, None], np.ones(len(points)))
     least = 1e-3 * coefficients.max()
     size = len(coefficients)
     return {tuple(int(i == j) for j in range(size)): max(float(c), least) for i, c in enumerate(coefficients)}
@@ -445,8 +445,8 @@ def scaled_norm(loop: Loop, exponents: Mapping[str, Fraction]) -> float:
 # ----------------------------------------------------------------------
 # Setting of a search for gains, its states, and its objective.
 
-MARGIN, FAINT = 1e-6, 1e-9
-_ROOM = 1e-3
+MARGIN, FAINT = 1e-6, 1e-9  # least accepted margins of a search; of its initial state and of given gains
+_ROOM = 1e-3  # relative distance of clipped gains from the bound on their norm
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -508,7 +508,7 @@ class Objective(ABC):
         return loop
 
     def speed(self, level: float) -> float | None:
-        """Speed 1/T that a level requires, see `required_rate`; None without one."""
+        """Settling speed 1/T [1/s] that a level requires, see `required_rate`; None without one."""
         return None
 
     def norm_bound(self, level: float) -> float | None:
@@ -535,7 +535,7 @@ class Objective(ABC):
         return find_certificate(state.loop, setting.degree, subject=subject)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate for fixed gains without a climb, or None; for an objective with a rate, a climb is tried, too."""
+        """Certificate for fixed gains without a climb; None if there is none."""
         return None
 
     @abstractmethod
@@ -555,12 +555,12 @@ _ROUNDS = 100  # largest number of steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrustRegion:
-    """Step sizes for which the linearisation is trusted; a step size is the relative improvement of the level."""
+    """Step sizes for which the linearisation is trusted, as shares: relative improvements of the level."""
 
     # First share. The omitted terms are of second order, about (`gains`·share)², which is 0.3 of the linear terms here
     initial: float = 0.1
     largest: float = 0.35  # Share at which the omitted terms are as large as the linear terms
-    # Share below which a centring step is made: ten units of the fourth digit, to which gains are rounded
+    # Share below which a centring step is made: one to ten units of the fourth digit, to which gains are rounded
     least: float = 1e-3
     # grow, shrink: Factor of the share after a successful step, and its divisor after a failed one; increases are slow
     # and decreases fast, since a failed programme takes as long as a successful one
@@ -569,7 +569,7 @@ class TrustRegion:
     # Largest relative change of a gain per share, as several gains must change more than the level
     gains: float = 3.0
     again: float = 0.03  # Share after centring; smaller than `initial`, since larger shares have failed
-    # Improvement of the level since the last centring that justifies another one: three least shares
+    # Improvement of the level since the last centring that justifies another one: three times `least`
     worthwhile: float = 3e-3
     # Factor by which centring must increase the margin; otherwise no step is possible and the search ends
     margin: float = 1.2
@@ -698,7 +698,7 @@ def _neighbourhood(
 def _limits(
     setting: PathSetting, loop: Loop, level: float, neighbourhood: Neighbourhood, sizes: Mapping[str, float]
 ) -> DecisionBounds:
-    """Bounds: |a_j| and shares of the changes at most one, and the norm of the gains within the objective's bound."""
+    """Bounds: |a_j| and fractions |x_k| at most one, and the norm of the gains within the objective's bound."""
     count = len(neighbourhood.monomials)
     bound = setting.objective.norm_bound(level)
     rows, bounds = [], []
@@ -714,7 +714,7 @@ def _limits(
 
 
 def _shares(setting: PathSetting, loop: Loop, neighbourhood: Neighbourhood) -> list[float]:
-    """Bounds on the terms of V on the box per unit of a_j, which ensure V ≤ 1 there; empty without a rate."""
+    """Bounds on the terms of V in the box per unit of a_j, which ensure V ≤ 1 there; empty without a rate."""
     if not setting.objective.has_rate:
         return []
     sizes = box(loop, setting.units)

@@ -55,8 +55,8 @@ from quakedesign.sos.solve.conic import collecting
 # ----------------------------------------------------------------------
 # Objectives: order of levels, requirements of a level on a loop, the final proof and its value.
 
-_HALVINGS = 8
-_BITS = (16, 24, 34)
+_HALVINGS = 8  # of the initial settling speed
+_BITS = (16, 24, 34)  # significant binary digits of the coefficients of V, coarsest first
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,12 +172,12 @@ class LargestRange(Objective):
         return state_at(setting, loop, self.first, least=FAINT)
 
     def given(self, loop: Loop, degrees: Sequence[int], subject: Subject) -> Certificate | None:
-        """Certificate of the largest range to four digits, by a search over one number in which V̇ is affine."""
+        """Certificate of the largest range to four digits, from a search over one number."""
         gains, bound = tuple(loop.gains.values()), loop.uncertain["d"][1]
-        reach = largest_gain_range(
+        limit = largest_gain_range(
             subject, gains, lipschitz=bound, nominal=self.middle, symmetric=True, degrees=tuple(degrees)
         )
-        return reach.certificate if reach.value is not None else None
+        return limit.certificate if limit.value is not None else None
 
     def figure(self, certificate: Certificate, setting: PathSetting) -> float:
         """ρ, rounded down."""
@@ -218,7 +218,7 @@ def objective_for(name: str, loop: Loop, bound: float | None) -> Objective:
 # ----------------------------------------------------------------------
 # The problem of a synthesis of gains, and the initial loops of its search.
 
-_SPREAD, _WIDTH = 0.4, 3.0
+_SPREAD, _WIDTH = 0.4, 3.0  # standard deviation of log factors of published gains; largest log of other random gains
 _HIGHEST = 12  # for higher degrees, one programme takes minutes
 
 
@@ -229,7 +229,7 @@ class SynthesisProblem:
     subject: Subject
     loop: Loop  # Loop with all gains 1
     setting: PathSetting  # Setting with the lowest degree
-    degrees: tuple[int, ...]
+    degrees: tuple[int, ...]  # Degrees of V
     published: tuple[Loop, ...]  # Loops with gains from the literature, scaled to the same ranges
 
 
@@ -295,7 +295,7 @@ def _scaled(
 def initial_loops(problem: SynthesisProblem, seed: int) -> Iterator[Loop]:
     """Loops with gains from the literature, nearest to the norm bound first, then with random gains near them.
 
-    Without gains in the literature, random gains of any size.
+    Without gains from the literature, all gains are random: 1 to e³, scaled to the L̄ of the loop.
     """
     yield from sorted(problem.published, key=lambda one: _beyond(problem.setting, one))
     loop, rng = problem.loop, np.random.default_rng(seed)
@@ -318,12 +318,12 @@ def _beyond(setting: PathSetting, loop: Loop) -> tuple[bool, float]:
 # ----------------------------------------------------------------------
 # Joint search for gains and a Lyapunov function; gains without a proof are never returned.
 
-_GAIN_SCALES = (1.0, 1.5, 4.0)
-_DRAWS = 12
+_GAIN_SCALES = (1.0, 1.5, 4.0)  # factors of L̄ to which initial gains are scaled up
+_DRAWS = 12  # candidates per climb
 _MOST_STARTS = 10_000
-_TRIES, _FEW = 6, 2
-_INSIDE = 0.98
-_SHARES = (1.0, 0.9, 0.7)
+_TRIES, _FEW = 6, 2  # states whose proof is tried; the same if a proof for other states exists
+_INSIDE = 0.98  # share of the norm bound to which larger gains are reduced
+_SHARES = (1.0, 0.9, 0.7)  # shares of the level at which a V of higher degree begins
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -388,7 +388,7 @@ def synthesise(
         Largest ‖k_i/L̄^{p_i}‖₂ for all objectives except ``"norm"``; by default the smallest norm of the gains from the
         literature.
     degrees : iterable of int, optional
-        Degrees of V; by default the two lowest of `candidate_degrees`. Higher degrees yield better gains, more slowly.
+        Degrees of V; by default the two lowest of `candidate_degrees`. Higher degrees yield better gains in more time.
     starts : int
         Number of climbs. Candidates are the gains from the literature, then random gains; up to 12 candidates per climb
         are tried, since a climb needs feasible initial gains.
@@ -412,11 +412,11 @@ def synthesise(
     Raises
     ------
     ParameterError
-        For an argument out of range, a missing bound, or a law whose gains do not scale.
+        For an argument out of range, a missing bound, or a law whose terms do not determine the scaling of its gains.
     UnknownNameError
         For an unknown law or objective.
     SimulationError
-        If the workers are not reachable, or terminate.
+        If the workers cannot be reached, or die repeatedly.
     """
     problem = problem_of(subject, objective, lipschitz=lipschitz, gain_range=gain_range, bound=bound, degrees=degrees)
     require_count(_MOST_STARTS, starts=starts)
@@ -424,8 +424,8 @@ def synthesise(
     first = list(islice(initial_loops(problem, seed), starts * _DRAWS))
     with InProcess() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         best = _best(problem, _climbed(problem.setting, first, starts, crew))
-    mine = _synthesis(problem, *best) if best else None
-    return _compared(problem, mine) if compare else mine
+    synthesis = _synthesis(problem, *best) if best else None
+    return _compared(problem, synthesis) if compare else synthesis
 
 
 def _synthesis(problem: SynthesisProblem, certificate: Certificate, value: float) -> Synthesis:
@@ -440,7 +440,7 @@ def _synthesis(problem: SynthesisProblem, certificate: Certificate, value: float
     )
 
 
-def _compared(problem: SynthesisProblem, mine: Synthesis | None) -> Synthesis | None:
+def _compared(problem: SynthesisProblem, synthesis: Synthesis | None) -> Synthesis | None:
     """Synthesis compared with gains from the literature, which replace it if they are better within the norm bound."""
     objective = problem.setting.objective
     compared = [compared_gains(problem, one) for one in problem.published]
@@ -449,32 +449,32 @@ def _compared(problem: SynthesisProblem, mine: Synthesis | None) -> Synthesis | 
             continue
         if not _covers(one.certificate.loop, problem.loop):
             continue
-        if mine is None or objective.better(one.value, mine.value):
-            mine = _synthesis(problem, one.certificate, one.value)
-    if mine is None:
+        if synthesis is None or objective.better(one.value, synthesis.value):
+            synthesis = _synthesis(problem, one.certificate, one.value)
+    if synthesis is None:
         return None
-    best = mine.value
+    best = synthesis.value
     ratios = [one.value and (best / one.value if objective.larger else one.value / best) for one in compared]
-    return replace(mine, compared=tuple(replace(c, ratio=r) for c, r in zip(compared, ratios, strict=True)))
+    return replace(synthesis, compared=tuple(replace(c, ratio=r) for c, r in zip(compared, ratios, strict=True)))
 
 
-def _covers(proved: Loop, wanted: Loop) -> bool:
+def _covers(proved: Loop, requested: Loop) -> bool:
     """Whether a proof covers all requested ranges."""
     return all(
         proved.uncertain[name][0] <= low and high <= proved.uncertain[name][1]
-        for name, (low, high) in wanted.uncertain.items()
+        for name, (low, high) in requested.uncertain.items()
     )
 
 
-def _climbed(setting: PathSetting, first: Sequence[Loop], wanted: int, crew: Crew) -> list[list[State]]:
-    """Climbs from the requested number of feasible starts, in the order of the starts."""
+def _climbed(setting: PathSetting, first: Sequence[Loop], count: int, crew: Crew) -> list[list[State]]:
+    """Climbs from the first `count` feasible loops, in the order of the loops."""
     done: list[list[State]] = []
     for at in range(0, len(first), crew.width):
         climbs = dict(crew.results(attempt, [(setting, loop) for loop in first[at : at + crew.width]]))
         done += [climbs[place] for place in sorted(climbs) if climbs[place]]
-        if len(done) >= wanted:
+        if len(done) >= count:
             break
-    return done[:wanted]
+    return done[:count]
 
 
 def attempt(setting: PathSetting, loop: Loop) -> list[State]:
@@ -564,9 +564,9 @@ def compared_gains(problem: SynthesisProblem, loop: Loop) -> ComparedGains:
     """
     objective = replace(problem.setting.objective, bound=None)
     setting = replace(problem.setting, objective=objective, least=FAINT)
-    shorter = objective.given(loop, problem.degrees, problem.subject)
-    proofs = [(shorter, objective.figure(shorter, setting))] if shorter else []
-    for degree in problem.degrees if objective.has_rate or not shorter else ():
+    direct = objective.given(loop, problem.degrees, problem.subject)
+    proofs = [(direct, objective.figure(direct, setting))] if direct else []
+    for degree in problem.degrees if objective.has_rate or not direct else ():
         at = replace(setting, degree=degree)
         begin = objective.start(at, loop)
         states = _in_order(at, [climb(at, begin, free=False)]) if begin else []

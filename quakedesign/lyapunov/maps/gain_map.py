@@ -31,8 +31,8 @@ from quakedesign.sos.solve.conic import collecting
 # ----------------------------------------------------------------------
 # Computation of the points of a map, by workers that cache their compiled sweeps.
 
-Place = tuple[int, int]
-_FAST = 1e-8
+Place = tuple[int, int]  # indices of a grid point on both axes
+_FAST = 1e-8  # tolerance of the solver for a first decision
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class MapDefinition:
 
     subject: Subject
     loop: Loop  # Loop with the base gains
-    over: tuple[str, str]  # Gains that vary
+    over: tuple[str, str]  # Names of the two gains that vary
     axes: tuple[tuple[Fraction, ...], tuple[Fraction, ...]]  # Their values
     levels: tuple[Fraction, ...]  # L̄, increasing
     degree: int  # Degree of V
@@ -64,14 +64,14 @@ class MapDefinition:
 
 
 class Screener:
-    """Compiled sweeps of one sheet, one per structure of its points."""
+    """Compiled sweeps of one map, one per structure of its points."""
 
     def __init__(self, sheet: MapDefinition) -> None:
         self.sheet = sheet
         self._sweeps: list[Sweep] = []
         self._paths: dict[tuple[Sweep, tuple[Fraction, ...]], Path] = {}
         self._followed: dict[Sweep, Path] = {}
-        self._answered = 0
+        self._decided = 0
 
     def row(self, places: Sequence[Place]) -> tuple[list[tuple[Place, Fraction | None, int]], int]:
         """Limit and number of feasible levels of every point, and number of solves.
@@ -103,19 +103,19 @@ class Screener:
         sweep = self._sweep(loop)
         if sweep is None:
             return False
-        answer = None if collecting() else self._follow(sweep, loop)
-        return _solved(sweep, loop) if answer is None else answer
+        feasible = None if collecting() else self._follow(sweep, loop)
+        return _solved(sweep, loop) if feasible is None else feasible
 
     def _follow(self, sweep: Sweep, loop: Loop) -> bool | None:
         """Feasibility from the neighbours in the row, in the units of the first neighbour; None if undecided."""
         path = self._followed.get(sweep) or self._path(sweep, sweep.frame(loop))
-        answer = path.feasible(loop)
-        if answer is None:
+        feasible = path.feasible(loop)
+        if feasible is None:
             self._followed.pop(sweep, None)
         else:
             self._followed[sweep] = path
-            self._answered += 1
-        return answer
+            self._decided += 1
+        return feasible
 
     def _path(self, sweep: Sweep, frame: Frame) -> Path:
         """Path for a frame without cached neighbours."""
@@ -128,10 +128,10 @@ class Screener:
         """Point, level, text of the certificate for this point and level (None without proof), and number of solves."""
         before, loop = self._solves(), self.sheet.at(place, level)
         sweep = self._sweep(loop)
-        answer = None if sweep is None else sweep.solve(loop, anew=True)
+        solution = None if sweep is None else sweep.solve(loop, anew=True)
         certificate = None
-        if sweep is not None and answer is not None and answer.feasible:
-            certificate = prove(sweep, loop, answer, self.sheet.subject)
+        if sweep is not None and solution is not None and solution.feasible:
+            certificate = prove(sweep, loop, solution, self.sheet.subject)
         return place, level, certificate_text(certificate) if certificate else None, self._solves() - before
 
     def _sweep(self, loop: Loop) -> Sweep | None:
@@ -145,36 +145,36 @@ class Screener:
         return sweep
 
     def _solves(self) -> int:
-        return self._answered + sum(s.solves for s in self._sweeps)
+        return self._decided + sum(s.solves for s in self._sweeps)
 
 
 def _solved(sweep: Sweep, loop: Loop) -> bool:
-    answer = sweep.solve(loop, accuracy=_FAST)
-    if answer is not None and abs(answer.margin) < CLEAR:
-        answer = sweep.solve(loop)
-    return answer is not None and answer.feasible
+    solution = sweep.solve(loop, accuracy=_FAST)
+    if solution is not None and abs(solution.margin) < CLEAR:
+        solution = sweep.solve(loop)
+    return solution is not None and solution.feasible
 
 
 class Screeners:
-    """Screeners of a sheet on the workers of a crew."""
+    """Screeners of one map on the workers of a crew."""
 
     def __init__(self, sheet: MapDefinition, crew: Crew) -> None:
         self._sheet, self._crew = sheet, crew
 
-    def answers(self, method: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
+    def results(self, method: str, arguments: Iterable[tuple[object, ...]]) -> Iterator[Any]:
         """Results of one method of `Screener` for many arguments, in any order.
 
         Raises
         ------
         SimulationError
-            When processes die repeatedly; a single killed process is replaced.
+            When workers die repeatedly; a single killed worker is replaced.
         """
         tasks = [(self._sheet, method, one) for one in arguments]
-        return (answer for _, answer in self._crew.results(_answer, tasks))
+        return (result for _, result in self._crew.results(_screened, tasks))
 
 
 class _Cached(threading.local):
-    """Cached screener of the last sheet, one per thread, as compiled sweeps store their parameters in place."""
+    """Cached screener of the last map, one per thread, as compiled sweeps store their parameters in place."""
 
     screener: Screener | None = None
 
@@ -182,7 +182,7 @@ class _Cached(threading.local):
 _cached = _Cached()
 
 
-def _answer(sheet: MapDefinition, method: str, arguments: tuple[object, ...]) -> Any:
+def _screened(sheet: MapDefinition, method: str, arguments: tuple[object, ...]) -> Any:
     if _cached.screener is None or _cached.screener.sheet != sheet:
         _cached.screener = Screener(sheet)
     return getattr(_cached.screener, method)(*arguments)
@@ -201,7 +201,7 @@ class GainMap:
     """Largest level of L̄ at every point of a grid of two gains, as screened and as proved."""
 
     sheet: MapDefinition  # Law, gains, axes, levels
-    limits: Mapping[Place, Fraction | None]  # Necessary limit of L̄
+    limits: Mapping[Place, Fraction | None]  # Necessary limit of L̄; None if none is known
     # Number of levels at which the floating-point search finds a Lyapunov function, without proof
     screened: Mapping[Place, int]
     # Number of levels covered by a certificate, checked in exact arithmetic; only for points with an attempted proof
@@ -286,9 +286,9 @@ def gain_map(
     Raises
     ------
     ParameterError, UnknownNameError, CertificateError
-        For unknown gains, empty ranges or levels, and as in `certify`.
+        For unknown or equal gains, fewer than two points per axis, empty ranges or levels, and as in `certify`.
     SimulationError
-        If the workers are not reachable, or terminate.
+        If the workers cannot be reached, or die repeatedly.
     """
     require_count(MOST_WORKERS, workers=workers)
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
@@ -338,7 +338,7 @@ def _sheet(
 
 
 def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[Fraction, ...]:
-    """Values from low to high, decimals of four or more digits; spaced geometrically if both ends are positive.
+    """Values from low to high, those between rounded to four or more digits; spaced geometrically if both are positive.
 
     Parameters
     ----------
@@ -348,7 +348,6 @@ def axis(low: Number, high: Number, points: int, what: str = "range") -> tuple[F
         Number of values.
     what : str
         Name of the range in error messages.
-
 
     Raises
     ------
@@ -385,8 +384,8 @@ def _lowest_degree(loop: Loop, bound: Fraction) -> int:
     """Lowest degree with a clear margin for the base gains; the lowest candidate if there is none."""
     bounded, degrees = replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), candidate_degrees(loop)
     for degree in degrees:
-        answer = Sweep(bounded, degree).solve(bounded)
-        if answer is not None and answer.margin > CLEAR:
+        solution = Sweep(bounded, degree).solve(bounded)
+        if solution is not None and solution.margin > CLEAR:
             return degree
     return degrees[0]
 
@@ -399,7 +398,7 @@ def _screen(
     screened: dict[Place, int] = {}
     rows, solves = sheet.rows, 0
     tell(f"screening 0 of {sum(map(len, rows))} points", 0.0)
-    for points, more in screeners.answers("row", ((row,) for row in rows)):
+    for points, more in screeners.results("row", ((row,) for row in rows)):
         solves += more
         for place, limit, reached in points:
             limits[place], screened[place] = limit, reached
@@ -426,7 +425,7 @@ def _prove(
 
     def run(open_places: list[tuple[Place, int]], what: str) -> None:
         nonlocal solves
-        for done, (place, level, text, more) in enumerate(screeners.answers("proof", open_places), 1):
+        for done, (place, level, text, more) in enumerate(screeners.results("proof", open_places), 1):
             solves += more
             if text is None:
                 reached[place] = level - 1
@@ -458,5 +457,5 @@ def _drawn(reached: Mapping[Place, int], proved: Mapping[Place, int], count: int
 def _at_edge(place: Place, inside: set[Place], sheet: MapDefinition) -> bool:
     """Whether a neighbour on the grid is outside."""
     sizes = tuple(len(axis) for axis in sheet.axes)
-    around = ((place[0] + a, place[1] + b) for a, b in _NEIGHBOURS)
-    return any(0 <= i < sizes[0] and 0 <= j < sizes[1] and (i, j) not in inside for i, j in around)
+    neighbours = ((place[0] + a, place[1] + b) for a, b in _NEIGHBOURS)
+    return any(0 <= i < sizes[0] and 0 <= j < sizes[1] and (i, j) not in inside for i, j in neighbours)

@@ -125,16 +125,16 @@ def _template(row: FormRow, loop: Loop, scale: Sequence[Fraction]) -> Statement:
 #
 #     maximise t  subject to  V − t·N_m  and  −V̇ − t·N_n  in the cone on every cell and vertex,  mean of V = 1,
 #
-# so that t is negative beyond the largest disturbance, and its derivatives in gains and bounds follow from the
-# multipliers. All numbers are floating point: a sweep screens without proof.
+# so that t is negative beyond the largest disturbance, and its derivatives with respect to gains and bounds follow from
+# the multipliers. All numbers are floating point: a sweep screens without proof.
 
 ACCURACY = 1e-10
 """Default tolerance of the solver."""
 SURE = 5e-10
 """Margins above this value count as positive; it is close to the accuracy of the solver."""
 CLEAR = 1e-6
-"""Margin above which a choice for many points, such as a degree, may depend on its sign. The linear-algebra kernels of
-different processors change margins near zero by up to 2e-9; above this value all processors choose alike."""
+"""Least margin for a choice that affects many points, such as a degree. The linear-algebra kernels of different
+processors change margins near zero by up to 2e-9; with this value, the choice is the same on all processors."""
 _TOO_FAR = "the magnitudes of the gains differ too much for a search in floating point."
 _MOST_SCALES = 64  # number of scales with cached coefficients
 
@@ -154,7 +154,7 @@ class Screened:
     margin: float  # Largest t
     decision: list[float]  # Coefficients a_j, in the units of the frame
     frame: Frame
-    # Derivative of the margin in every parameter of V̇, by the names of `rows_of`
+    # Derivative of the margin with respect to every parameter of V̇, by the names of `rows_of`
     slopes: Mapping[str, float]
 
     @property
@@ -229,7 +229,7 @@ class Sweep:
         Raises
         ------
         ValueError
-            When the point has another structure.
+            When the point does not have the structure of the sweep.
         CertificateError
             When the magnitudes of its numbers differ too much for floating point.
         """
@@ -282,7 +282,7 @@ class Sweep:
         return np.array([_product(values, names) for names in self.products])
 
     def _slopes(self, values: Mapping[str, float], per_product: np.ndarray) -> dict[str, float]:
-        """Derivative of the margin in every parameter, from that in every product."""
+        """Derivative of the margin with respect to every parameter, from those with respect to the products."""
         slopes = {name: 0.0 for names in self.products for name in names}
         for names, slope in zip(self.products, per_product.tolist(), strict=True):
             for i, name in enumerate(names):
@@ -290,10 +290,10 @@ class Sweep:
         return slopes
 
 
-def prove(sweep: Sweep, loop: Loop, answer: Screened, subject: Subject | None = None) -> Certificate | None:
+def prove(sweep: Sweep, loop: Loop, solution: Screened, subject: Subject | None = None) -> Certificate | None:
     """Certificate of a screened point, checked in exact arithmetic; None without an exact proof."""
-    family, proposal = sweep.family(answer.frame), Proposal(answer.decision, answer.margin)
-    return certificate_from_proposal(loop, family, proposal, answer.frame.scale, subject)
+    family, proposal = sweep.family(solution.frame), Proposal(solution.decision, solution.margin)
+    return certificate_from_proposal(loop, family, proposal, solution.frame.scale, subject)
 
 
 class _Numbers:
@@ -328,7 +328,7 @@ class _Numbers:
     def solve(
         self, features: np.ndarray, rate_scale: float, accuracy: float, *, anew: bool
     ) -> tuple[float, list[float], np.ndarray, float] | None:
-        """Margin, decision, derivative of the margin in every product, and solver time; None if the solver fails."""
+        """Margin, a_j, derivatives of the margin by product, and solver time [s]; None if the solver fails."""
         weights = self.weights(rate_scale)
         solution = self.cones.solve(weights * features[self.products], accuracy, anew=anew)
         if solution is None:
@@ -340,7 +340,7 @@ class _Numbers:
 
 
 def _exponents(values: Sequence[Fraction]) -> np.ndarray:
-    """Binary exponents n with 2^n within a factor of two, for values of any magnitude; exact for powers of two."""
+    """Binary exponents n with 2^n within a factor of two of |value|, for any magnitude; exact for powers of two."""
     return np.array([v.numerator.bit_length() - v.denominator.bit_length() for v in values])
 
 
@@ -373,11 +373,11 @@ def _nested(loop: Loop) -> list[tuple[Fraction, ...]]:
 # neighbouring point. All numbers are floating point: a path screens without proof.
 
 _FIRST = 1e-3  # first τ, far larger than margins
-_NEAR, _FAR = 0.9, 2.0  # size below which a step ends near a centre; size above which its start is discarded
+_NEAR, _FAR = 0.9, 2.0  # size below which a step ends near a centre; above which its initial point is discarded
 _REACH = 1.3  # largest size of a step after a reduction of τ, estimated from above
 _APART = 0.3  # largest ratio of τ between cached centres
-_MOST = 60
-_ROUNDS = 5
+_MOST = 60  # largest number of steps
+_ROUNDS = 5  # largest number of refinements of a step
 _ROOM = 10.0  # least ratio of a valid bound to the residual of its equations
 
 
@@ -401,7 +401,7 @@ class _Step:
     # least, most: Extreme eigenvalues of ΔS relative to S
     least: float
     most: float
-    residual: float  # Largest residual of the equations, by rounding errors
+    residual: float  # Largest residual of the equations, due to rounding errors
 
     @property
     def size(self) -> float:
@@ -469,7 +469,7 @@ class Path:
         return None
 
     def _moved(self, centre: _Centre, step: _Step) -> _Centre:
-        """Place after a step, or after 90 % of the way to the boundary; a centred place replaces those of smaller τ."""
+        """Point after a step, or after 90 % of the way to the boundary; a centred point replaces those of smaller τ."""
         share = min(1.0, 0.9 / step.size)
         moved = _Centre(step.tau, [f + share * d for f, d in zip(centre.functionals, step.moves, strict=True)])
         if step.size < _NEAR:
@@ -481,7 +481,7 @@ class Path:
 
 
 class _Newton:
-    """Newton's equations at one place: H·ΔL + Cλ = a, Σ CᵀΔL − Δμ·means = b, meansᵀλ = c.
+    """Newton's equations at one point: H·ΔL + Cλ = a, Σ CᵀΔL − Δμ·means = b, meansᵀλ = c.
 
     Parameters
     ----------
@@ -513,9 +513,9 @@ class _Newton:
     ) -> tuple[list[np.ndarray], np.ndarray, float]:
         """Solution ΔL, λ and Δμ, from H⁻¹a."""
         side = np.append(sum(map(_sum, self._tables, free)) - rest, slope)
-        answer = np.linalg.solve(self._system, side)
-        moves = [one - solved @ answer[:-1] for one, solved in zip(free, self._solved, strict=True)]
-        return moves, answer[:-1], float(answer[-1])
+        solution = np.linalg.solve(self._system, side)
+        moves = [one - solved @ solution[:-1] for one, solved in zip(free, self._solved, strict=True)]
+        return moves, solution[:-1], float(solution[-1])
 
     def _changes(self, moves: Sequence[np.ndarray]) -> list[np.ndarray]:
         """ΔS relative to S, as triangles of F⁻¹ΔS F⁻ᵀ with F Fᵀ = S."""
@@ -526,12 +526,12 @@ class _Newton:
         return min(ends), max(ends)
 
     def step(self) -> _Step:
-        """Newton's step towards the centre for the τ of the place."""
+        """Newton's step towards the centre for the τ of the point."""
         rest = self._rest(self._centre.functionals, 0.0)
         return self._refined(self._centre.tau, *self._solve(self._free, rest, 1 / self._centre.tau))
 
     def further(self, step: _Step) -> _Step:
-        """Step of limited size towards the centre for a smaller τ, from the step for the τ of the place."""
+        """Step of limited size towards the centre for a smaller τ, from the step for the τ of the point."""
         moves, multipliers, bound = self._solve([0.0 * one for one in step.moves], 0.0 * self._means, 1.0)
         more = (_REACH - step.size) / max(map(_longest, self._kinds, self._changes(moves)))
         return self._refined(
@@ -551,15 +551,15 @@ class _Newton:
         """Step refined until the residual of its equations is small against its bounds."""
         for _ in range(_ROUNDS):
             changes = self._changes(moves)
-            falls = [
+            gradients = [
                 (one @ (kind.unit - change)[..., None])[..., 0] - table @ multipliers
                 for kind, one, change, table in zip(self._kinds, self._forms, changes, self._tables, strict=True)
             ]
             rest = self._rest([f + d for f, d in zip(self._centre.functionals, moves, strict=True)], bound)
-            residual = max(np.abs(rest).max(), tau * max(np.abs(fall).max() for fall in falls))
+            residual = max(np.abs(rest).max(), tau * max(np.abs(one).max() for one in gradients))
             if residual * _ROOM < min(abs(bound), tau * abs(multipliers[0])):
                 break
-            free = [np.linalg.solve(h, fall[..., None])[..., 0] for h, fall in zip(self._squares, falls, strict=True)]
+            free = [np.linalg.solve(h, one[..., None])[..., 0] for h, one in zip(self._squares, gradients, strict=True)]
             more, further, higher = self._solve(free, rest, 1 / tau - self._means @ multipliers)
             moves = [move + one for move, one in zip(moves, more, strict=True)]
             multipliers, bound = multipliers + further, bound + higher

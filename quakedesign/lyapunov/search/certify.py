@@ -56,8 +56,8 @@ def certify(
     Raises
     ------
     ParameterError
-        If a gain or range is not a number, a range is empty or not positive, or the law has other uncertain
-        parameters or is not homogeneous in its weights.
+        If the number of gains is wrong, a gain or range is not a number, a range is empty or not positive, or the law
+        has other uncertain parameters or is not homogeneous in its weights.
     CertificateError
         When certificates do not support a part of the law, such as a squared uncertain parameter.
     UnknownNameError
@@ -78,11 +78,11 @@ def _swept(loop: Loop, subject: Subject) -> Certificate | None:
     for degree in candidate_degrees(loop):
         try:
             sweep = Sweep(loop, degree)
-            answer = sweep.solve(loop)
+            solution = sweep.solve(loop)
         except CertificateError:  # no candidates of this degree, or numbers too far apart
             continue
-        if answer is not None and answer.feasible:
-            certificate = prove(sweep, loop, answer, subject)
+        if solution is not None and solution.feasible:
+            certificate = prove(sweep, loop, solution, subject)
             if certificate is not None:
                 return certificate
     return None
@@ -115,15 +115,15 @@ def closed_loop(
 
 
 def _require_declared(model: LoopField, ranges: Mapping[str, tuple[Fraction, Fraction]]) -> None:
-    """Reject numbers outside the assumptions of their symbol, with which SymPy has simplified the field."""
-    inside: dict[sp.Symbol, set[sp.Expr]] = {}
+    """Reject numbers that violate the assumptions of their symbol, which SymPy has used to simplify the field."""
+    numbers: dict[sp.Symbol, set[sp.Expr]] = {}
     for symbol in (*model.gains, *model.uncertain):
         low, high = ranges[str(symbol)]
-        inside[symbol] = {to_sympy(v) for v in (low, high, min(max(low, Fraction(0)), high))}
+        numbers[symbol] = {to_sympy(v) for v in (low, high, min(max(low, Fraction(0)), high))}
         if low < high:
-            inside[symbol].add(to_sympy(low) + to_sympy(high - low) / sp.sqrt(2))
-    inside |= {root: {sp.sqrt(to_sympy(ranges[str(of)][0]))} for root, of in model.roots.items() if of in inside}
-    for symbol, values in inside.items():
+            numbers[symbol].add(to_sympy(low) + to_sympy(high - low) / sp.sqrt(2))
+    numbers |= {root: {sp.sqrt(to_sympy(ranges[str(of)][0]))} for root, of in model.roots.items() if of in numbers}
+    for symbol, values in numbers.items():
         for kind, declared in symbol.assumptions0.items():
             wrong = [v for v in values if getattr(v, f"is_{kind}") != declared]
             if wrong:
@@ -164,7 +164,7 @@ def _require_one(degrees: Mapping[Fraction, str], loop: Loop) -> None:
         (m, first), (n, second), *_ = degrees.items()
         raise ParameterError(
             f"the loop must be homogeneous in the weights {dict(loop.states)}. Received degree {m} of "
-            f"{first} and {n} of {second}. Use weights of quakedesign.symbolic.homogeneity.weights_for."
+            f"{first} and {n} of {second}. Use the weights from quakedesign.symbolic.homogeneity.weights_for."
         )
 
 
@@ -210,10 +210,10 @@ def _ranges(
 TOLERANCE = Fraction(1, 10_000)
 """Relative width of a bracket: the search succeeds at x and not at x(1 + TOLERANCE)."""
 _BELOW, _ABOVE = TOLERANCE / 2, TOLERANCE / 5  # intended distances of the bracket's ends from the root
-_MOST = 40
-_STRIDE = 8
-_BELIEVED = 6  # evaluations after which tangents are combined with bisection
-_NEAR = 3 * TOLERANCE
+_MOST = 40  # largest number of evaluations
+_STRIDE = 8  # largest factor by which one step increases the distance from the floor
+_TANGENTS = 6  # evaluations after which tangents are combined with bisection
+_NEAR = 3 * TOLERANCE  # relative distance from the root below which the other end of the bracket is tried
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -231,10 +231,10 @@ class Bracket:
         ends = [end for end in (self.high, limit) if end is not None]
         return self.low is not None and any(end <= self.low * (1 + TOLERANCE) for end in ends)
 
-    def updated(self, x: Fraction, answer: Screened | None) -> "Bracket":
+    def updated(self, x: Fraction, solution: Screened | None) -> "Bracket":
         """Bracket after one more evaluation."""
-        if answer is not None and answer.feasible:
-            return Bracket(low=x, high=self.high, best=answer, evaluations=self.evaluations + 1)
+        if solution is not None and solution.feasible:
+            return Bracket(low=x, high=self.high, best=solution, evaluations=self.evaluations + 1)
         return Bracket(low=self.low, high=x, best=self.best, evaluations=self.evaluations + 1)
 
 
@@ -252,7 +252,7 @@ def last_success(
     Parameters
     ----------
     evaluate : callable
-        Function of a number; returns the solution at this number, and the slope of its margin.
+        Function of a number; returns the solution at this number, and the derivative of its margin.
     first : Fraction
         Initial number; the floor if no better guess is known.
     floor : Fraction
@@ -260,7 +260,7 @@ def last_success(
     limit : Fraction, optional
         Smallest number at which no search can succeed; the search stays below it.
     most : Fraction, optional
-        Number at which success ends the search.
+        Number from which on a success ends the search.
     only_above : bool
         Stop if the search fails at `first`.
 
@@ -271,32 +271,32 @@ def last_success(
     """
     bracket, x = Bracket(), first
     for _ in range(_MOST):
-        answer, slope = evaluate(x)
-        bracket = bracket.updated(x, answer)
+        solution, slope = evaluate(x)
+        bracket = bracket.updated(x, solution)
         enough = most is not None and bracket.low is not None and bracket.low >= most
         if bracket.closed(limit) or enough or bracket.high == floor or (only_above and bracket.low is None):
             break
-        step = _next(bracket, x, _root(x, answer, slope), floor, limit)
+        step = _next(bracket, x, _root(x, solution, slope), floor, limit)
         x = max(floor, Fraction(f"{float(step):.7e}"))  # eight digits suffice
     return bracket
 
 
-def _root(x: Fraction, answer: Screened | None, slope: float) -> Fraction | None:
-    """Number at which the tangent of the margin reaches `SURE`; None without a falling tangent."""
-    if answer is None or not slope < 0:
+def _root(x: Fraction, solution: Screened | None, slope: float) -> Fraction | None:
+    """Number at which the tangent of the margin reaches `SURE`; None without a decreasing tangent."""
+    if solution is None or not slope < 0:
         return None
-    return Fraction(float(x) - (answer.margin - SURE) / slope)
+    return Fraction(float(x) - (solution.margin - SURE) / slope)
 
 
 def _next(bracket: Bracket, x: Fraction, root: Fraction | None, floor: Fraction, limit: Fraction | None) -> Fraction:
     """Next number to try: near the tangent's root, on the side where the bracket needs an end; else the middle."""
     low, high = bracket.low, bracket.high
-    astray = root is None or root <= floor or bracket.evaluations > _BELIEVED
-    if low is None and bracket.evaluations > 1 and astray:
+    unusable = root is None or root <= floor or bracket.evaluations > _TANGENTS
+    if low is None and bracket.evaluations > 1 and unusable:
         return floor
     ceiling = None if limit is None else first_below(limit)
     middle = _middle(x, low, high, floor, ceiling)
-    if root is None or (bracket.evaluations > _BELIEVED and bracket.evaluations % 3 == 0):
+    if root is None or (bracket.evaluations > _TANGENTS and bracket.evaluations % 3 == 0):
         return middle
     near = abs(root - x) < _NEAR * x
     guess = root * (1 - _BELOW) if not near or x == high else root * (1 + _ABOVE)
@@ -318,7 +318,7 @@ def _middle(
 
 
 def first_below(limit: Fraction) -> Fraction:
-    """Number below a limit, but so close to it that success there ends the search."""
+    """Number below a limit, so close to it that success there ends the search."""
     return limit * (1 - _BELOW - _ABOVE)
 
 
@@ -326,9 +326,9 @@ def first_below(limit: Fraction) -> Fraction:
 # Proved limits of given gains: the largest disturbance or range of β, each with an upper bound.
 
 _STEPS_BACK = (Fraction(0), TOLERANCE / 4, TOLERANCE / 2, 10 * TOLERANCE, 100 * TOLERANCE)
-_FAR = Fraction(10) ** 12
+_FAR = Fraction(10) ** 12  # least bound on |d| in the search for a counterexample
 _WIDE = 10**6  # factor of β at which the search stops
-_HAIR = Fraction(1, 10**9)  # least relative width of a range of β, so that it always has two ends
+_LEAST_WIDTH = Fraction(1, 10**9)  # least relative width of a range of β, so that it always has two ends
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -338,10 +338,10 @@ class CertifiedLimit:
     quantity: str  # ``"lipschitz"``, ``"beta"`` (upper end b_M) or ``"beta-factor"`` (range [b/f, b·f])
     value: Fraction | None  # Proved exactly; None if the search finds no proof
     # Largest over all degrees of the smallest number at which the search failed; at most value·(1 + 1e-4) unless an
-    # exact proof failed. None if `limit` is as close, or no search failed
+    # exact proof failed. None if `limit` is within 1e-4 of the value, or no search failed
     beyond: Fraction | None
     limit: Fraction | None  # Value at which no Lyapunov function of any kind exists; None if unknown
-    degrees: tuple[int, ...]  # Degrees of V that were tried, all with sums of squares on cells without multiplier
+    degrees: tuple[int, ...]  # Degrees of V, tried in order until `limit` is reached; no multiplier in the proofs
     degree: int | None  # Degree of V in the certificate
     # Proof for the value; without a proof, the exact counterexample, if one is known
     certificate: Certificate | None
@@ -374,7 +374,7 @@ class CertifiedLimit:
 
 @dataclass(frozen=True, slots=True)
 class _Line:
-    """Loops as a function of one number x ≥ floor, and the derivatives of the sweep's parameters in x."""
+    """Loops as a function of one number x ≥ floor, and the derivatives of the sweep's parameters with respect to x."""
 
     quantity: str
     at: Callable[[Fraction], Loop]
@@ -420,7 +420,7 @@ def largest_lipschitz(
     def at(x: Fraction) -> Loop:
         return replace(base, uncertain={**base.uncertain, "d": (-x, x)})
 
-    first = _reachable(base) if limit is None else first_below(limit)
+    first = _disturbance_scale(base) if limit is None else first_below(limit)
     line = _Line("lipschitz", at, lambda x: {"d": 1.0}, Fraction(0), first, limit)
     return _largest(line, subject, _chosen(degrees, base), began)
 
@@ -466,7 +466,7 @@ def largest_gain_range(
     floor = Fraction(1) if symmetric else middle
 
     def at(x: Fraction) -> Loop:
-        x = max(x, floor * (1 + _HAIR))
+        x = max(x, floor * (1 + _LEAST_WIDTH))
         ends = (middle / x, middle * x) if symmetric else (middle, x)
         return replace(base, uncertain={**base.uncertain, "beta": ends})
 
@@ -484,7 +484,7 @@ def necessary_limit(loop: Loop, subject: Subject) -> Fraction | None:
     chosen = None if isinstance(subject, LoopField) else law(subject) if isinstance(subject, str) else subject
     limit = chosen(gains=dict(loop.gains)).lipschitz_limit if chosen is not None else None
     limits = [] if limit is None else [max(Fraction(0), limit)]
-    for bound in (Fraction(0), max(_FAR, 4 * _reachable(loop))):
+    for bound in (Fraction(0), max(_FAR, 4 * _disturbance_scale(loop))):
         refuted = refute(replace(loop, uncertain={**loop.uncertain, "d": (-bound, bound)}), subject)
         if refuted is not None and refuted.refutation is not None:
             limits.append(abs(refuted.refutation.parameters["d"]))
@@ -546,18 +546,18 @@ class _Search:
         self.sweep = Sweep(reference, degree)
         self.frame = self.sweep.frame(reference)
 
-    def ask(self, x: Fraction) -> tuple[Screened | None, float]:
-        """Solution at x, and the slope of its margin."""
-        answer = self.sweep.solve(self.line.at(x), self.frame)
-        if answer is None:
+    def evaluate(self, x: Fraction) -> tuple[Screened | None, float]:
+        """Solution at x, and the derivative of its margin with respect to x."""
+        solution = self.sweep.solve(self.line.at(x), self.frame)
+        if solution is None:
             return None, 0.0
-        return answer, sum(answer.slopes.get(n, 0.0) * step for n, step in self.line.direction(float(x)).items())
+        return solution, sum(solution.slopes.get(n, 0.0) * step for n, step in self.line.direction(float(x)).items())
 
     def above(self, value: Fraction | None) -> Bracket:
         """Bracket of the largest number; has `low` only if it exceeds the proved value."""
         first = self.line.first if value is None else value * (1 + TOLERANCE * Fraction(9, 10))
         return last_success(
-            self.ask,
+            self.evaluate,
             first,
             floor=self.line.floor,
             limit=self.line.limit,
@@ -568,12 +568,12 @@ class _Search:
     def proved(self, bracket: Bracket) -> tuple[Fraction, Certificate] | None:
         """Number at or just below the lower end of a bracket, and its certificate; None without a proof."""
         assert bracket.low is not None
-        answer = bracket.best
+        solution = bracket.best
         for step in _STEPS_BACK:
             x = max(self.line.floor, bracket.low * (1 - step))
-            answer = answer if x == bracket.low else self.ask(x)[0]
-            if answer is not None and answer.feasible:
-                certificate = prove(self.sweep, self.line.at(x), answer, self.subject)
+            solution = solution if x == bracket.low else self.evaluate(x)[0]
+            if solution is not None and solution.feasible:
+                certificate = prove(self.sweep, self.line.at(x), solution, self.subject)
                 if certificate is not None:
                     return x, certificate
         return None
@@ -585,7 +585,7 @@ def _chosen(degrees: int | Iterable[int] | None, loop: Loop) -> tuple[int, ...]:
     return (degrees,) if isinstance(degrees, int) else tuple(degrees)
 
 
-def _reachable(loop: Loop) -> Fraction:
+def _disturbance_scale(loop: Loop) -> Fraction:
     """Half the sum of the magnitudes of all other terms in the rates that contain d."""
     rates = [terms for terms in loop.field.values() if any("d" in t.parameters for t in terms)]
     ends = {name: max(map(abs, range_)) for name, range_ in loop.ranges.items()}

@@ -1,6 +1,6 @@
 """Exact proofs that a family contains no Lyapunov function, and falsification of a loop by simulation.
 
-The proofs are weighted points (exact dual solutions).
+The proofs are exact dual solutions: points with positive weights.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,8 +23,8 @@ from quakedesign.symbolic.term_expressions import signed_monomials
 from quakedesign.symbolic.terms import Term
 
 _GRID = 4096  # denominator of the points before scaling by powers of two
-_ROUNDS, _FIRST, _MORE = 12, 40, 400
-_SURE = 1e-9
+_ROUNDS, _FIRST, _MORE = 12, 40, 400  # number of refinements; of first points per row; of new points per refinement
+_SURE = 1e-9  # margins and weights up to this value count as zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,10 +38,10 @@ class Atom:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dual:
-    """Proof by Σ weight·P_o(point) = 0 for every V of a family, so that no V has P_o > 0 at all these points.
+    """Proof that no V of a family has P_o > 0 at all given points: Σ weight·P_o(point) = 0 for every V.
 
     P_o are V and −V̇ on cells. The family contains all sums of even C¹ signed monomials of one degree
-    (`signed_monomials`). The proof excludes positivity itself, not only sums of squares of some level.
+    (`signed_monomials`). The proof excludes positivity itself, not only a sum of squares of some level.
     """
 
     loop: Loop
@@ -51,7 +51,7 @@ class Dual:
     @property
     def holds(self) -> bool:
         """Whether the proof is valid, re-checked in exact arithmetic."""
-        if not _sharp(self.loop):
+        if not _attains_vertices(self.loop):
             return False
         monomials = signed_monomials(self.loop.states, self.degree, self.loop.domain)
         rows = {row[0].name: row for row in _rows(self.loop, monomials)}
@@ -84,12 +84,12 @@ def dual(loop: Loop, degree: int) -> Dual | None:
         rows = list(_rows(loop, monomials)) if monomials else []
     except CertificateError:
         return None
-    if not rows or not _sharp(loop) or any(row[0].equalities for row in rows):
+    if not rows or not _attains_vertices(loop) or any(row[0].equalities for row in rows):
         return None
     return _PointSearch(loop, degree, monomials, rows).result()
 
 
-def _sharp(loop: Loop) -> bool:
+def _attains_vertices(loop: Loop) -> bool:
     """Whether every vertex of the ranges is attained by the loop."""
     return all(low == high for _, (low, high) in loop.roots.values())
 
@@ -171,13 +171,13 @@ class _PointSearch:
         return tuple(s * Fraction(n, _GRID) for s, n in zip(self.scale, whole, strict=True))
 
     def line(self, row: int, point: Sequence[Fraction]) -> list[float]:
-        """Values of all V_j or −V̇_j at a point, over the sizes of V_j, scaled to a largest value of one."""
+        """Values of all V_j or −V̇_j at a point, divided by the sizes of the V_j, then by the largest magnitude."""
         values = [v / s for v, s in zip(_values(self.rows[row], point), self.sizes, strict=True)]
         largest = max(map(abs, values)) or Fraction(1)
         return [float(v / largest) for v in values]
 
     def best(self) -> tuple[float, np.ndarray]:
-        """Largest margin t with line·a ≥ t on all lines and |a_j| ≤ 1, and its a."""
+        """Largest margin t with line·a ≥ t for all lines and |a_j| ≤ 1, and the maximising a."""
         A = np.hstack([-np.array(self.lines), np.ones((len(self.lines), 1))])
         count = A.shape[1] - 1
         cost = [*[0.0] * count, -1.0]
@@ -215,8 +215,8 @@ class _PointSearch:
             Atom(obligation=self.rows[row][0].name, point=point, weight=w)
             for (row, point), w in zip(chosen, weights, strict=True)
         )
-        answer = Dual(loop=self.loop, degree=self.degree, atoms=atoms)
-        return answer if answer.holds else None
+        result = Dual(loop=self.loop, degree=self.degree, atoms=atoms)
+        return result if result.holds else None
 
 
 def _null_vector(rows: Sequence[Sequence[Fraction]]) -> list[Fraction] | None:
@@ -249,10 +249,10 @@ class Escape:
 
 
 def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
-    """Simulation that grows at two step sizes, with parameters that switch between their ends; None if none is found.
+    """Simulation whose state grows at two step sizes, with parameters at the ends of their ranges; None if not found.
 
-    Every uncertain parameter takes the end of its range given by a sign: that of a state or a rate, or of a product of
-    two such quantities if all its terms are odd in the states.
+    A sign selects the end of the range of an uncertain parameter. If all its terms are odd in the states, this is the
+    sign of a product of two states, or of a state and its rate; otherwise, of one state or rate.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ def escape(loop: Loop, *, steps: int = 6000) -> Escape | None:
 
 @dataclass(frozen=True, slots=True)
 class _Strategy:
-    """Sign that a parameter follows: that of a product of states and rates, the rates at the middle of all ranges."""
+    """Sign that a parameter follows: that of a product of states and rates, with rates at the middle of all ranges."""
 
     names: tuple[str, ...]
     sign: int
@@ -329,7 +329,7 @@ class _FloatField:
         return total
 
     def growths(self, strategies: Sequence[tuple[_Strategy, ...]], steps: int, step: float) -> np.ndarray:
-        """Largest growth of every strategy in e-foldings over all initial states, without the initial part of a run."""
+        """Largest growth of every strategy over all initial states [e-foldings], without the first quarter of a run."""
         x = np.tile(np.random.default_rng(0).normal(size=(len(self.states), _STARTS)), len(strategies))
         middle, ends = self._parameters()
         growth = np.zeros(x.shape[1])
@@ -344,8 +344,8 @@ class _FloatField:
             for name, (low, high) in ends.items():
                 first, second, sign = followed[name]
                 chosen[name] = np.where(signs[first, columns] * signs[second, columns] * sign > 0, high, low)
-            speed = self.rates(x, chosen)
-            x = x + step * speed / np.abs(speed).max(axis=0)
+            rates = self.rates(x, chosen)
+            x = x + step * rates / np.abs(rates).max(axis=0)
         return np.asarray(growth.reshape(len(strategies), _STARTS).max(axis=1))
 
     def _followed(self, strategies: Sequence[_Strategy]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -73,7 +73,7 @@ def certificate_of(
 
 
 def witness_of(one: Obligation, domain: str) -> Witness | None:
-    """Exact witness of an obligation with the lowest sufficient power of the sum of all variables; None without one."""
+    """Exact witness of an obligation, with the lowest sufficient power of Σu_i as multiplier; None if none is found."""
     size = width(one)
     if not one.polynomial:
         empty: tuple[dict[Any, Any], ...] = tuple({} for _ in one.equalities)
@@ -105,9 +105,8 @@ def power_of_sum(size: int, power: int) -> dict[tuple[int, ...], Fraction]:
 def balance(loop: Loop) -> tuple[Fraction, ...]:
     """Scales 2^n_i of the variables, u_i = 2^n_i·ũ_i, for which the terms of every state's rate are similar in size.
 
-    The scales solve a least-squares problem in the logarithms; the scale of the first state is 1.
-    A nested power is replaced by the
-    powers of the terms of its argument.
+    The scales solve a least-squares problem in the logarithms; the scale of the first state is 1. A nested power is
+    replaced by the powers of the terms of its argument.
     """
     states = tuple(loop.states)
     rows, sides = [], []
@@ -182,7 +181,7 @@ def scaled(polynomial: Polynomial, scale: Sequence[Fraction], factor: Fraction =
 
 
 def normal(polynomial: Polynomial, scale: Sequence[Fraction]) -> Polynomial:
-    """Polynomial P(scale ∘ ũ) divided by its largest coefficient."""
+    """Polynomial P(scale ∘ ũ) divided by the largest magnitude of its coefficients."""
     moved = scaled(polynomial, scale)
     size = max(abs(c) for c in moved.values())
     return {e: c / size for e, c in moved.items()}
@@ -374,7 +373,7 @@ def store(loop: Loop, degree: int, certificate: Certificate | None) -> None:
 
 _WORTH_A_PROOF = 1e-9
 """Margins above this are tried in exact arithmetic, which decides."""
-_DIGITS = (1 << 14, 1 << 20, 1 << 30)
+_DIGITS = (1 << 14, 1 << 20, 1 << 30)  # denominators of the rounded coefficients of V, coarsest first
 _HIGHEST_DEGREE, _HIGHEST_IN_THE_PLANE = 8, 10  # higher degrees gain less than they cost in rounding or time
 
 
@@ -502,7 +501,7 @@ def _rows(columns: list[list[Obligation]]) -> list[list[Obligation]]:
 
 
 def _moved(one: Obligation, scale: Sequence[Fraction], factor: Fraction) -> Obligation:
-    """Obligation in scaled variables with its polynomial times a factor; an empty scale keeps the variables."""
+    """Obligation in scaled variables with its polynomial times a factor; an empty scale means unscaled variables."""
     if not scale:
         return Obligation(
             one.name, {e: c * factor for e, c in one.polynomial.items()}, one.equalities, one.inequalities

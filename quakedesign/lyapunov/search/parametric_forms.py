@@ -75,7 +75,7 @@ def values_of(loop: Loop) -> dict[str, float]:
 
 
 def rows_of(loop: Loop, monomials: Sequence[Term], *, with_function: bool = False) -> tuple[FormRow, ...]:
-    """Every distinct form of V, then of −V̇; with `with_function`, equal forms of −V̇ with different V are kept apart.
+    """Every distinct form of V, then of −V̇; with `with_function`, equal forms of −V̇ with different V are separate.
 
     Raises
     ------
@@ -138,8 +138,8 @@ class Structure:
     """All properties of a loop on which its rows depend, as key of the cache."""
 
     loop: tuple[object, ...]
-    inside: tuple[tuple[str, Fraction], ...]
-    points: tuple[tuple[str, bool, bool], ...]
+    inside: tuple[tuple[str, Fraction], ...]  # Parameters in nested powers, with their values
+    points: tuple[tuple[str, bool, bool], ...]  # Ranges: name, whether low = high, whether low = −high
     degree: int
 
     @classmethod

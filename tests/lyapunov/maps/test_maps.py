@@ -126,10 +126,10 @@ def test_processes_give_the_same_answers_even_if_they_are_killed():
     alone = Screener(sheet)
     with Processes(2) as processes:
         crew = Screeners(sheet, processes)
-        first = [found for found, _ in crew.answers("row", [(row,) for row in sheet.rows])]
+        first = [found for found, _ in crew.results("row", [(row,) for row in sheet.rows])]
         for process in active_children():
             process.kill()
-        second = list(crew.answers("proof", [((2, 2), 1)]))
+        second = list(crew.results("proof", [((2, 2), 1)]))
     assert sorted(first) == sorted(alone.row(row)[0] for row in sheet.rows)
     assert second == [alone.proof((2, 2), 1)]
     assert second[0][2] is not None
