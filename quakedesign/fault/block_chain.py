@@ -1,9 +1,9 @@
-"""Faults of several blocks in a row, coupled by springs, with wells along the fault; reading of their files.
+"""Faults of several blocks in a row, coupled by springs, with wells along the fault, and their files.
 
-A fault file has ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between two
-wells, constant beyond the outermost ones, taken at the middle of each block. With a diffusivity D the pressure diffuses
-between neighbouring points, which are the middles x_i of blocks of lengths L_i and the wells: q_i' =
-D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, without flow at the ends). If a well is at x_i, q_i is its pressure.
+Such a fault file has ``[[block]]`` tables. Without a diffusivity the pressure along the fault is steady: linear between
+two wells, constant beyond the outermost ones. A block has the pressure at its middle. With a diffusivity D the pressure
+diffuses between neighbouring points: the middles x_i of the blocks, of lengths L_i, and the wells. The pressures there
+obey q_i' = D/L_i·Σ(q_j − q_i)/|x_j − x_i| (finite volumes, no flow through the ends); at a well, q_i is its pressure.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,14 +33,16 @@ MOST_BLOCKS = 20
 class FaultBlock:
     """One block of a row.
 
+    Raises `ParameterError` for a length or stress that is not positive and finite.
+
     Attributes
     ----------
     length : float
-        Length of the block along the fault [m].
+        Length of the block along the fault [m], positive.
     effective_normal_stress : float
-        σ'_n [Pa], positive in compression; a file may omit it for a block with that of the fault.
+        σ'_n [Pa], positive in compression; default in a file: that of the fault.
     friction : FrictionLaw
-        Friction law of the block; a file may omit it for a block with that of the fault.
+        Friction law of the block; default in a file: that of the fault.
     """
 
     length: float
@@ -58,13 +60,18 @@ class BlockChain:
     Attributes
     ----------
     fault : Fault
-        Common data of all blocks: rock, width, damping per area, task, disturbance, box, name.
+        Common data of all blocks: host rock, width, damping per area, task, disturbance, box, name.
     blocks : tuple of FaultBlock
-        2 to 20 blocks, whose lengths add up to that of the fault.
+        2 to 20 blocks, whose lengths add up to that of the fault; friction has a state in all blocks or in none.
     wells : tuple of float
-        Positions along the fault [m], in increasing order.
+        Positions along the fault [m], in increasing order; at least one, at most as many as blocks.
     diffusivity : float, optional
-        Diffusivity of the pressure along the fault [m²/s]; without it the pressure is steady.
+        Diffusivity of the pressure along the fault [m²/s], positive; without it the pressure is steady.
+
+    Raises
+    ------
+    ParameterError
+        When these conditions are violated, or a diffusivity is given for friction with a state.
     """
 
     fault: Fault
@@ -76,9 +83,9 @@ class BlockChain:
         blocks, wells = len(self.blocks), len(self.wells)
         if not 2 <= blocks <= MOST_BLOCKS or not 1 <= wells <= blocks:
             raise ParameterError(
-                f"a fault of several blocks must have 2 to {MOST_BLOCKS} blocks, and 1 to as many wells as blocks. "
-                f"Received {counted(blocks, 'block')} and {counted(wells, 'well')}. Add or omit [[block]] or "
-                "[[well]] tables; the file of a fault of one block has neither."
+                f"a fault of several blocks must have 2 to {MOST_BLOCKS} blocks, at least one well, and at most as "
+                f"many wells as blocks. Received {counted(blocks, 'block')} and {counted(wells, 'well')}. Add or omit "
+                "[[block]] or [[well]] tables; the file of a fault of one block has neither."
             )
         whole, length = sum(self.lengths, Fraction(0)), rational(self.fault.length)
         if whole != length:
@@ -99,7 +106,7 @@ class BlockChain:
         for place, block in enumerate(self.blocks, 1):
             if block.friction.equilibrium is not self.friction.equilibrium:
                 raise ParameterError(
-                    "blocks of a fault need friction with a state in all of them, or in none. Received "
+                    "either all blocks of a fault or none must have friction with a state. Received "
                     f"{self.friction.name} in block 1 and {block.friction.name} in block {place}. Change one."
                 )
 
@@ -135,22 +142,22 @@ class BlockChain:
 
     @cached_property
     def flow(self) -> tuple[tuple[Fraction, ...], ...]:
-        """Coefficients in q' [1/s] of q (first columns) and of the well pressures (last columns).
+        """Matrix [1/s] that gives q' from q (first columns) and the well pressures (last columns).
 
-        q are the pressures of the blocks without a well at their middle. Empty without a diffusivity.
+        q are the pressures of the blocks without a well at their middle. The matrix is empty without a diffusivity.
         """
-        wells, slow = [rational(v) for v in self.wells], self._diffusing
+        wells, states = [rational(v) for v in self.wells], self._diffusing
         diffusivity = rational(self.diffusivity or 0)
         points = sorted({*self.middles, *wells})
         rows = []
-        for i in slow:
-            x, row = self.middles[i], [Fraction(0)] * (len(slow) + len(wells))
+        for i in states:
+            x, row = self.middles[i], [Fraction(0)] * (len(states) + len(wells))
             place = points.index(x)
             for other in points[max(place - 1, 0) : place] + points[place + 1 : place + 2]:
                 rate = diffusivity / (self.lengths[i] * abs(other - x))
-                column = len(slow) + wells.index(other) if other in wells else slow.index(self.middles.index(other))
+                column = len(states) + wells.index(other) if other in wells else states.index(self.middles.index(other))
                 row[column] += rate
-                row[slow.index(i)] -= rate
+                row[states.index(i)] -= rate
             rows.append(tuple(row))
         return tuple(rows)
 
@@ -159,14 +166,14 @@ class BlockChain:
         """Share of each pressure of `flow` (columns) in each block pressure (rows) [-]; `shares` if it is steady."""
         if self.diffusivity is None:
             return self.shares
-        wells, slow = [rational(v) for v in self.wells], self._diffusing
-        places = [slow.index(i) if i in slow else len(slow) + wells.index(x) for i, x in enumerate(self.middles)]
-        size = len(slow) + len(wells)
+        wells, states = [rational(v) for v in self.wells], self._diffusing
+        places = [states.index(i) if i in states else len(states) + wells.index(x) for i, x in enumerate(self.middles)]
+        size = len(states) + len(wells)
         return tuple(tuple(Fraction(j == place) for j in range(size)) for place in places)
 
     @property
     def _diffusing(self) -> list[int]:
-        """Blocks whose pressure diffuses."""
+        """Indices of the blocks whose pressure is a state of the diffusion."""
         wells = {rational(v) for v in self.wells}
         return [] if self.diffusivity is None else [i for i, x in enumerate(self.middles) if x not in wells]
 
@@ -204,7 +211,7 @@ class BlockChain:
 
 
 def add_springs(rows: Any, springs: Iterable[tuple[int, int, Fraction]], scale: Any = 1) -> None:
-    """Add to the rows of a matrix the acceleration of block i by springs (i, j, K) per slip of every block, × scale."""
+    """Add springs (i, j, K), times `scale`, to a matrix of the acceleration of each block (row) per slip (column)."""
     for i, j, K in springs:
         rows[i][j] += K * scale
         rows[i][i] -= K * scale
@@ -216,20 +223,20 @@ BLOCK = {
 }
 WELL = {"position": FileEntry(name="position", unit="m", example="1 km", text="Position along the fault")}
 DIFFUSION = entries_of(BlockChain)
-"""Entries of a file of several blocks outside of its tables."""
+"""Top-level entries that only a file of several blocks has."""
 
 
 def load_chain(source: str | Path, *, box: str | None = None, allow_code: bool = False) -> BlockChain | None:
-    """Fault of several blocks from a TOML file; None without ``[[block]]`` and ``[[well]]`` tables, or if not TOML.
+    """Fault of several blocks from a TOML file; None if it is not TOML or has no ``[[block]]`` or ``[[well]]`` table.
 
     Parameters
     ----------
     source : str or Path
         Name of a preset, or a path that ends in ``.toml``.
     box : str, optional
-        Name of an uncertainty box in place of that of the file.
+        Name of an uncertainty box that replaces the one in the file.
     allow_code : bool
-        As in `load_fault`.
+        As in `load_fault`, whose errors are raised here too.
     """
     text = source_text(source)
     try:

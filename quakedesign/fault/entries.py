@@ -1,7 +1,7 @@
 """Entries of fault files, declared once as fields of dataclasses, and the tables that contain them.
 
-The metadata of a field are its `unit`, `symbol`, `example`, `default` and `text`; without a text, the description is
-that of the docstring. Reading, writing, template, JSON Schema and reference page use the same entries.
+The metadata of a field are its `unit`, `symbol`, `example`, `default` and `text`; without `text`, the docstring of the
+class describes the field. Reading, writing, template, JSON Schema and reference page use the same entries.
 """
 
 import inspect
@@ -44,7 +44,7 @@ class FileEntry:
     text : str
         Description in place of that in the docstring of `owner`.
     owner : type
-        Class with the field.
+        Class that declares the field.
     """
 
     name: str
@@ -68,7 +68,7 @@ class FileEntry:
 
 
 def entries_of(kind: type) -> dict[str, FileEntry]:
-    """Entries of those fields of a dataclass that are quantities or texts; of a friction law, all fields."""
+    """Entries of the fields of a dataclass that are quantities or texts; all fields of a friction law."""
     law = issubclass(kind, FrictionLaw)
     return {
         each.name: FileEntry(
@@ -88,7 +88,7 @@ def entries_of(kind: type) -> dict[str, FileEntry]:
 
 @cache
 def _descriptions(kind: type) -> dict[str, str]:
-    """Descriptions of attributes by name, in the docstrings of a class and of its base classes."""
+    """Descriptions of attributes by name, from the docstrings of a class and of its base classes."""
     from docstring_parser import DocstringStyle, parse
 
     descriptions: dict[str, str] = {}
@@ -119,7 +119,7 @@ class Table:
     def read(self, entries: Mapping[str, FileEntry], quantity: Reader = si_value) -> Json:
         """Texts, and quantities in SI units, by name; None for an invalid entry or a missing required one.
 
-        An omitted optional entry has no value.
+        An optional entry that the file omits is not in the result.
         """
         values: Json = {}
         for entry in entries.values():
@@ -129,7 +129,7 @@ class Table:
                 with self.problems.collected():
                     value, unit, name = self.entries[key], entry.unit, self._name(key)
                     values[entry.name] = (
-                        _of(str, value, name, "a string") if unit is None else quantity(value, unit, name)
+                        _typed(str, value, name, "a string") if unit is None else quantity(value, unit, name)
                     )
             elif entry.required:
                 values[entry.name] = None
@@ -140,7 +140,7 @@ class Table:
         if self._given(key, optional):
             with self.problems.collected():
                 name = self._name(key)
-                return Table(_of(dict, self.entries[key], name, "a table"), self.problems, name)
+                return Table(_typed(dict, self.entries[key], name, "a table"), self.problems, name)
         return Table({}, Problems())
 
     def name_or_table(self, key: str, default: str) -> "str | Table | None":
@@ -150,7 +150,7 @@ class Table:
             return self.table(key, optional=True)
         self._keys.append(key)
         with self.problems.collected():
-            return _of(str, value, self._name(key), "a name or a table")
+            return _typed(str, value, self._name(key), "a name or a table")
         return None
 
     def built(self, kind: Callable[..., _Value], values: Json) -> _Value | None:
@@ -197,8 +197,8 @@ class Table:
         return f"{self.where}.{key}".strip(".")
 
 
-def _of(kind: type[_Value], value: object, name: str, what: str) -> _Value:
-    """Return a value if it has a type; `name` and `what` (the type in words) are for the message."""
+def _typed(kind: type[_Value], value: object, name: str, what: str) -> _Value:
+    """Return a value of the type `kind`, else raise; `name` and `what` (the type in words) are for the message."""
     if not isinstance(value, kind):
         raise ScenarioError(f"{name} must be {what}. Received {shown(value)}. Compare with a preset.")
     return value

@@ -1,4 +1,4 @@
-"""Equilibria of faults, rest or steady sliding, and functions with one implementation for each."""
+"""Equilibria of faults (rest and steady sliding), and functions with one implementation for each."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -14,27 +14,27 @@ class FaultEquilibrium:
     """Equilibrium about which a fault is studied and controlled."""
 
     name: str
-    coordinates: str  # Coordinates of the plant: beginning of a sentence that the equations of the plant complete
-    poles: str  # Equilibrium about which the poles are computed, in words: format string for the slip rate [m/s]
-    messages: Mapping[str, str]  # Message for each quantity that does not apply, by name
+    coordinates: str  # Coordinates of the plant: begins a sentence that the equations of the plant complete
+    poles: str  # Equilibrium of the poles, in words: a format string for the slip rate [m/s]
+    messages: Mapping[str, str]  # Message about each argument that does not apply, by its name
 
 
 AT_REST = FaultEquilibrium(
     name="rest",
-    coordinates="Slip x₁ and slip rate x₂, measured from the equilibrium without pressure,",
+    coordinates="Slip x₁ and slip rate x₂, relative to the equilibrium without pressure,",
     poles="",
     messages={
         "ramp": "ramp needs friction with a state, whose reference has a constant rate. Received the ramp {value!r} "
-        "with {law}, whose reference is smooth already. Omit ramp.",
+        "with {law}, whose reference is already smooth. Omit ramp.",
         "simulate_state": "the friction law must have a state. Received {law}. Use simulate.",
     },
 )
 STEADY_SLIDING = FaultEquilibrium(
     name="sliding",
-    coordinates="Slip x₁, slip rate v, the stretch s of the spring, whose far end rests, and the state of friction",
+    coordinates="Slip x₁, slip rate v, extension s of the spring, whose far end is fixed, and the state of friction",
     poles=" about steady sliding at {:.4g} m/s",
     messages={
-        "disturbance": "friction with a state takes the bound of a shear stress, not a disturbance. Received "
+        "disturbance": "friction with a state needs the bound of a shear stress, not a disturbance. Received "
         "{value!r}. Give --stress.",
         "diffusivity": "diffusivity along the fault needs friction without a state. Received {law}. Omit diffusivity, "
         "for steady pressures along the fault.",
@@ -54,7 +54,7 @@ STEADY_SLIDING = FaultEquilibrium(
 def by_equilibrium(
     *, rest: Callable[Concatenate[S, P], R], sliding: Callable[Concatenate[S, P], R]
 ) -> Callable[Concatenate[S, P], R]:
-    """Function with one implementation per equilibrium; its first argument, a fault or a friction law, selects it."""
+    """Function with one implementation per equilibrium, that of its first argument, a fault or a friction law."""
 
     def chosen(subject: S, /, *positional: P.args, **named: P.kwargs) -> R:
         given: Any = subject

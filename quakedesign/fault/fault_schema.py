@@ -27,7 +27,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
     name : str
         Name of the fault.
     schema : bool
-        Whether its first line names the schema file in the same folder, for editors.
+        Whether the first line names the schema file in the same folder, for editors.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def template(law: str = "exponential-slip-weakening", *, name: str = "my-fault",
 
 
 def _example(friction: type[FrictionLaw]) -> Fault:
-    """Fault with the required examples of the template, without a task."""
+    """Fault with the required examples of the template and a placeholder task."""
     values = [
         Table({key: entry.example for key, entry in entries.items() if entry.required}, Problems()).read(entries)
         for entries in (PLANT, entries_of(friction))
@@ -78,7 +78,7 @@ def _example(friction: type[FrictionLaw]) -> Fault:
 
 
 def _comes_to_rest(fault: Fault) -> bool:
-    """Whether the rest slip is positive; slip weakening is steepest at slip 0, so its slope there decides quickly."""
+    """Whether the rest slip is positive; slip weakening is steepest at slip 0, so its slope there is sufficient."""
     if isinstance(fault.friction, SlipWeakening):
         weakening = fault.authority * fault.effective_normal_stress * fault.friction.slip_slope
         return weakening > fault.specific_stiffness
@@ -86,7 +86,7 @@ def _comes_to_rest(fault: Fault) -> bool:
 
 
 def _lines(entries: Mapping[str, FileEntry]) -> Iterator[str]:
-    """Line of each quantity with its example and description, as a comment for an optional one."""
+    """Line of each quantity with its example and description; the line of an optional quantity is a comment."""
     for key, entry in entries.items():
         if entry.unit is not None:
             comment = entry.description.split("; ")[0].rstrip(".")
@@ -111,10 +111,10 @@ def fault_schema() -> Json:
         disturbance=_table(DISTURBANCE),
         block={
             "type": "array",
-            "description": "tables [[block]], ordered along the chain; default friction and stress: the fault's",
+            "description": "tables [[block]], in order along the fault; friction and stress default to the fault's",
             "items": _table(BLOCK, friction=friction),
         },
-        well={"type": "array", "description": "tables [[well]], ordered along the chain", "items": _table(WELL)},
+        well={"type": "array", "description": "tables [[well]], in order along the fault", "items": _table(WELL)},
         diffusivity=_property(DIFFUSION["diffusivity"]),
     )
     schema["required"].append("friction")

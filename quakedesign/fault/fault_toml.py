@@ -1,7 +1,7 @@
 """Fault files in TOML with units: presets, reading, default values, writing.
 
-Units are checked and converted to SI here, at the boundary. All errors of a file are collected and
-reported together. Default values: radiation damping, and a task like that of the faults in the paper.
+Units are checked and converted to SI here, at the boundary. All errors of a file are collected and reported together.
+Default values: radiation damping, and a task like that of the faults in the paper.
 """
 
 import json
@@ -40,10 +40,10 @@ from quakedesign.files import Json, parse_toml, read_text
 from quakedesign.text import nearest_name
 
 # ----------------------------------------------------------------------
-# Where descriptions of faults come from: presets, and files of the user.
+# Sources of faults: presets and files of the user.
 
 LARGEST_FILE = 1 << 16
-"""Largest file in bytes, text in characters; the time to parse a dotted key grows with the square of its length."""
+"""Largest file [byte] and text [characters]; the time to parse a dotted key grows with the square of its length."""
 _PRESETS = Path(__file__).parent / "presets"
 
 
@@ -53,7 +53,7 @@ def presets() -> list[str]:
 
 
 def require_source(source: str) -> str:
-    """Return the name of a preset or path of a .toml file; raise for anything else."""
+    """Return the name of a preset or the path of a .toml file; raise `UnknownNameError` for any other text."""
     if source not in presets() and Path(source).suffix != ".toml":
         raise UnknownNameError(
             f"fault must be a preset ({', '.join(presets())}) or the path of a .toml file. Received {source!r}."
@@ -77,9 +77,9 @@ PERIODS = 4.6e5
 SAMPLES = 10.0
 """Samples per e-folding time of an error, or per radian of the free oscillation if that is faster."""
 SAMPLES_PER_STATE_TIME = 20.0
-"""Samples per d_c/V in slow sliding at a rate V: enough for control, and few enough for the sums of a proof."""
+"""Samples per d_c/V in slow sliding at a rate V: enough for control, and few enough to evaluate the sums of a proof."""
 _STEP = "sampling time"
-_SHARE = 1000  # least operation time over sampling time
+_SHARE = 1000  # smallest ratio of operation time to sampling time
 
 
 def radiation_damping(density: float, shear_modulus: float, area: float) -> float:
@@ -109,7 +109,7 @@ def sliding_step(law: FrictionLaw, task: Reference) -> float:
     law : FrictionLaw
         Friction law with a state.
     task : Reference
-        Gives V and the operation time t_op.
+        Task with the mean rate V and the operation time t_op.
     """
     ageing = float(min(law.steady_state(mean_rate(task))))
     return _cut(min(ageing / SAMPLES_PER_STATE_TIME, task.operation_time / _SHARE), digits=2)
@@ -123,14 +123,14 @@ def mean_rate(task: Reference) -> float:
 def rate_out_of_range(law: FrictionLaw, rate: float, *, source: str = "") -> str:
     """Statement that a slip rate [m/s] is outside the working range of a law; empty for a rate inside.
 
-    The range is that of slowest_rate and fastest_rate; the text names `source` as its origin if given.
+    The range is from slowest_rate to fastest_rate; the text names its origin `source`, if given.
     """
     slowest, fastest = law.working_rates
     if slowest <= rate <= fastest:
         return ""
     return (
         f"V = {rate:.3g} m/s is {'below' if rate < slowest else 'above'} the rates "
-        f"{source or 'for which friction is known'}, {slowest:.2g} to {fastest:.2g} m/s"
+        f"{source or 'of the working range'}, {slowest:.2g} to {fastest:.2g} m/s"
         f"{'' if source else ' (slowest_rate, fastest_rate)'}: a, b and D_c are extrapolated"
     )
 
@@ -226,7 +226,7 @@ _step = by_equilibrium(rest=_step_at_rest, sliding=_step_of_sliding)
 
 
 def _growth(fault: Fault) -> float:
-    """Largest real part [1/s] of the poles without pressure, where friction falls most steeply."""
+    """Largest real part [1/s] of the poles without pressure, for the steepest fall of friction."""
     load, law = fault.authority * fault.effective_normal_stress, fault.friction
     damping = fault.specific_damping - load * law.rate_slope
     stiffness = fault.specific_stiffness - load * law.slip_slope
@@ -249,7 +249,7 @@ WIDTHS = entries_of(UncertaintyBox)
 del WIDTHS["name"]
 _UNDISTURBED = "no disturbance; for guarantees that cover one, give amplitude in [disturbance], such as '2 kPa'"
 _STILL = (
-    "frequency 0 of the disturbance: its sine is 0 in every run, while guarantees cover every disturbance within the "
+    "the disturbance has frequency 0, so its sine is 0 in every run; guarantees cover every disturbance within the "
     "amplitude. Give a frequency to simulate a sine"
 )
 
@@ -279,11 +279,11 @@ def load_fault(
     Raises
     ------
     UnknownNameError
-        For a preset or box that does not exist.
+        For a preset, box or friction law that does not exist, or a user-defined law without `allow_code`.
     ScenarioError
-        For a file that cannot be read, is not TOML, lacks a required key or has an unknown one.
+        For a file that cannot be read, is not TOML, lacks a required key, has an unknown one, or has several blocks.
     UnitError, ParameterError
-        For a wrong unit or an unphysical value.
+        For a wrong unit, an unphysical value, or a `disturbance` for friction with a state.
     """
     fault = parse_fault(source_text(source), str(source), allow_code=allow_code)
     fault = fault.with_box(box) if box else fault
@@ -297,7 +297,7 @@ def load_fault(
 
 
 def parse_fault(text: str, name: str, *, allow_code: bool = False) -> Fault:
-    """Fault from the text of a TOML file; `name` is its name in messages. See `load_fault`."""
+    """Fault from the text of a TOML file, called `name` in messages; see `load_fault`."""
     if len(text) > LARGEST_FILE:
         raise ScenarioError(
             f"{name}: a fault file must have at most {LARGEST_FILE} characters. Received {len(text)}. Shorten it."
@@ -433,7 +433,7 @@ def fault_toml(fault: Fault) -> str:
 
 
 def _values(part: object, entries: Mapping[str, FileEntry]) -> Json:
-    """Values of the entries that a part has, quantities with their units."""
+    """Values of those entries that an object has as attributes, quantities with their units."""
     return {
         name: f"{value!r} {entry.unit}" if entry.unit else value
         for name, entry in entries.items()
@@ -442,7 +442,7 @@ def _values(part: object, entries: Mapping[str, FileEntry]) -> Json:
 
 
 def _stresses(fault: Fault) -> dict[str, str]:
-    """Stresses [Pa] of disturbance entries given as a stress: least floats that reach the stored acceleration."""
+    """Stresses [Pa] of disturbance entries given as a stress: smallest floats that reach the stored acceleration."""
     stresses = {}
     for name in fault.disturbance.stresses:
         size = abs(getattr(fault.disturbance, name))

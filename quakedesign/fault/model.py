@@ -1,8 +1,7 @@
 """Spring-slider model of one fault: parameters, reference, disturbance, uncertainty box.
 
-All values are in SI units. Chapters: uncertainty box, slip at rest after an uncontrolled event, checks of
-physical values, reference slip (eq. ref of the paper), disturbance, and the class `Fault` (eq.
-springmodel).
+All values are in SI units. Chapters: uncertainty box, rest slip after an uncontrolled event, checks of physical values,
+reference slip (eq. ref of the paper), disturbance, and the class `Fault` (eq. springmodel).
 """
 
 import math
@@ -49,7 +48,12 @@ class UncertaintyBox:
     ----------
     name : str
     stiffness, damping, authority : Fraction
-        Half-widths of k̂, η̂ and N̂ relative to their nominal values [-], in [0, 1).
+        Half-widths of k̂ = k/m, η̂ = η/m and N̂ = A/m relative to their nominal values [-], in [0, 1).
+
+    Raises
+    ------
+    ParameterError
+        When a half-width is not in [0, 1).
     """
 
     name: str
@@ -78,13 +82,13 @@ BOXES = {
 
 
 def uncertainty_box(name: str) -> UncertaintyBox:
-    """Named box: ``paper`` (only friction is uncertain) or ``ten-percent`` (also ±10 % on k, η and N̂)."""
+    """Box ``paper`` (only friction uncertain) or ``ten-percent`` (also ±10 % on k̂, η̂, N̂); else `UnknownNameError`."""
     require_known(name, BOXES, "uncertainty box", UnknownNameError)
     return BOXES[name]
 
 
 # ----------------------------------------------------------------------
-# Where a fault that starts to slip comes to rest.
+# Rest slip: slip at which a fault that starts to slip comes to rest.
 
 _SCAN = 4096
 _DIGITS = 40  # cancellation: the excess of a barely unstable fault is a small difference
@@ -111,17 +115,17 @@ def rest_slip(friction: FrictionLaw, load: float, stiffness: float) -> float:
     excess = law(sp.Integer(0), 0) - law(x, 0) - stiffness / load * x
     drive, drive_in_floats = (sp.lambdify(x, excess, module) for module in ("mpmath", "math"))
     try:
-        ends = _turn(drive_in_floats, furthest)
+        ends = _bracket(drive_in_floats, furthest)
     except (NameError, ArithmeticError, ValueError):  # a function that `math` lacks, or float overflow
-        ends = _turn(drive, furthest)
+        ends = _bracket(drive, furthest)
     if ends is None:
         return 0.0
     with mpmath.workdps(_DIGITS):
         return float(mpmath.findroot(drive, ends, solver="anderson", tol=1e-60, maxsteps=100, verify=False))
 
 
-def _turn(drive: Callable[[float], float], furthest: float) -> tuple[float, float] | None:
-    """Slips [m] between which an excess changes from positive to negative; None if it is not positive near slip 0."""
+def _bracket(drive: Callable[[float], float], furthest: float) -> tuple[float, float] | None:
+    """Slips [m] that bracket the sign change of an excess; None if the excess is not positive near slip 0."""
     grid = [furthest * i / _SCAN for i in range(_SCAN + 1)]
     if drive(grid[1] / _SCAN) <= 0:
         return None
@@ -149,7 +153,7 @@ class Problems:
 
     @contextmanager
     def collected(self) -> Iterator[None]:
-        """Collect a `QuakedesignError` of the block instead of propagating it."""
+        """Collect a `QuakedesignError` of the ``with`` block instead of propagating it."""
         try:
             yield
         except QuakedesignError as error:
@@ -244,7 +248,7 @@ def is_finite(value: Real | float) -> bool:
 
 
 def require_name(name: str) -> None:
-    """Raise for a name that is not a valid file name on every system."""
+    """Raise for a name that is not a valid part of a file name on every system."""
     if not isinstance(name, str) or not _NAME.fullmatch(name) or len(name.encode()) > _MOST_BYTES:
         raise ParameterError(
             "name must be a string of at most 60 letters, digits, spaces and _ . - (120 bytes in UTF-8), beginning "
@@ -259,6 +263,8 @@ def require_name(name: str) -> None:
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
     """Smooth slip r(t) from rest to rest, constant at its final value for t > operation_time (ERRATA 26).
+
+    Raises `ParameterError` for values outside the ranges below.
 
     Attributes
     ----------
@@ -344,19 +350,19 @@ class SlidingReference:
 
     @property
     def swing(self) -> Fraction:
-        """w [-], the largest excess of r′ over V relative to V: V ≤ r′ ≤ V(1 + w)."""
+        """w [-], the largest excess of r′ over V, divided by V: V ≤ r′ ≤ V(1 + w)."""
         steady, share = self._shares
         return Fraction(15, 8) * share / steady
 
     def slip(self, time: Any) -> Any:
-        """r [m] at times [s] from 0 on, number or array; the rate is V after t_op."""
+        """r [m] at times ≥ 0 [s], number or array; the rate is V after t_op."""
         steady, share = map(float, self._shares)
         stage = time / self.task.operation_time
         ended = (stage < 1) * stage + (stage >= 1)
         return self.task.target_slip * (steady * stage + share * self.task.shape(ended))
 
     def rate(self, time: Any) -> Any:
-        """r′ [m/s] at times [s], as `slip`."""
+        """r′ [m/s] at times ≥ 0 [s], number or array."""
         steady, share = map(float, self._shares)
         stage = time / self.task.operation_time
         ramping = 30 * stage**2 * (1 - stage) ** 2 * (stage < 1)
@@ -366,7 +372,7 @@ class SlidingReference:
 # ----------------------------------------------------------------------
 # Disturbance: forces besides spring, dashpot, friction and injected fluid.
 
-STRESSES = ("constant", "amplitude")
+STRESSES = ("constant", "amplitude")  # entries that may be given as a shear stress
 
 
 def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[float, bool]:
@@ -386,7 +392,7 @@ def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[floa
     Raises
     ------
     UnitError
-        For another unit.
+        For a unit that is neither of an acceleration nor of a stress.
     ParameterError
         For a stress outside the range of `require_ordinary`.
     """
@@ -410,6 +416,8 @@ def acceleration(quantity: object, authority: Fraction, name: str) -> tuple[floa
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
     """Acceleration φ̂_e(x1, x2, t) = constant + amplitude·sin(frequency·t) + slip_growth·x1 + rate_growth·x2.
+
+    Raises `ParameterError` for values that are not finite or are outside the ranges below.
 
     Attributes
     ----------
@@ -502,13 +510,13 @@ class Fault:
     reference : Reference
         Slip to follow.
     sampling_time : float
-        T_s [s].
+        Sampling time T_s [s], at most a thousandth of the operation time.
     disturbance : Disturbance
     box : UncertaintyBox
     assumed : tuple of str
         Default values that replace missing entries of a file, and remarks on the disturbance, one sentence each.
     poor_fit : str
-        Reason why the friction identified from a record is not reliable; empty if it is.
+        Reason why friction that was identified from a record is not reliable; empty if it is reliable.
 
     Notes
     -----
@@ -519,7 +527,7 @@ class Fault:
     Raises
     ------
     ParameterError
-        When a value is unphysical or not finite.
+        When a value is unphysical or not finite, the sampling time is too long, or friction excludes a ramp.
     """
 
     name: str = field(metadata={"text": "letters, digits, spaces and _ . -"})
@@ -703,7 +711,7 @@ _ACCEPTED = "poor-fit"
 
 
 def with_accepted_fit(fault: Fault, accept_poor_fit: bool) -> Fault:
-    """The fault to design for; a poor fit must be accepted, and the name then ends with ``poor-fit``."""
+    """The fault to design for, renamed if it has a poor fit; raises `ParameterError` if that is not accepted."""
     if not fault.poor_fit:
         return fault
     if not accept_poor_fit:
@@ -716,7 +724,7 @@ def with_accepted_fit(fault: Fault, accept_poor_fit: bool) -> Fault:
 
 
 def require_fault(fault: Fault) -> Fault:
-    """Return the fault; raise for any other object."""
+    """Return the fault; raise `ParameterError` for any other object."""
     if not isinstance(fault, Fault):
         raise ParameterError(f"fault must be a Fault. Received {fault!r:.60}. Write load_fault('real-fault'), say.")
     return fault

@@ -1,9 +1,8 @@
 """Similarity of faults: π-groups, exact scale factors, and scaled faults.
 
-The dimensional matrix is derived from units alone; two faults are similar if all π-groups agree
-(Buckingham 1914, Phys. Rev. 4, 345). Slip, fault length and the normal direction have separate units of
-length (directed lengths, Huntley 1967, Dimensional Analysis), as Table I of the paper requires. A scale
-factor is a root of a positive rational.
+The dimensional matrix follows from the units alone; two faults are similar if all their π-groups agree (Buckingham
+1914, Phys. Rev. 4, 345). Slip, fault length and the normal direction have separate units of length (directed lengths,
+Huntley 1967, Dimensional Analysis), as Table I of the paper requires. A scale factor is a root of a positive rational.
 """
 
 from collections.abc import Mapping, Sequence
@@ -153,8 +152,8 @@ _WORKING_DIGITS = 60
 class Radical:
     """sign · radicand^(1/degree) with sign −1, 0 or 1, radicand > 0 (1 for zero), and the smallest possible degree.
 
-    So equal numbers compare equal. Products, quotients and rational powers of such numbers are of this form, hence
-    every scale factor and every scaled gain is exact. Build them with `radical`.
+    This form is unique, so equal numbers compare equal. Products, quotients and rational powers have this form too, so
+    every scale factor and every scaled gain is exact. Create such numbers with `radical`.
     """
 
     sign: int
@@ -317,11 +316,11 @@ def power_product(bases: Mapping[str, Radical | Fraction | int], exponents: Mapp
 
 # ----------------------------------------------------------------------
 # Similarity of faults: π-groups as the null space of the dimensional matrix, scale factors, and scaled faults. If every
-# π-group has the same value in both, every solution of one fault is a solution of the other after slip, time and
+# π-group has the same value in two faults, every solution of one is a solution of the other after slip, time and
 # pressure are multiplied by their scale factors.
 
 TOLERANCE = Fraction(1, 100)
-"""Largest relative difference of a π-group of similar faults, for parameters of three digits."""
+"""Largest relative difference of a π-group of similar faults, for parameters given to three digits."""
 
 CLOCKS = ("reference.operation_time", "shear_modulus")
 """Quantities that may set the time scale: the task, as in Table I of the paper, or the natural period ∝ √(ρL²/G)."""
@@ -439,8 +438,8 @@ def similarity(source: Fault, target: Fault, *, clock: str | None = None) -> Sim
     Parameters
     ----------
     clock : str, optional
-        Source of the time scale, one of `CLOCKS`. By default the task, as in Table I of the paper; but the natural
-        period if the ratio of the operation times is not that of the natural periods (within `TOLERANCE`).
+        Quantity that sets the time scale, one of `CLOCKS`. By default the task, as in Table I of the paper; but the
+        natural period if the ratio of operation times is not that of the natural periods (within `TOLERANCE`).
     """
     if clock is None:
         by_task = similarity(source, target, clock=CLOCKS[0])
@@ -485,7 +484,7 @@ def scaled_fault(source: Fault, scales: Scales, name: str | None = None) -> Faul
     Raises
     ------
     ParameterError
-        When a scaled value is out of range, or friction has a scale factor although its law cannot be scaled.
+        When a scaled value is out of range, or the scales change a friction coefficient that cannot be scaled.
     """
     exact = scaled_parameters(quantities(source), scales)
     if exact.pop(_UNIT_FRICTION, radical(1)) != radical(1):

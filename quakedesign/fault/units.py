@@ -31,8 +31,7 @@ _PLAIN: dict[str, dict[str, str]] = {
     "1/s": {"1/s": "1"},
     "1/s^2": {"1/s^2": "1"},
 }
-"""Sizes of common units in SI units. pint knows these with the same values, and all others, but takes half a second
-to load."""
+"""Sizes of common units in SI units, the same as those of pint, which has all units but takes half a second to load."""
 _WRITTEN = re.compile(r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d{1,3})?)(?: ([A-Za-z1][A-Za-z0-9/^]*))?", re.ASCII)
 
 
@@ -76,7 +75,7 @@ def si_value(quantity: object, unit: str, name: str) -> float:
     Parameters
     ----------
     quantity : str, int or float
-        Text with a unit. A bare number is accepted only where `unit` is empty.
+        Text with a unit; a number without a unit only where `unit` is empty.
     unit : str
         SI unit, empty for dimensionless.
     name : str
@@ -138,7 +137,7 @@ def quantity(unit: str, example: str | float, default: str = "", **more: str) ->
 
 
 def exact_value(quantity: str | float | Fraction, unit: str, name: str) -> Fraction:
-    """Exact value of a quantity, given in the SI unit (number, decimal or p/q), or as a text with a unit.
+    """Exact value in the SI unit of a quantity: a number, decimal or p/q in this unit, or a text with a unit.
 
     Raises
     ------

@@ -17,12 +17,12 @@ from quakedesign.identification.fitting import Fit, weighted
 from quakedesign.identification.loading import Loading
 from quakedesign.identification.record import Record, scatter
 
-SEVERAL = 2.0  # ratio to the noise above which residuals are no noise
+SEVERAL = 2.0  # ratio of residuals to noise above which a fit does not explain a record
 _PEAK = 10.0  # critical slips after a change of rate that count as its peak
 _FADED = 5.0  # critical slips after which an unsteady beginning has decayed
 _TREND_UNITS = {TREND: "1/m", TREND_IN_TIME: "1/s"}
 _DRIFT = 4.0  # standard deviations by which a trend may change at the last change of rate
-DECISIVE = 10.0  # difference of AIC above which a trend is certain
+DECISIVE = 10.0  # difference of AIC (Akaike) above which the choice of a model is certain
 EXPLAINS, EXPLAINS_NOT, CANNOT_TELL = "explains the record", "does not explain the record", "cannot tell"
 
 
@@ -73,7 +73,10 @@ class Assessment:
 def checks_of(
     fit: Fit, raw: Record, record: Record, used: ndarray, loading: Loading | None, values: Mapping[str, float]
 ) -> tuple[tuple[Check, ...], float]:
-    """Tests of beginning, residuals, peaks and halves, on the means `used` by the fit; and residuals over noise."""
+    """Tests of beginning, residuals, peaks and halves of a record; and the largest ratio of residuals to noise.
+
+    `raw` is the record as measured, `record` that of its means, of which `used` are in the fit; `values` in SI units.
+    """
     time = record.time[used]
     begins = np.empty(0) if loading is None else loading.steps
     first = float(begins[0]) if len(begins) else float("inf")
@@ -88,14 +91,14 @@ def checks_of(
         peak = _after_steps(fit, time, begins, record, used, values)
         factor = max(factor, peak)
         text = "is explained" if peak <= SEVERAL else "is not explained"
-        sentence = f"what follows changes of rate {text}: residuals there are {peak:.2g} times the noise"
+        sentence = f"friction after changes of rate {text}: residuals there are {peak:.2g} times the noise"
         checks.append(_within("peak", peak, SEVERAL, sentence))
         checks.append(_halves(fit, time, begins, record, used))
     return tuple(checks), factor
 
 
 def in_doubt(excess: float, shift: float | None) -> bool:
-    """Whether a fit with another trend counts for the sign: its AIC is close, or the selected trend may begin late."""
+    """Whether the sign test includes a fit with another trend: its AIC is close, or the selected trend may be late."""
     return excess < DECISIVE or shift is not None
 
 
@@ -104,9 +107,9 @@ def sign_check(
 ) -> Check | None:
     """Whether a - b has one sign, with the selected trend and with others that are about as likely.
 
-    `others` maps a description of fits with another trend or none to their a - b and the increase of their AIC;
-    `shift` is the change of a - b if the trend begins with the first change of rate [-], None if the beginning has the
-    trend too; `unsteady` is the reason why the beginning does not determine steady sliding.
+    `difference` is the estimate of a - b; `others` maps a description of fits with another trend or none to their a - b
+    and the increase of their AIC; `shift` is the change of a - b if the trend begins with the first change of rate [-],
+    None if it begins earlier; `unsteady` is the reason why the beginning does not determine steady sliding.
     """
     if difference is None:
         return None
@@ -128,17 +131,17 @@ def sign_check(
 
 
 def unsteady_beginning(difference: Any, values: Mapping[str, float], loading: Loading) -> str:
-    """Reason why a fitted beginning off steady sliding hides the sign of a - b; empty if it does not.
+    """Reason why a fitted initial deviation from steady sliding masks the sign of a - b; empty if it does not.
 
-    It hides the sign, like a drift, if its effect on friction exceeds that of the rate step and has not decayed by
-    then.
+    It masks the sign, like a drift, if its effect on friction exceeds that of the rate step and has not decayed before
+    this step.
     """
     step, slip = loading.first_step, values.get("critical_slip", 0.0)
     moved = abs(values.get("evolution_effect", 0.0) * values.get(START_STATE, 0.0))
     if difference is None or step is None or loading.before >= _FADED * slip or moved <= abs(difference.value * step):
         return ""
     before = f"{loading.before / slip:.2g} critical slips"
-    return f": the beginning, of {before}, is off steady sliding by {moved:.2g} of friction"
+    return f": the beginning, of {before}, deviates from steady sliding by {moved:.2g} in friction"
 
 
 def _within(name: str, value: float, limit: float, sentence: str) -> Check:
@@ -170,7 +173,7 @@ def _beginning(values: Mapping[str, float], loading: Loading) -> Check:
 def _after_steps(
     fit: Fit, time: ndarray, begins: ndarray, record: Record, used: ndarray, values: Mapping[str, float]
 ) -> float:
-    """Largest RMS residual over noise within some critical slips after a change of rate."""
+    """Largest ratio of the RMS residual within some critical slips after a change of rate to the noise."""
     assert record.load_point is not None
     path, scores = record.load_point[used], fit.whitened / fit.noise
     way = float(np.ptp(path))

@@ -1,7 +1,7 @@
 """Correlated noise of records: white noise and an Ornstein–Uhlenbeck process.
 
-Servos, filters, screws and the rock itself drift; least squares that treats such noise as independent underestimates
-the intervals. The process decays with time or displacement, whichever has the larger restricted likelihood.
+Servos, filters, screws and the rock itself drift; least squares for independent noise gives intervals that are then too
+narrow. The correlation decays with time or displacement, whichever has the larger restricted likelihood.
 """
 
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ from quakedesign.files import Json
 
 _LEAST_GAIN = 3.0  # least gain of the log-likelihood by two parameters: AIC with a margin of 1
 _MOST_DENSE = 1500  # samples whose covariance is factored as a full matrix
-_SHARES = (-2.0, 0.0, 3.0)  # natural logarithms of initial values, in white variances
-_LENGTHS = (0.003, 0.03)  # initial values, relative to the whole span
-_LONGEST = 0.05  # relative to the whole span: noise of longer decay cannot be separated from the rock
+_SHARES = (-2.0, 0.0, 3.0)  # initial values of the logarithm of the share
+_LENGTHS = (0.003, 0.03)  # initial values of the decay length, relative to the whole span
+_LONGEST = 0.05  # relative to the whole span: noise of longer decay looks like the response of the rock
 _LARGEST = 9.0  # natural logarithm of the largest share
 
 
@@ -27,17 +27,17 @@ _LARGEST = 9.0  # natural logarithm of the largest share
 class CorrelatedNoise:
     """Covariance of samples, in variances of the white noise of one measurement."""
 
-    share: float  # variance of the correlated process
+    share: float  # variance of the correlated process [-]
     length: float  # its decay length, in units of `along`
     along: ndarray  # position of every sample: time [s] or displacement [m]
     counts: ndarray  # measurements in every sample
     of_time: bool  # whether `along` is time
     common: ndarray | None = (
-        None  # columns: effect of one standard deviation of each unknown of the load on all samples
+        None  # columns: effect of one standard deviation of each uncertain load-point rate on all samples
     )
 
     def to_dict(self, noise: float) -> Json | None:
-        """Size and length with units, from the white noise [-] of one measurement; None without correlated noise."""
+        """Size and length with units, for white noise `noise` [-] of one measurement; None without correlated noise."""
         if not self.share:
             return None
         size = noise * self.share**0.5
@@ -48,8 +48,8 @@ class CorrelatedNoise:
         """Degrees of freedom of the estimated slow noise: one per four decay lengths of the span.
 
         By Satterthwaite, 2 over the relative variance of the spectral density at frequency zero, 2·share·length. For
-        the likeliest process over a span T this variance is 8·length/T: share/length is sharp, and 1/length has the
-        variance 2/(length·T).
+        the likeliest process over a span T this variance is 8·length/T: share/length is well determined, and 1/length
+        has the variance 2/(length·T).
         """
         return float(np.ptp(self.along)) / (4 * self.length) if self.share else np.inf
 
@@ -62,7 +62,7 @@ class CorrelatedNoise:
         return whole if self.common is None else whole + self.common @ self.common.T
 
     def deletion(self, residuals: ndarray, used: ndarray) -> ndarray:
-        """Residuals minus their prediction from the other used ones, in standard deviations of this difference.
+        """Residuals minus their predictions from the other used residuals, in standard deviations of this difference.
 
         Both follow from the inverse covariance (Martin 1992, Commun. Stat. Theory Methods 21, 1183).
         """
@@ -75,7 +75,7 @@ class CorrelatedNoise:
         return np.asarray(off / np.sqrt(variance))
 
     def whitener(self, used: ndarray) -> ndarray:
-        """Matrix that makes the used residuals independent, with the variance of one measurement."""
+        """Matrix (used, samples) that makes used residuals independent, with the variance of one measurement."""
         if (key := used.tobytes()) not in self._whiteners:
             factor = cholesky(self.covariance[np.ix_(used, used)], lower=True)
             self._whiteners[key] = np.zeros((int(used.sum()), len(used)))
@@ -93,8 +93,8 @@ def restricted_likelihood(
 ) -> float:
     """Logarithm of the restricted likelihood of residuals, up to a constant.
 
-    By the tridiagonal inverse of the process, at the likeliest size of the noise. `steps` are the distances between
-    neighbouring samples, `slopes` the derivatives by the fitted coordinates; a share of 0 means no process.
+    From the tridiagonal inverse covariance of the process, maximised over the size of the noise. `steps` are distances
+    of neighbouring samples, `slopes` derivatives in the fitted coordinates (columns); a share of 0 means no process.
     """
     number, size = slopes.shape
     together = np.column_stack([residuals, slopes])
@@ -130,9 +130,9 @@ def noise_of(
     used: ndarray,
     most: int = _MOST_DENSE,
 ) -> CorrelatedNoise | None:
-    """Likeliest noise of residuals, from the slopes of the fitted coordinates; None if independent noise is as likely.
+    """Likeliest noise of residuals, given the slopes in the fitted coordinates; None if white noise is about as likely.
 
-    None as well if fewer than three samples per slope, or more than `most`, are used.
+    None as well if at most three samples per coordinate, or more than `most` samples, are used.
     """
     if not 3 * slopes.shape[1] < used.sum() <= most:
         return None

@@ -1,4 +1,4 @@
-"""Experiments for the fit: friction at the samples of a record, and its derivatives.
+"""Simulated experiments for the fit: friction at the samples of a record, and its derivatives.
 
 Chapters: the interface; velocity steps and holds with rate-and-state friction; slip-weakening friction.
 """
@@ -49,7 +49,7 @@ class Coordinate:
 class Experiment(ABC):
     """A simulated experiment: friction of the record without noise, for given coordinates.
 
-    The fitted quantities stored in its law are not used.
+    The values of fitted quantities in `law` are placeholders.
     """
 
     law: FrictionLaw
@@ -57,14 +57,14 @@ class Experiment(ABC):
 
     @abstractmethod
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction coefficient [-] at every sample; not finite if the experiment does not exist."""
+        """Friction coefficient [-] at every sample; not finite if the experiment cannot be simulated."""
 
     @abstractmethod
     def slopes(self, fitted: ndarray) -> ndarray:
         """Derivatives of `friction`, shape (samples, coordinates)."""
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """Remarks on assumptions, checked with a noise of friction [-]; empty by default."""
+        """Remarks on assumptions that a noise of friction [-] makes relevant; empty by default."""
         return ()
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
@@ -84,7 +84,7 @@ class Experiment(ABC):
         return low, high
 
     def near(self, values: Mapping[str, float]) -> ndarray:
-        """Fitted coordinates at values of another experiment; where one is missing, the middle of `start`."""
+        """Fitted coordinates at values of another experiment; for a missing value, the middle of `start`."""
         given = ((c, values.get(c.name)) for c in self.coordinates)
         return np.array([sum(map(c.inward, c.start)) / 2 if v is None else c.inward(v) for c, v in given])
 
@@ -123,19 +123,19 @@ class _Transformed(Experiment):
 
     @property
     def law(self) -> FrictionLaw:  # type: ignore[override]
-        """Law of the whole."""
+        """Law of `whole`."""
         return self.whole.law  # type: ignore[no-any-return]
 
     @abstractmethod
     def inside(self, fitted: ndarray) -> ndarray:
-        """Coordinates of the whole."""
+        """Coordinates of `whole`."""
 
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
-        """Remarks of the whole."""
+        """Remarks of `whole`."""
         return self.whole.remarks(self.inside(fitted), noise)  # type: ignore[no-any-return]
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
-        """Law of the whole."""
+        """Best law of `whole`."""
         return self.whole.best_law(self.inside(fitted))  # type: ignore[no-any-return]
 
     def resolved(self, fitted: ndarray, accuracy: float) -> Experiment:
@@ -149,8 +149,8 @@ class Widened(_Transformed):
     """An experiment, `whole`, with further coordinates, which come last and change friction in proportion to `columns`.
 
     Trends add to friction; their columns are displacement [m] or time [s]. A delay of a change of rate [s] changes
-    friction, to first order, by minus the delay times the time derivative of friction; its column is not 0 from this
-    change to the next.
+    friction, to first order, by minus the delay times the time derivative of friction; its column is 1 from this change
+    to the next, and 0 elsewhere.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -179,7 +179,7 @@ DELAY = "delay"
 
 
 def delayed(whole: Any, after: ndarray, most: ndarray) -> Experiment:
-    """An experiment with a delay of each change of rate, at most `most` [s]; `after`: the columns of `Widened`."""
+    """An experiment with a delay of each change of rate, at most `most` [s]; `after` are the columns of `Widened`."""
     if not after.shape[1]:
         return whole  # type: ignore[no-any-return]
     delays = [_about_zero(f"{DELAY}_{place}", "s", end) for place, end in enumerate(most.tolist(), start=1)]
@@ -187,7 +187,7 @@ def delayed(whole: Any, after: ndarray, most: ndarray) -> Experiment:
 
 
 def trended(whole: Experiment, along: ndarray, size: float, name: str = TREND) -> Widened:
-    """An experiment with a trend along displacement [m] or time [s], at most ten times the friction over the span."""
+    """An experiment with a trend along displacement [m] or time [s], over the span at most ten times `size` [-]."""
     trend = _about_zero(name, "1/m" if name == TREND else "1/s", 10 * size / float(np.ptp(along)))
     return Widened(whole=whole, coordinates=(*whole.coordinates, trend), columns=along[:, None])
 
@@ -198,7 +198,7 @@ def _about_zero(name: str, unit: str, most: float) -> Coordinate:
 
 @dataclass(frozen=True, kw_only=True)
 class Difference(_Transformed):
-    """An experiment in which coordinate `first` is reduced by the sum of coordinates `seconds` (indices)."""
+    """An experiment with coordinate `first` minus the sum of coordinates `seconds` (indices) in place of `first`."""
 
     first: int
     seconds: tuple[int, ...]
@@ -262,7 +262,7 @@ _DIAGONAL = 0.5
 def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.SX, ca.SX]:
     """State after one L-stable step of order 3, and its error as estimated by an embedded step of order 2.
 
-    `field` gives dy/dt of y, both CasADi SX columns; time must not enter. Nothing changes in a step of length 0 [s].
+    `field` gives dy/dt of y, both CasADi SX columns, and must not depend on time. For `length` 0 [s], y is unchanged.
     RODAS3 of Sandu, Verwer, Blom, Spee, Carmichael and Potra (1997), Atmos. Environ. 31(20), 3459.
     """
     rates = field(y)
@@ -281,7 +281,7 @@ def step(field: Callable[[ca.SX], ca.SX], y: ca.SX, length: ca.SX) -> tuple[ca.S
 _MOST_STEPS = 30  # largest mean number of trial steps per interval; more: an unstable block, or samples too sparse
 _SAFETY = 0.9
 _USABLE_ERROR = 1e3  # largest error of friction that gives the next length; else the length falls by a fixed factor
-_SHORTEST = 1e-8  # share of the time between two samples
+_SHORTEST = 1e-8  # shortest step, relative to the time between neighbouring instants
 STIFFNESS = "stiffness"
 START_STATE = "start_state"  # logarithm of the ratio of the state at the first sample to that of steady sliding
 START_RATE = "start_rate"  # logarithm of the ratio of the slip rate at the first sample to the load-point rate
@@ -289,12 +289,12 @@ START_RATE = "start_rate"  # logarithm of the ratio of the slip rate at the firs
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """Inputs of an experiment between neighbouring instants: samples and changes of rate."""
+    """Inputs of an experiment, one value per interval between neighbouring instants: samples and changes of rate."""
 
-    lengths: ndarray  # [s]
+    lengths: ndarray  # of the intervals [s]
     rates: ndarray  # rates of the load point [m/s]
     growth: ndarray  # d(log σ')/dt [1/s]
-    compliance: ndarray  # 1/σ' at the middle [1/Pa, 1/N, or 1]
+    compliance: ndarray  # reciprocal normal load 1/σ' at the middle [1/Pa, 1/N, or 1]
     first_rate: float  # rate of steady sliding before the first sample [m/s]
 
     @cached_property
@@ -305,23 +305,23 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class SlidingExperiment(Experiment):
-    """Simulated friction of a law with state."""
+    """A block without inertia, pulled by a spring, with the friction of a law with state."""
 
     law: FrictionLaw
     drive: Drive
     coordinates: tuple[Coordinate, ...]
-    stiffness: float | None  # given stiffness, in units of the normal load per m
+    stiffness: float | None  # in units of the normal load per m; None if it is fitted
     normal_unit: str  # Pa, N or empty
     steps: tuple[tuple[float, ...], ...]  # step lengths [s] between neighbouring instants
-    measured: ndarray  # instants that are samples; the others are changes of rate between them
+    measured: ndarray  # whether an instant is a sample; the others are changes of rate
 
     def friction(self, fitted: ndarray) -> ndarray:
-        """Friction coefficient [-] at every sample, from steady sliding or a fitted deviation from it at the first."""
+        """Friction coefficient [-] at every sample; begins in steady sliding or with a fitted deviation from it."""
         states = self._states(fitted)[:, self._sampled]
         return np.asarray(self._build["friction"](states, np.asarray(fitted)[:, None])[0])
 
     def slopes(self, fitted: ndarray) -> ndarray:
-        """Derivatives from the variational equations of the steps themselves: exact for what `friction` computes.
+        """Exact derivatives of the discretised simulation, from the variational equations of its steps.
 
         The derivatives of the single steps are computed for all steps at once; a banded linear system combines them.
         """
@@ -360,7 +360,7 @@ class SlidingExperiment(Experiment):
         return (f"inertia is neglected: it would matter above {noise / acceleration:.2g} {unit}",)
 
     def best_law(self, fitted: ndarray) -> FrictionLaw:
-        """The law; its working range, if any, is from half the smallest to twice the largest slip rate."""
+        """The fitted law; its working range, if any, is from half the smallest to twice the largest slip rate."""
         law, rates = Experiment.best_law(self, fitted), self.rates(fitted)
         ends = {"slowest_rate": float(f"{np.min(rates) / 2:.2g}"), "fastest_rate": float(f"{2 * np.max(rates):.2g}")}
         effect = {"evolution_effect": getattr(law, "evolution_effect", 1.0)}
@@ -369,16 +369,16 @@ class SlidingExperiment(Experiment):
     def resolved(self, fitted: ndarray, accuracy: float) -> "SlidingExperiment":
         """The same experiment with the steps that an accuracy of friction requires at given coordinates.
 
-        By the embedded error estimate; the same steps are then used at other coordinates too, so that friction is a
-        smooth function of them. If the steps would be too many or too short, for example because the block is
-        unstable, nothing changes.
+        These steps follow from the embedded error estimate. They are also used at other coordinates, so that friction
+        is a smooth function of these. If the steps would be too many or too short, for example because the block is
+        unstable, the experiment is returned unchanged.
         """
         q = np.asarray(fitted)
         taken = _steps(self._build["trial"], q, accuracy, self.drive, self._build["start"](q))
         return self if taken is None else replace(self, steps=taken)
 
     def _states(self, fitted: ndarray) -> ndarray:
-        """Logarithms of rate and states [SI]: initial values, then after every step."""
+        """Logarithms of rate and states (rows, SI) at the beginning and after every step (columns)."""
         q = np.asarray(fitted)
         if q.tobytes() not in self._latest:
             start = self._build["start"](q).full()
@@ -443,9 +443,9 @@ def _steps(
 def _built(
     law: FrictionLaw, names: tuple[str, ...], stiffness: float | None, first_rate: float, linear: frozenset[str]
 ) -> dict[str, Any]:
-    """CasADi Functions of a step, its derivatives and outputs, for logarithms of rate, states and coordinates.
+    """CasADi Functions of a step, its derivatives and outputs, for logarithms of rate and states.
 
-    Quantities of the law are exponentials of the coordinates, or numbers.
+    Quantities of the law are exponentials of the coordinates, coordinates if `linear`, or numbers.
     """
     symbolic, moving = law.symbolic(), (rate, *state_symbols(law.state_names))
     size = len(law.state_names)
@@ -546,18 +546,18 @@ class MeasuredSlip(_Weakening):
     def remarks(self, fitted: ndarray, noise: float) -> tuple[str, ...]:
         """Remark if the noise of the slip, which the fit neglects, affects friction."""
         felt = float(np.max(np.abs(self.strength(self.slip, fitted)[1]))) * self.slip_noise
-        text = f"the slip is taken as exact, although its noise of {self.slip_noise:.2g} m moves friction by {felt:.2g}"
+        text = f"slip is taken as exact, although its noise of {self.slip_noise:.2g} m changes friction by {felt:.2g}"
         return (text,) if felt > _SMALL_SHARE * noise else ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpringLoaded(_Weakening):
-    """A block at rest until its strength is reached, which then slips until the spring balances friction.
+    """A block that is at rest until its strength is reached, and then slips until the spring balances friction.
 
     Slip never decreases. With a soft spring, friction falls faster than the spring force and the block jumps. No
-    balance describes this, so slip and friction are NaN then. `load_point` is the displacement of the load
-    point since the first sample [m], `normal` the normal load in Pa, N or 1. Coordinates: those of the
-    law, the stiffness if not given, `START` last.
+    balance describes a jump, so slip and friction are then NaN. `load_point` is the displacement of the load point
+    since the first sample [m], `normal` the normal load in Pa, N or 1. Coordinates: those of the law, the stiffness if
+    not given, `START` last.
     """
 
     load_point: ndarray
@@ -584,7 +584,7 @@ class SpringLoaded(_Weakening):
         return np.asarray(at_fixed_slip - softness[:, None] * moved)
 
     def _without_slip(self, fitted: ndarray) -> tuple[ndarray, ndarray]:
-        """Shear over normal force without slip, and its decrease per slip [1/m]."""
+        """Shear over normal force [-] without slip, and its decrease per slip [1/m]."""
         softness = (np.exp(fitted[-2]) if self.stiffness is None else self.stiffness) / self.normal
         return np.asarray(fitted[-1] * self.normal[0] / self.normal + softness * self.load_point), softness
 

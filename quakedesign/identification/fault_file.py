@@ -41,7 +41,7 @@ def cover(
     """Slip-weakening law and box that cover every law with residual, drop and critical slip in given ranges.
 
     The bounds and the slope of the scaled laws are monotone in each of the three, so corners are enough; numbers are
-    rounded to the safe side. `law` is one of the family, `box` the uncertainty of all other parameters.
+    rounded conservatively. `law` gives the family, `box` the uncertainty of all other parameters.
     """
     ends = {name: [rational(end) for end in ranges[name]] for name in sorted(_WEAKENING)}
     corners = [dict(zip(ends, corner, strict=True)) for corner in product(*ends.values())]
@@ -68,7 +68,7 @@ def _decimal(value: Fraction, *, up: bool, digits: int = _DIGITS) -> Fraction:
 
 
 def identified_fault(identification: Identification, fault: Fault) -> Fault:
-    """A fault with the friction of a record in place of its own.
+    """Fault with the friction identified from a record in place of its own.
 
     For a slip-weakening law, friction and box together contain every law of the record's box, so that `guarantee` and
     `design` cover all of them. For a law with state, friction is the best fit. If the fault has a reference rate, which
@@ -128,8 +128,8 @@ def other_parts(identification: Identification, fault: Fault) -> str:
     if _gains_a_state(identification, fault):
         return shared
     loaded = ", reference rate, working range" if "reference_rate" in identification.law.quantities() else ""
-    kept = "" if _step_follows(identification, fault) else ", T_s"
-    return f"{shared}{kept}, disturbance{loaded}"
+    sampling = "" if _step_follows(identification, fault) else ", T_s"
+    return f"{shared}{sampling}, disturbance{loaded}"
 
 
 def task_remarks(identification: Identification, fault: Fault) -> list[str]:
@@ -155,9 +155,9 @@ def law_remarks(identification: Identification, fault: Fault) -> list[str]:
 
 
 def next_command(identification: Identification, path: str | Path | None) -> str:
-    """Command that designs for a fault file of a record, for all constants that the record allows.
+    """Command that designs for a fault file of a record, and for all parameters that the record allows.
 
-    Without a path, it names the option that writes a file.
+    Without a path, the text names the option that writes a file.
     """
     difference = identification.difference
     if identification.explained and difference is not None and difference.low > 0:
@@ -174,9 +174,9 @@ def next_command(identification: Identification, path: str | Path | None) -> str
 
 
 def _at_rate_of(fault: Fault, law: FrictionLaw) -> Any:
-    """A law at the reference rate of a fault, with a working range that covers those of law and fault.
+    """A law restated at the reference rate of a fault; its working range covers those of law and fault.
 
-    Friction is the same, as μ_0 changes by (a − b)·ln of the ratio of rates.
+    Friction is unchanged, because μ_0 changes by (a − b)·ln of the ratio of reference rates.
     """
     own = fault.friction
     if not isinstance(law, RateAndState) or not isinstance(own, RateAndState):
@@ -208,7 +208,7 @@ def covers(law: FrictionLaw) -> bool:
 
 
 def save_fault(identification: Identification, fault: Fault, path: str | Path) -> None:
-    """Write `identified_fault` to a TOML file, with best fit and ranges as remarks at its head; whole or not at all.
+    """Write `identified_fault` to a TOML file, with best fit and ranges as comments at its head; whole or not at all.
 
     Raises `RecordError` as `identified_fault`, and `OutputError` when the file cannot be written.
     """
@@ -241,8 +241,8 @@ def _too_wide(identification: Identification) -> str:
     number = ceil((max(wide.values()) / _WIDEST_SPREAD) ** 2)  # as standard deviations decrease with its square root
     text = ", ".join(f"{name} within {float(share):.0%}" for name, share in wide.items())
     return (
-        f"the box is too wide for a guarantee: {text}; about {float(_WIDEST_SPREAD):.0%} is the most. Fit about "
-        f"{number} such steps together, or steps to ten times the rate with more samples within D_c after them"
+        f"the box is too wide for a guarantee: {text}; at most about {float(_WIDEST_SPREAD):.0%} is admissible. Fit "
+        f"about {number} such steps together, or steps to ten times the rate with more samples within D_c after them"
     )
 
 

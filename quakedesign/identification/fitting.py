@@ -19,11 +19,11 @@ from quakedesign.identification.correlated_noise import CorrelatedNoise
 from quakedesign.identification.experiment import Experiment
 
 CONFIDENCE = 0.95
-_SHARE_OF_NOISE = 3e-3
+_SHARE_OF_NOISE = 3e-3  # required accuracy of the simulated friction, relative to the noise of a sample
 _NEIGHBOUR_SHARE = 0.4  # an outlier's neighbours are below this share of it; else it is an unexplained peak
 _ROUNDING_SLOPE = 1e-7  # below this share of the largest slope, a slope is a rounding error
 _SHARE_OF_EXCESS = 2e-3  # excess by which a search may still improve when it ends
-_CANDIDATES = 64  # random starting points, simulated once
+_CANDIDATES = 64  # random initial values, each simulated once
 _COARSE = 40  # steps of a search before it is compared with the others
 _AGREEMENT = 1e-3  # largest relative difference of the sums of squares of agreeing searches
 _ROUNDS = 6  # repetitions that remove outliers and refine steps
@@ -38,9 +38,9 @@ class Fit:
     fitted: ndarray  # fitted coordinates
     measured: ndarray  # friction [-]
     counts: ndarray  # number of measurements averaged in every sample
-    used: ndarray  # used samples
-    agreeing: int  # searches that end in the best fit
-    starts: int  # searches
+    used: ndarray  # whether each sample is in the fit
+    agreeing: int  # number of searches that end in the best fit
+    starts: int  # number of searches
     correlated: CorrelatedNoise | None = None  # noise correlated between neighbouring samples
     pieces: float = math.inf  # independent pieces of the noise, for whitened samples of several records
 
@@ -51,17 +51,14 @@ class Fit:
 
     @property
     def scaled(self) -> ndarray:
-        """Residuals [-] scaled to one measurement; if the noise is correlated, minus their prediction from neighbours.
-
-        The noise of a mean of n falls with the square root of n.
-        """
+        """Residuals [-] times the root of `counts`; for correlated noise, those of `CorrelatedNoise.deletion`."""
         if self.correlated is not None:
             return self.correlated.deletion(self.residuals, self.used)
         return np.asarray(self.residuals * np.sqrt(self.counts))
 
     @cached_property
     def weights(self) -> ndarray:
-        """Weights of all residuals, 0 for outliers; for correlated noise a matrix that makes them independent."""
+        """Weights of all residuals, 0 for outliers; for correlated noise a matrix that makes residuals independent."""
         if self.correlated is not None:
             return self.correlated.whitener(self.used)
         return np.asarray(np.sqrt(self.counts) * self.used)
@@ -152,7 +149,7 @@ class Fit:
 
 
 def weighted(weights: ndarray, values: ndarray) -> ndarray:
-    """Values of all samples, or columns of them, times the weights of `Fit`; samples of weight 0 are left out."""
+    """Values of all samples, or columns of them, times the weights of `Fit`; samples of weight 0 are omitted."""
     if weights.ndim == 2:
         used = np.any(weights != 0, axis=0)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -171,12 +168,12 @@ def fit(
     least: int = 4,
     most: int = 16,
 ) -> Fit:
-    """Best fit of all starts, without outliers, on an experiment simulated accurately enough for the noise.
+    """Best fit of several searches, without outliers, on an experiment simulated accurately enough for the noise.
 
-    `measured` friction [-] is a mean of `counts` measurements, or of one; `seed` is for the random starts, the first
-    of which may be given (`near`). Searches start from at most `most` of the best candidates. They end when at least
-    `least` have run, two agree on the best fit, and this fit determines every coordinate. Raises `RecordError` when no
-    candidate can be simulated, or there are too few samples.
+    `measured` friction [-] is a mean of `counts` measurements, or of one; `seed` is for the random initial values, the
+    first of which may be given (`near`). At most `most` of the best candidates are used. No search follows when at
+    least `least` have run, two agree on the best fit, and this fit determines every coordinate. Raises `RecordError`
+    when no candidate can be simulated, or there are too few samples.
     """
     if len(measured) < 3 * len(experiment.coordinates):
         raise RecordError(
@@ -203,7 +200,7 @@ def fit(
 def _starts(
     experiment: Experiment, measured: ndarray, roots: ndarray, seed: int, most: int, near: ndarray | None = None
 ) -> tuple[Experiment, list[ndarray]]:
-    """The given start followed by the best candidates, and the experiment with steps for the first of them."""
+    """The experiment with steps for the first start; and the starts: the given one, then the best candidates."""
     draw = np.random.default_rng(seed)
     ends = np.array([[c.inward(end) for end in c.start] for c in experiment.coordinates])
     candidates = draw.uniform(ends[:, 0], ends[:, 1], (_CANDIDATES, len(ends)))
@@ -289,10 +286,10 @@ def settled(fit: Fit) -> Fit:
 
 
 def outliers(residuals: ndarray) -> ndarray:
-    """Samples so far off that noise alone gives one such sample with a probability of 5 %, in runs of at most two.
+    """Samples beyond a deviation that noise alone exceeds in 5 % of such records, in runs of at most two.
 
-    The size of the noise follows from the median absolute deviation from the median residual.
-    A peak whose neighbours deviate too is no outlier.
+    The size of the noise follows from the median absolute deviation from the median residual. A peak whose neighbours
+    deviate too is no outlier.
     """
     off = residuals - np.median(residuals)
     size = np.median(np.abs(off)) / stats.norm.ppf(0.75)
@@ -309,8 +306,8 @@ def outliers(residuals: ndarray) -> ndarray:
 def advantage(one: Fit, other: Fit) -> tuple[float, float]:
     """Ratio of the sum of squares of another fit to that of this one, and the increase of its AIC.
 
-    On the samples that both fits use, or for correlated noise on those that each uses.
-    For equal parameter counts, the AIC increases by n·ln(ratio), n independent samples.
+    On the samples that both fits use, or for correlated noise on those that each uses. For equal numbers of parameters,
+    the AIC increases by n·ln(ratio) with n independent samples.
     """
     both = one.used & other.used
     if one.correlated is not None or other.correlated is not None:
@@ -360,15 +357,15 @@ class Profile:
     def interval(self, threshold: float) -> tuple[float, float]:
         """Fitted coordinates at which `Fit.excess` passes a threshold on both sides; infinite without a bound.
 
-        Raises `BetterFit`.
+        Raises `BetterFit` when a point of the profile fits better than the best fit.
         """
         return self._end(threshold, -1), self._end(threshold, 1)
 
     def _end(self, threshold: float, side: int) -> float:
-        """End on one side, by bracketed secants: the square root of the excess grows about linearly.
+        """End of the interval on one side, by bracketed secants: the root of the excess is about linear.
 
-        If this root grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little.
-        An end at this limit, or where the experiment cannot be simulated, counts as infinite.
+        If this root grows slowly, the limit of the coordinate is tried next, so that a flat profile costs little. An
+        end at this limit, or where the experiment cannot be simulated, counts as infinite.
         """
         fit, place, wanted = self.fit, self.place, math.sqrt(threshold)
         furthest = abs(fit.experiment.bounds[(side + 1) // 2][place] - fit.fitted[place])

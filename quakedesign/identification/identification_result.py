@@ -1,4 +1,4 @@
-"""Result of an identification: parameters, intervals, verdict, and what to measure next."""
+"""Result of an identification: parameters, intervals, verdict, and further experiments."""
 
 import math
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from quakedesign.identification.fitting import CONFIDENCE, Fit, Profile
 from quakedesign.identification.record import Record
 
 _OTHER_LAW = {"rest": "another --law", "sliding": "no --law, which fits both laws with a state"}
-_BESIDE = "delay", "start_rate"  # parameters that may stay undetermined: no other parameter depends on them then
+_SEPARABLE = "delay", "start_rate"  # names of parameters that no other one depends on if they are undetermined
 
 
 _EXPERIMENTS = {
@@ -71,7 +71,7 @@ class ParameterEstimate:
 
 @dataclass(frozen=True, kw_only=True)
 class Outlier:
-    """A sample that noise does not explain, left out of the fit."""
+    """A sample that noise does not explain, excluded from the fit."""
 
     time: float  # time in the record [s], since its first sample
     size: float  # measured minus simulated friction [-]
@@ -86,9 +86,10 @@ class OtherLaw:
     excess: float  # increase of its AIC, twice the decrease of the log-likelihood
 
     def __str__(self) -> str:
-        little = "" if self.excess > DECISIVE else "; so little that the record hardly tells the laws apart"
+        little = "" if self.excess > DECISIVE else "; so little that the record hardly distinguishes the laws"
         return (
-            f"{self.law} fits worse: squares {self.squares:.4g} times as large, AIC higher by {self.excess:.3g}{little}"
+            f"{self.law} fits worse: {self.squares:.4g} times the sum of squares, AIC higher by {self.excess:.3g}"
+            f"{little}"
         )
 
 
@@ -101,7 +102,7 @@ class Identification:
     record : Record
     fit : Fit
     used : ndarray of bool
-        Samples of the record in the fit.
+        Whether each sample of the record is simulated by the fit.
     estimates : dict of ParameterEstimate
         By name: quantities of the law, and, if fitted, the stiffness, delays, initial rate and trend.
     difference : ParameterEstimate or None
@@ -137,7 +138,7 @@ class Identification:
     @property
     def determined(self) -> bool:
         """Whether every parameter except delays and the initial rate has an interval with both ends."""
-        return all(e.identified for e in self.estimates.values() if not e.name.startswith(_BESIDE))
+        return all(e.identified for e in self.estimates.values() if not e.name.startswith(_SEPARABLE))
 
     @property
     def identified(self) -> bool:
@@ -150,7 +151,7 @@ class Identification:
         return self.assessment.verdict == EXPLAINS
 
     def to_try(self) -> list[str]:
-        """Options that may explain a record better."""
+        """Options with which a fit may explain the record."""
         return [
             "--figure, which shows where the fit fails",
             *([_OTHER_LAW[self.law.equilibrium.name]] if self.rival is None else []),
@@ -172,14 +173,14 @@ class Identification:
 
     @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
-        """Excluded samples, largest residual first."""
+        """Samples excluded from the fit, largest residual first."""
         left = ~self.fit.used
         sizes, times = self.fit.residuals[left].tolist(), self.record.time[self.used][left].tolist()
         outliers = [Outlier(time=time, size=size) for time, size in zip(times, sizes, strict=True)]
         return tuple(sorted(outliers, key=lambda outlier: -abs(outlier.size)))
 
     def allows(self, values: Mapping[str, float]) -> bool:
-        """Whether a set of all fitted parameters, in SI, lies in the joint 95 % region of the record."""
+        """Whether all fitted parameters, in SI, are in the joint 95 % region; `ParameterError` if one is missing."""
         coordinates = self.fit.experiment.coordinates
         if missing := {c.name for c in coordinates} - set(values):
             raise ParameterError(
@@ -189,7 +190,7 @@ class Identification:
 
     def undetermined(self) -> list[str]:
         """Sentences about parameters that the record does not determine; empty if it determines all."""
-        open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith(_BESIDE))]
+        open_ = [e for e in self.estimates.values() if not (e.identified or e.name.startswith(_SEPARABLE))]
         texts, only = [], self.difference
         pair = only.name.split(" - ") if only is not None and only.identified else []
         if only is not None and pair and {e.name for e in open_} >= set(pair):
@@ -258,7 +259,7 @@ def _with_unit(estimate: ParameterEstimate, value: float) -> str:
 
 
 def _one_sided(estimate: ParameterEstimate) -> str:
-    """The end of the joint interval that exists."""
+    """Text with the finite end of the joint interval, if it has one."""
     if math.isfinite(estimate.most):
         return f"at most {_with_unit(estimate, estimate.most)}, without a lower end"
     if math.isfinite(estimate.least):

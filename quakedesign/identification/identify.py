@@ -46,9 +46,9 @@ from quakedesign.identification.loading import Loading, prepared
 from quakedesign.identification.record import FAR_OFF, Record, read_record, scatter
 from quakedesign.identification.two_states import SECOND_EFFECT, with_two_states
 
-_EFFECTS = 1e-5, 1.0, (2e-3, 3e-2)
-_SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}
-_MODERATE = 1e3
+_EFFECTS = 1e-5, 1.0, (2e-3, 3e-2)  # limits and start of a direct effect [-]
+_SHARES = {"drop": (0.2, 1.5), "residual": (0.3, 1.1)}  # starts, relative to the range and the maximum of friction
+_MODERATE = 1e3  # working range of the law during the fit, relative to the loading rates
 _NUISANCE = {TREND, TREND_IN_TIME, START_STATE}
 _START = tuple(
     Coordinate(name=name, unit="", low=-most, high=most, start=(-1e-3, 1e-3), logarithmic=False)
@@ -58,7 +58,7 @@ _START = tuple(
 
 @dataclass(frozen=True, kw_only=True)
 class Setup:
-    """An experiment with the samples of the record that it simulates (`used`), and notes on what it assumes."""
+    """An experiment with the samples of the record that it simulates (`used`), and notes on its assumptions."""
 
     experiment: Experiment
     used: ndarray
@@ -75,9 +75,8 @@ def set_up(
 ) -> Setup:
     """Experiment of a prepared record, chosen by the variables of the law and the measured columns.
 
-    `nuisance` names what is fitted besides law and stiffness: `TREND` or `TREND_IN_TIME`, `START_STATE` (with
-    `START_RATE`). Raises `RecordError` when the law depends on neither slip nor state, or a column
-    is missing.
+    `nuisance` names further fitted parameters: `TREND` or `TREND_IN_TIME`, `START_STATE` (with `START_RATE`). Raises
+    `RecordError` when the law depends on neither slip nor state, or a column is missing.
     """
     setup = _setup(law, record, stiffness, loading, START_STATE in nuisance)
     for name, along in ((TREND, record.path), (TREND_IN_TIME, record.time)):
@@ -118,7 +117,7 @@ def _of_slip(
             f"a law to identify must depend on slip or on a state. Received {law.name}, which depends on the slip "
             "rate alone. Choose another law."
         )
-    return _measured_slip(record, law) if record.slip is not None else _drawn(record, law, stiffness)
+    return _measured_slip(record, law) if record.slip is not None else _spring_loaded(record, law, stiffness)
 
 
 def _sliding(
@@ -133,7 +132,7 @@ def _sliding(
     if not first > 0:
         raise RecordError(
             f"a record for {law.name} must begin in steady sliding. Received a load point that moves at {first:.3g} "
-            "m/s. Cut off what precedes steady sliding with --from."
+            "m/s. Remove the samples before steady sliding with --from."
         )
     drive, measured = loading.drive(record)
     path = float(np.ptp(record.load_point))
@@ -182,8 +181,8 @@ def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
     count, least = int(used.sum()), 3 * len(law.quantities())
     if count < least:
         raise RecordError(
-            f"slip must have grown from zero in at least {least} samples. Received {count}. Measure it from where the "
-            "fault begins to slip, forward positive."
+            f"slip must exceed its noise in at least {least} samples at the end. Received {count}. Measure slip from "
+            "its onset, forward positive."
         )
     slip = record.slip[used]
     coordinates = tuple(_coordinate(name, law, record, float(slip.max())) for name in law.quantities())
@@ -192,7 +191,7 @@ def _measured_slip(record: Record, law: type[FrictionLaw]) -> Setup:
     return Setup(experiment=experiment, used=used, notes=(note,))
 
 
-def _drawn(record: Record, law: type[FrictionLaw], stiffness: float | None) -> Setup:
+def _spring_loaded(record: Record, law: type[FrictionLaw], stiffness: float | None) -> Setup:
     if record.load_point is None:
         raise RecordError(
             f"{law.name} needs the column slip, or the motion of the load point. Received neither. Add slip [mm], say."
@@ -255,17 +254,17 @@ def identify(
         Name of a friction law with state, or of one that depends on slip. By default the ageing and the slip law are
         both fitted, and the likelier one is selected.
     stiffness : float, optional
-        Exact machine stiffness [Pa/m; N/m for a record of forces, 1/m for one of friction alone]; fitted unless given.
+        Machine stiffness [Pa/m; N/m for a record of forces, 1/m for friction alone], exact; fitted unless given.
     normal_stress : float, optional
         Constant normal stress [Pa], where a file has no such column.
     rates : sequence of float
         Successive rates of the load point [m/s], if known; by default from its displacement.
     states : int
-        1, or 2 for a second evolution effect with its own critical slip; a fault file cannot state two.
+        1, or 2 for a second evolution effect with its own critical slip, which a fault file cannot contain.
     trend : str
-        ``"displacement"``, ``"time"`` or ``"none"``; by default one is fitted if an F test (level 1 %) requires it.
+        ``"displacement"``, ``"time"``, ``"none"``, or ``"auto"``: fitted if an F test (level 1 %) requires it.
     seed : int
-        Seed of the random starting points.
+        Seed of the random initial values.
 
     Returns
     -------
@@ -274,9 +273,9 @@ def identify(
     Raises
     ------
     RecordError
-        When the record cannot be read, or is unsuitable for the law.
-    UnknownNameError
-        For a law that does not exist.
+        When the record cannot be read, or is unsuitable for the law; or for another number of states.
+    UnknownNameError, ParameterError
+        For a law or trend that does not exist; for a stiffness, stress or seed out of range.
     """
     require_positive(normal_stress=1.0 if normal_stress is None else normal_stress)
     if not isinstance(record, Record):
@@ -287,7 +286,7 @@ def identify(
 
 
 def kinds_of(law: str | None, states: int) -> list[type[FrictionLaw]]:
-    """Laws to fit: the requested law, or the ageing and the slip law."""
+    """Laws to fit: the requested law, or the ageing and the slip law; `RecordError` unless `states` is 1 or 2."""
     if states not in (1, 2):
         raise RecordError(f"states must be 1 or 2. Received {states}. Use 2 if one state does not explain the record.")
     return [friction_law(name) if states == 1 else with_two_states(name) for name in ([law] if law else [AGEING, SLIP])]
@@ -326,8 +325,8 @@ class _Fitted:
 class _Choice:
     """Selection of the law, the nuisance parameters and the noise of a record."""
 
-    record: Record
-    raw: Record
+    record: Record  # means of the samples
+    raw: Record  # record as measured
     loading: Loading | None
     stiffness: float | None
     seed: int
@@ -335,16 +334,16 @@ class _Choice:
     by_load: ndarray | None = None  # times of rate changes by the load point alone, uncorrected [s]
 
     def identified(self, kinds: Sequence[type[FrictionLaw]]) -> Identification:
-        """Profiles about the best fit of the best law; times of rate changes are corrected by fitted delays."""
+        """Profiles about the best fit of the likeliest law; fitted delays correct the times of rate changes."""
         first = _ONE_TREND.get(self.trend, {TREND} if self.trend == "auto" else set())
         fits: list[_Fitted] = []
         for kind in kinds:
             try:
                 near = fits[0].best if fits else None
-                if len(kind.state_names) > 1:  # with a trend the states are hard to tell apart: first without
+                if len(kind.state_names) > 1:  # states are hard to distinguish with a trend; first fit without trend
                     near = self._fitted(kind, (), None).best
                 fits.append(self._fitted(kind, first, near))
-            except RecordError:  # no spring prevents a jump with this law
+            except RecordError:  # for example if this law jumps with every candidate
                 if not fits:
                     raise
         choice = self
@@ -403,7 +402,7 @@ class _Choice:
         own, rest = next(iter(_nuisance(fitted) & _TRENDS.keys()), ""), _nuisance(fitted) - _TRENDS.keys()
         names = {"", own} if self.trend in _ONE_TREND else _TRENDS
         same = fitted, fitted.best.sum_of_squares
-        fits = {name: same if name == own else self._among(fitted, {*rest, name} - {""}) for name in sorted(names)}
+        fits = {name: same if name == own else self._refitted(fitted, {*rest, name} - {""}) for name in sorted(names)}
         aic = {name: fitted.best.excess(squares) + 2 * bool(name) for name, (_, squares) in fits.items()}
         in_time = self.trend == "auto" and aic[TREND_IN_TIME] < aic[own] - DECISIVE
         selected = TREND_IN_TIME if in_time else own
@@ -411,7 +410,7 @@ class _Choice:
             selected = ""
         better, _ = fits.pop(selected)
         others = {_TRENDS[name]: (other, aic[name] - aic[selected]) for name, (other, _) in fits.items()}
-        return better if better is fitted else _again(better), others
+        return better if better is fitted else _settled(better), others
 
     def _assessed(self, result: Identification, others: Mapping[str, tuple[_Fitted, float]]) -> Assessment:
         """Tests of the assumptions, and quantities that the record does not determine."""
@@ -431,7 +430,7 @@ class _Choice:
         return Assessment(checks=checks, factor=factor, open=undetermined, experiments=tuple(result.experiments(sign)))
 
     def _late_trend(self, result: Identification) -> float | None:
-        """Change of a - b if the trend begins at the first change of rate; None if that fits decisively worse.
+        """Change of a - b if the trend begins at the first change of rate; None without trend or if decisively worse.
 
         A slow evolution of friction after a change of rate looks like a trend that is absent before the change.
         """
@@ -466,6 +465,7 @@ class _Choice:
         return _Fitted(kind=kind, setup=setup, best=best)
 
     def _noise(self, fitted: _Fitted) -> CorrelatedNoise | None:
+        """Likeliest noise of a fit, with the uncertainty of load-point rates; None for white noise alone."""
         best, used, path = fitted.best, fitted.setup.used, self.record.path
         slopes = np.nan_to_num(best.experiment.slopes(best.fitted), posinf=0, neginf=0)
         where, time = None if path is None else path[used], self.record.time[used]
@@ -477,8 +477,8 @@ class _Choice:
     def _moved_by_rates(self, fitted: _Fitted) -> ndarray:
         """Change of friction per standard deviation of each load-point rate, where it is not negligible.
 
-        Rates computed from noisy displacements are unknowns with a known spread. As part of the covariance of the
-        samples they widen the regions of a and b as much as if they were fitted with that spread.
+        Rates from noisy displacements are unknowns of known standard deviation. As part of the covariance of the
+        samples they widen the regions of a and b as much as if they were fitted with that deviation as a prior.
         """
         best, loading = fitted.best, self.loading
         columns: list[ndarray] = []
@@ -506,17 +506,17 @@ class _Choice:
         """Fit with an unsteady beginning, where it improves the fit significantly."""
         if not fitted.setup.starts:
             return fitted
-        wider, _ = self._among(fitted, {*_nuisance(fitted), START_STATE})
-        return _again(wider) if needed(wider.best, fitted.best.sum_of_squares, len(_START)) else fitted
+        wider, _ = self._refitted(fitted, {*_nuisance(fitted), START_STATE})
+        return _settled(wider) if needed(wider.best, fitted.best.sum_of_squares, len(_START)) else fitted
 
     def _without_start(self, fitted: _Fitted) -> _Fitted:
         """Fit without an unsteady beginning, unless it improves the fit significantly."""
         if START_STATE not in _nuisance(fitted):
             return fitted
-        narrower, squares = self._among(fitted, _nuisance(fitted) - {START_STATE})
-        return fitted if needed(fitted.best, squares, len(_START)) else _again(narrower)
+        narrower, squares = self._refitted(fitted, _nuisance(fitted) - {START_STATE})
+        return fitted if needed(fitted.best, squares, len(_START)) else _settled(narrower)
 
-    def _among(self, fitted: _Fitted, nuisance: Collection[str]) -> tuple[_Fitted, float]:
+    def _refitted(self, fitted: _Fitted, nuisance: Collection[str]) -> tuple[_Fitted, float]:
         """Fit with other nuisance parameters at the same samples with the same noise, and its sum of squares."""
         other, best = self._fitted(fitted.kind, nuisance, fitted.best, start=False), fitted.best
         at, squares = minimised(other.best.experiment, best.measured, best.weights, other.best.fitted)
@@ -526,7 +526,7 @@ class _Choice:
 def profiled(
     best: Fit, record: Record, setup: Setup, seed: int, names: Collection[str] | None = None
 ) -> Identification:
-    """Profiles of named or all parameters about the best fit; restarted if a profile finds a better fit."""
+    """Profiles of `names` or all parameters about the best fit, restarted from any better fit on a profile."""
     for _ in range(_MOST_BETTER):
         try:
             estimates = _estimates(best, names)
@@ -564,17 +564,17 @@ def _nuisance(fitted: _Fitted) -> set[str]:
     return {c.name for c in fitted.best.experiment.coordinates} & _NUISANCE
 
 
-def _again(fitted: _Fitted) -> _Fitted:
+def _settled(fitted: _Fitted) -> _Fitted:
     return replace(fitted, best=settled(fitted.best))
 
 
 def _with_noise(fitted: _Fitted, noise: CorrelatedNoise | None) -> _Fitted:
     white = noise is None and fitted.best.correlated is None
-    return fitted if white else _again(replace(fitted, best=replace(fitted.best, correlated=noise)))
+    return fitted if white else _settled(replace(fitted, best=replace(fitted.best, correlated=noise)))
 
 
 def _estimates(best: Fit, wanted: Collection[str] | None = None) -> dict[str, ParameterEstimate]:
-    """Estimates of named or all coordinates, those of the law first.
+    """Estimates of the `wanted` or all coordinates, those of the law first.
 
     For a law with both effects, their difference is a coordinate of the profiles: if the record determines only the
     difference, the valley of equal fits is straight.

@@ -1,6 +1,6 @@
 """Loading of an experiment: load point and normal stress as piecewise linear functions of time.
 
-Following the transducer sample by sample would drive the simulated spring with its noise.
+A load point that followed the transducer sample by sample would drive the simulated spring with its noise.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from quakedesign.identification.record import FAR_OFF, Record, reading_step, sca
 
 _MOST_POINTS = 2000  # largest number of means in the search for changes of rate
 _CANDIDATES = 400
-_FEWEST = 8  # smallest number of samples
+_FEWEST = 8  # smallest number of samples for a search for changes
 _MOST_PIECES = 40
 _PATIENCE = 4  # successive pieces without improvement that end the search
 _TIMELY = 0.01  # error of the time of a change, in sampling periods, that has no visible effect
@@ -62,7 +62,7 @@ def staircase(time: ndarray, rates: ndarray) -> Pieces:
 
 
 def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: float) -> Pieces:
-    """Pieces with rates from the data: the fewest that explain it within its noise (`scatter`) and reading step [m]."""
+    """The fewest pieces that explain the positions within their noise (`scatter`) and reading step (`step`) [m]."""
     if len(time) < _FEWEST or not np.ptp(position) > 0:
         rate = (position[-1] - position[0]) / max(time[-1] - time[0], 1e-300)
         return Pieces(begins=time[:1], rates=np.array([rate]), noise=0.0, rough=bool(np.ptp(position) > 0))
@@ -103,7 +103,7 @@ def straight_pieces(time: ndarray, position: ndarray, scatter: float, step: floa
 
 
 def given_pieces(time: ndarray, position: ndarray, rates: ndarray) -> Pieces:
-    """Pieces with known rates, with the beginnings that fit the data best; rejected if they do not fit."""
+    """Pieces with known rates, and beginnings that fit the positions best; `RecordError` if they do not fit."""
     t, x = _means(time, position, most=400)
 
     def off(begins: ndarray) -> float:
@@ -150,14 +150,14 @@ class Loading:
 
     @property
     def first_step(self) -> float | None:
-        """Logarithm of the ratio of rates at the first large change; None without one, or with a hold."""
+        """Logarithm of the ratio of rates at the first large change; None without one, or unless both are positive."""
         if not len(places := np.flatnonzero(self.pieces.large_changes)):
             return None
         slow, fast = self.pieces.rates[places[0] : places[0] + 2]
         return float(np.log(fast / slow)) if slow > 0 and fast > 0 else None
 
     def delays(self, record: Record) -> tuple[ndarray, ndarray]:
-        """Samples after each change of rate whose time is uncertain because of noise, and its error [s]."""
+        """Columns of `Widened` for changes of rate whose times are uncertain, and the largest delay of each [s]."""
         begins, rates = self.pieces.begins, self.pieces.rates
         ends = np.append(begins[1:], np.inf)
         off = self.pieces.noise / np.maximum(np.abs(np.diff(rates)), 1e-300)
@@ -172,7 +172,7 @@ class Loading:
         return table, np.array([most for _, most in windows])
 
     def drive(self, record: Record) -> tuple[Drive, ndarray]:
-        """Drive between all samples and changes of rate, and the indices of the samples among these instants."""
+        """Drive between all samples and changes of rate, and whether each of these instants is a sample."""
         assert record.load_point is not None
         inside = self.pieces.begins[(self.pieces.begins > record.time[0]) & (self.pieces.begins < record.time[-1])]
         changes = np.array([]) if self.pieces.rough else np.setdiff1d(inside, record.time)
@@ -249,14 +249,14 @@ def _design(u: ndarray, knots: ndarray) -> ndarray:
 
 
 def _hinges(u: ndarray, y: ndarray, knots: ndarray) -> tuple[ndarray, ndarray]:
-    """Rates of all pieces, and the piecewise linear function."""
+    """Rates of all pieces, and the fitted piecewise linear function at all u."""
     design = _design(u, knots)
     coefficients, *_ = np.linalg.lstsq(design, y, rcond=None)
     return np.cumsum(coefficients[1:]), design @ coefficients
 
 
 def _squares(u: ndarray, y: ndarray, knots: ndarray) -> float:
-    """Sum of squares of the residuals of the piecewise linear function."""
+    """Sum of squares of the residuals of the fitted piecewise linear function."""
     return float(np.sum((y - _hinges(u, y, knots)[1]) ** 2))
 
 
@@ -280,7 +280,7 @@ def _refined(u: ndarray, y: ndarray, knots: ndarray) -> ndarray:
 
 
 def _needed(u: ndarray, y: ndarray, knots: ndarray, floor: float) -> ndarray:
-    """Knots without those that explain no more than noise, and those at which the rate hardly changes.
+    """Knots except those that explain no more than noise or at which the rate hardly changes.
 
     Two knots less than two points apart count as one: a mean of samples before and after a change fits neither line.
     """
@@ -303,10 +303,10 @@ def _needed(u: ndarray, y: ndarray, knots: ndarray, floor: float) -> ndarray:
 
 
 def _rate_errors(u: ndarray, left: ndarray, knots: ndarray) -> ndarray:
-    """Standard deviation of the slope of each piece: that of a separate line, as the knots are free.
+    """Standard deviation of the slope of each piece: that of a separate line, because the knots are free.
 
-    From the long-run variance of the residuals, the sum of their covariance over all lags, of the likeliest white noise
-    and decaying process: with quantised readings, the first correlation alone does not show the decay length.
+    From the long-run variance of the residuals, the sum of their covariance over all lags, for the likeliest sum of
+    white noise and a decaying process; for quantised readings, the lag-one correlation does not give the decay length.
     """
     ends = np.concatenate([u[:1], knots, u[-1:]])
     inside = np.maximum(np.histogram(u, ends)[0], 1)
@@ -322,7 +322,7 @@ def _rate_errors(u: ndarray, left: ndarray, knots: ndarray) -> ndarray:
 
 
 def _spread(residuals: ndarray) -> float:
-    """Number of samples per independent sample for AR(1) residuals, from their first correlation."""
+    """Number of samples per independent sample for AR(1) residuals, from their lag-one correlation."""
     first = float(residuals[1:] @ residuals[:-1] / max(residuals @ residuals, 1e-300))
     first = min(max(first, 0.0), 0.95)
     return (1 + first) / (1 - first)

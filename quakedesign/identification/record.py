@@ -29,17 +29,17 @@ class Record:
     name : str
         Name of the file.
     time : ndarray
-        [s], ascending.
+        Times of the samples [s], ascending.
     friction : ndarray
         Shear over normal stress [-].
     load_point : ndarray or None
         Displacement of the load point [m].
     slip : ndarray or None
-        [m].
+        Slip of the fault [m].
     normal : ndarray
         Effective normal stress [Pa] or force [N]; 1 where only friction is known.
     normal_unit : str
-        ``"Pa"``, ``"N"`` or nothing.
+        ``"Pa"``, ``"N"`` or empty.
     counts : ndarray or None
         Number of measurements that were averaged into each sample, or the weight of the sample; 1 by default.
     load_rates : ndarray or None
@@ -89,7 +89,7 @@ def read_record(
     begin: str | None = None,
     end: str | None = None,
 ) -> Record:
-    """Record from a file whose headings name columns with units, as ``time [s], shear_stress [MPa]``.
+    """Record from a file whose headings name columns with units, such as ``time [s], shear_stress [MPa]``.
 
     Formats: text with any column separator and decimal points or commas, text and binary files of xlook, and numeric
     MATLAB arrays. ``Time (s)``, ``LP_Disp [mic]`` and ``mu`` name columns as well. The remarks of the record list the
@@ -101,10 +101,10 @@ def read_record(
     normal_stress : float, optional
         Constant effective normal stress [Pa] where there is no such column.
     columns : str
-        Headings of the columns, as ``time=Time(s), friction=col 7``; a number is the position of a heading, and
-        ``=mu_corr [1]`` gives a unit.
+        Headings of the columns, such as ``time=Time(s), friction=7``; a number is the position of a heading, and
+        ``friction=mu_corr [1]`` gives a unit.
     begin, end : str, optional
-        Window, as ``8110 s`` or ``1600 um`` in the file's own time or load-point displacement.
+        Window, such as ``8110 s`` or ``1600 um``, in the time or load-point displacement of the file.
 
     Returns
     -------
@@ -154,7 +154,7 @@ def read_windows(
 
 
 def part(record: Record, inside: ndarray, name: str) -> Record:
-    """Record of some samples of a record; its time and load point start at 0."""
+    """Record of the samples of a record where `inside` is true; its time and load point start at 0."""
     values: dict[str, Any] = {n: column[inside] for n, column in vars(record).items() if isinstance(column, np.ndarray)}
     begun = float(values["time"][0]) if np.any(inside) else 0.0
     for along in values.keys() & {"time", "load_point"}:
@@ -173,7 +173,7 @@ def _weighted(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
             f"{np.max(weight):.6g}. Write 1/variance of friction, in any unit."
         )
     given = {name: column[weight > 0] for name, column in given.items()}
-    lost = f"{int(np.sum(weight == 0))} samples of weight 0 left out"
+    lost = f"{int(np.sum(weight == 0))} samples of weight 0 excluded"
     return given | {"weight": given["weight"] / np.mean(given["weight"])}, [lost] * bool(np.any(weight == 0))
 
 
@@ -182,7 +182,7 @@ def _measured(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
     table, repairs = pd.DataFrame(given), []
     whole = table.dropna()
     if lost := len(table) - len(whole):
-        repairs.append(f"{lost} of {len(table)} rows left out, as a number is missing")
+        repairs.append(f"{lost} of {len(table)} rows excluded, because a number is missing")
     if whole.empty:
         raise RecordError(
             f"a record must have rows with a number in every column. Received none in {len(table)} rows. Remove the "
@@ -228,7 +228,7 @@ _DURATION, _PERIOD = (1e-6, 1e12), (1e-9, 1e12)
 
 
 def _require_sizes(given: dict[str, ndarray]) -> None:
-    """Reject values outside the range of experiments, as from a wrong unit; the solvers of the fit fail on them."""
+    """Reject values outside the range of experiments, often due to a wrong unit, on which the solvers fail."""
     time = given["time"]
     if len(time) < 2:
         return
@@ -308,16 +308,16 @@ def _load_point(given: dict[str, ndarray]) -> tuple[ndarray | None, ndarray | No
 
 
 FAR_OFF = 4.0  # standard deviations of a displacement that noise does not explain
-_FIRST = 20  # samples
+_FIRST = 20  # samples in the test for quantised readings
 _BENDS = 2  # bends among the first samples that a change of rate alone may cause
 _MEDIAN, _NINETIETH = 0.6745, 1.645  # median and 90th percentile of |normal deviate|
 MOST_PLAIN = 500  # samples up to which a record is not thinned
 MOST_MEANS = 300
 _MOST_CURVED = 8000  # means, where friction bends far beyond its noise
-_SHARE = 0.5  # longest window over the time since the last change of rate
+_SHARE = 0.5  # longest window, relative to the time since the last change of rate
 _PARTS = 8  # least number of windows of a piece, and number of means of a window
 _CURVED = 5.0  # standard deviations of a bend that noise does not explain
-_FAR_CURVED = 100.0
+_FAR_CURVED = 100.0  # bend above which windows are halved even beyond `MOST_MEANS`
 _SPIKE, _MOST_SPIKES = 8.0, 20  # deviations from both neighbours; more such samples are no outliers
 _BENT = np.array([[1.0, -1.0, -1.0, 1.0], [1.0, -3.0, 3.0, -1.0]]).T  # of quarters: a bend, and a step in the middle
 _FLOOR = 1e-4  # of the range of friction: resolution that no machine reaches
@@ -326,7 +326,7 @@ _FLOOR = 1e-4  # of the range of friction: resolution that no machine reaches
 def scatter(time: ndarray, values: ndarray) -> float:
     """Standard deviation of white noise, from the distances of samples to the line between both neighbours.
 
-    From their median or their 90th percentile, whichever is larger: the median is small for quantised readings.
+    The larger of the values from their median and their 90th percentile: the median is small for quantised readings.
     """
     if len(time) < 3:
         return 0.0
@@ -355,7 +355,7 @@ def thinned(record: Record, begins: ndarray | None = None, *, follow: bool = Fal
     After every change of the rate of loading, a window lasts at most half of the time since then, and at most an eighth
     of the time until the next change. A window over which friction, slip or normal load bends by more than its noise
     explains is halved, the most curved first, until the windows, of eight means each, give `MOST_MEANS`, so that a bend
-    hidden by noise moves a mean by a twentieth of its noise. Samples at and just after a step are kept.
+    hidden by noise changes a mean by a twentieth of its noise. Samples at and just after a step are not averaged.
     """
     count = len(record.time)
     if count <= MOST_PLAIN:

@@ -1,7 +1,6 @@
 """Laboratory files: text of any dialect, xlook's text and binary formats, MATLAB arrays.
 
-A file becomes columns with its own names, units and numbers. `quakedesign.identification.record` interprets
-them.
+A file becomes columns with its own names, units and numbers, which `quakedesign.identification.record` interprets.
 """
 
 import csv
@@ -53,7 +52,7 @@ class Column:
 
 
 def read_columns(path: str | Path) -> list[Column]:
-    """Columns of a file, of equal length; `RecordError` for an unknown format or a line that misfits the headings."""
+    """Columns of a file, of equal length; `RecordError` for an unknown format or lines that misfit the headings."""
     data = read_bytes(path, "record", largest=_LARGEST_FILE, refusal=RecordError)
     if data.startswith(b"MATLAB 5.0"):
         columns = _matlab(data, path)
@@ -63,8 +62,8 @@ def read_columns(path: str | Path) -> list[Column]:
         columns = _text(_decoded(data, path), path)
     if len(columns[0].values) > MOST_SAMPLES:
         raise RecordError(
-            f"a record must have at most {MOST_SAMPLES} samples. Received {len(columns[0].values)}. Cut out the part "
-            "that counts."
+            f"a record must have at most {MOST_SAMPLES} samples. Received {len(columns[0].values)}. Extract the "
+            "relevant part."
         )
     return columns
 
@@ -77,7 +76,7 @@ def heading(text: str) -> Column:
 
 
 def _decoded(data: bytes, path: str | Path) -> str:
-    """Text of bytes: UTF-8, UTF-16 with its byte-order mark, or Latin-1, as older instruments write a micro sign."""
+    """Text of bytes: UTF-8, UTF-16 with its byte-order mark, or Latin-1, used by older instruments for µ."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return data.decode("utf-16", errors="replace")
     try:
@@ -131,7 +130,7 @@ def _cells(line: str, sign: str) -> list[str]:
 def _headings(before: list[str], count: int, sign: str) -> list[Column]:
     """Names and units of the columns, from the lines before the first numbers; without headings, numbers as names.
 
-    A line of units may stand between headings and numbers, and headings may be a remark, as NumPy writes them.
+    A line of units may follow the headings, and headings may be a comment line, as NumPy writes them.
     """
     parts = [line.strip() for line in before if line.strip()]
     plain = [line for line in parts if line[0] not in _COMMENTS]
@@ -145,7 +144,7 @@ def _headings(before: list[str], count: int, sign: str) -> list[Column]:
     else:
         named = [heading(cell) for cell in last]
     if len(named) != count and {len(named), count} != {count, count - 1}:
-        _refuse_count(named, count, sign)
+        _reject_count(named, count, sign)
     return named
 
 
@@ -156,7 +155,7 @@ def _heading_cells(line: str, sign: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def _refuse_count(named: list[Column], count: int, sign: str) -> None:
+def _reject_count(named: list[Column], count: int, sign: str) -> None:
     if sign == "," and len(named) < count <= 2 * len(named):
         raise RecordError(
             f"a line must have {len(named)} values, one for each column. Received {count}: commas separate the columns "
@@ -188,9 +187,9 @@ def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -
     except (pd.errors.ParserError, ValueError) as error:
         match = re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", str(error))
         what = (
-            f"line {int(match[2])} must hold {match[1]} values. Received {match[3]}. Complete or remove it."
+            f"line {int(match[2])} must have {match[1]} values. Received {match[3]}. Complete or remove it."
             if match
-            else "all lines must hold as many values. Complete or remove those that do not."
+            else "all lines must have the same number of values. Complete or remove those that do not."
         )
         raise RecordError(what) from None
     if len(columns) == len(cells) - 1:  # row numbers without a heading, such as xlook's, come first
@@ -200,7 +199,7 @@ def _table(text: str, first: int, sign: str, columns: list[Column], line: str) -
 
 
 def _values(cells: pd.Series, column: Column, text: str, first: int) -> ndarray:
-    """Numbers of one column; NaN where nothing was measured. A text that is no number is rejected."""
+    """Numbers of one column; NaN where nothing was measured. Any other text is rejected."""
     if pd.api.types.is_numeric_dtype(cells):
         values: ndarray = cells.to_numpy(dtype=float, copy=True)
         values[~np.isfinite(values)] = np.nan
@@ -217,7 +216,7 @@ def _values(cells: pd.Series, column: Column, text: str, first: int) -> ndarray:
         cell, numbered = texts.iloc[int(wrong[0])], enumerate(text.splitlines(), start=1)
         rows = [i for i, line in numbered if i > first and line.strip() and line.strip()[0] != "#"]
         raise RecordError(
-            f"line {rows[int(wrong[0])]} must hold a number in column {column.name}. Received {shown(cell)}."
+            f"line {rows[int(wrong[0])]} must have a number in column {column.name}. Received {shown(cell)}."
             f"{_remedy(cell)}"
         )
     return np.asarray(numbers.to_numpy(dtype=float))
@@ -247,7 +246,7 @@ def _xlook_text(text: str) -> list[Column]:
     table = pd.read_csv(io.StringIO(text), sep=r"\s+", header=None, skiprows=5, engine="c")
     columns = [heading(f"{name} [{unit}]") for name, unit in zip(names, units, strict=True)]
     if table.shape[1] != len(columns) + 1:
-        _refuse_count(columns, table.shape[1] - 1, r"\s+")
+        _reject_count(columns, table.shape[1] - 1, r"\s+")
     return [replace(column, values=_values(table[i], column, text, 5)) for i, column in enumerate(columns, start=1)]
 
 
@@ -271,7 +270,7 @@ def _xlook_binary(data: bytes, size: int, channels: int, kind: str) -> list[Colu
     table = table.astype(float).reshape(channels, -1)
     if b"bits" in data[36 : 36 + 84 * channels]:
         raise RecordError(
-            "xlook's binary must hold a reduced record. Received raw readings, in bits. Run its reduction (the file "
+            "xlook's binary must contain a reduced record. Received raw readings, in bits. Run its reduction (the file "
             "that ends in _r) in xlook and write the record as text, or as binary again."
         )
     words = [data[36 + 84 * i : 36 + 84 * i + 26] for i in range(channels)]
@@ -293,7 +292,7 @@ def _matlab(data: bytes, path: str | Path) -> list[Column]:
     long = max((value.shape[0] for value in arrays.values() if value.ndim), default=0)
     if long < 2:
         raise RecordError(
-            f"a MATLAB file must hold numeric arrays of equal length. Received {path} with "
+            f"a MATLAB file must contain numeric arrays of equal length. Received {path} with "
             f"{', '.join(name for name, *_ in listed) or 'nothing'}. Save the columns as vectors."
         )
     vectors = []
@@ -344,7 +343,7 @@ _COUNTS = {"bit", "bits", "volt", "volts", "V", "mV", "counts"}
 
 
 def columns_by_name(columns: Sequence[Column], wanted: str) -> tuple[dict[str, ndarray], list[str]]:
-    """Columns in SI units by name, and remarks on how their headings were read."""
+    """Columns in SI units by name, and remarks on headings; `RecordError` for missing, double or unclear headings."""
     given: dict[str, ndarray] = {}
     headings: dict[str, str] = {}
     named = _assigned(columns, wanted)
@@ -432,7 +431,7 @@ def _factor(name: str, column: Column) -> float:
     if written.strip().lower() in _COUNTS:
         raise RecordError(
             f"column {name} must be in units of {wanted or 'friction'}. Received {shown(column.heading)}, readings of "
-            f"an instrument. Calibrate it first, or give the size of one: --columns '{name}={column.name} "
+            f"an instrument. Calibrate it first, or give the size of one count: --columns '{name}={column.name} "
             f"[{ {'m': '0.0765 um', 'Pa': '0.0016 MPa', 's': '0.1 ms'}.get(wanted, '0.001') }]'."
         )
     try:

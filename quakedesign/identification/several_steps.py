@@ -58,17 +58,16 @@ class Steps:
 def read_steps(
     path: str | Path, steps: str = "", *, begin: str | None = None, end: str | None = None, **how: Any
 ) -> list[Record]:
-    """Records of the steps of a file: windows ``0 s to 60 s, 60 s to 120 s``, or as `cut` gives them with ``auto``.
+    """Records of the steps of a file: windows ``0 s to 60 s, 60 s to 120 s``, or the parts of `cut` with ``auto``.
 
-    By default one record of the whole file. `how` and the errors are those of `read_record`.
+    By default one record of the whole file. `how` are other arguments of `read_record`, whose errors are raised here
+    too; `RecordError` also for overlapping windows.
     """
     if steps in ("", "auto"):
         record = read_record(path, begin=begin, end=end, **how)
         return cut(record) if steps else [record]
     if begin is not None or end is not None:
-        raise RecordError(
-            f"--from and --to are for one window. Received them beside --steps {shown(steps)}. Omit them."
-        )
+        raise RecordError(f"--from and --to are for one window. Received them with --steps {shown(steps)}. Omit them.")
     parts: list[Record] = []
     windows = [[end.strip() for end in each.split(" to ")] for each in steps.split(",")]
     named = [" to ".join(ends) for ends in windows]
@@ -88,7 +87,7 @@ def read_steps(
 
 
 def cut(record: Record) -> list[Record]:
-    """Parts of a record, one for each large change of the loading rate, cut midway between the changes."""
+    """Parts of a record with one large change of rate each, cut midway; `RecordError` for fewer than two changes."""
     _, loading = prepared(record)
     begins = np.empty(0) if loading is None else loading.steps
     if len(begins) < 2:
@@ -118,19 +117,19 @@ def identify_steps(
     records : sequence of Record
         One record per step, at least two, without common samples.
     law, stiffness, rates, states, trend, seed
-        As for `identify`; the same `rates` hold for every step.
+        As for `identify`; the same `rates` apply to every step.
 
     Raises
     ------
     RecordError
-        When a record has not the columns that the law needs, or stiffnesses of steps have different units.
+        For fewer than two records, missing columns that the law needs, or stiffnesses of steps in different units.
     """
     if len(records) < 2:
         raise RecordError(f"a common fit must have at least 2 records. Received {len(records)}. Use identify for one.")
     units = sorted({record.stiffness_unit for record in records if record.load_point is not None})
     if len(units) > 1:
         raise RecordError(
-            f"stiffness must have one unit in all steps. Received {', '.join(units)}. Give stresses alone."
+            f"stiffness must have one unit in all steps. Received {', '.join(units)}. Use stresses in every step."
         )
     more: dict[str, Any] = {"stiffness": stiffness, "rates": rates, "trend": trend, "seed": seed}
     kinds = kinds_of(law, states)
@@ -156,7 +155,7 @@ def identify_steps(
 
 
 def _common(steps: Sequence[Identification]) -> tuple[Fit, list[str], float]:
-    """The common fit, the names of shared parameters, and its sum of squares minus those of the steps' own fits."""
+    """Common fit, names of shared parameters, and its sum of squares minus those of the separate fits of the steps."""
     fits = [step.fit for step in steps]
     of_steps = [fit.experiment.coordinates for fit in fits]
     quantities = steps[0].law.quantities()

@@ -14,9 +14,9 @@ SECOND_EFFECT, SECOND_SLIP = "second_effect", "second_slip"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _TwoStates(RateAndState):
-    """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c) + b_2 log(v_0 θ_2/d_2); each state evolves as in the law with one.
+    """μ = μ_0 + a log(v/v_0) + b log(v_0 θ/d_c) + b_2 log(v_0 θ_2/d_2); both states evolve as in the law `one`.
 
-    The second effect may be negative. Such friction only describes records; no fault can have it.
+    The second effect may be negative. This law only describes records; no fault file can contain it.
     """
 
     state_names: ClassVar[tuple[str, ...]] = ("theta", "theta_2")
@@ -63,7 +63,7 @@ class _TwoStates(RateAndState):
 
 
 def with_two_states(name: str) -> type[FrictionLaw]:
-    """The two-state law of the ageing or the slip law."""
+    """Two-state version of the ageing or the slip law, by its name."""
     one = friction_law(name)
     return type(
         "TwoStates", (_TwoStates,), {"one": one, "name": f"{name}, two states", "source": one.source, "__slots__": ()}

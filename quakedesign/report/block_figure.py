@@ -17,21 +17,21 @@ _STAGES = 6
 
 
 def block_figure(chain: BlockChain, run: BlockRun | SlidersRun, proved: str) -> "Figure":
-    """Matplotlib figure of a run with a note below it.
+    """Matplotlib figure of a run.
 
     Parameters
     ----------
     chain : BlockChain
     run : BlockRun or SlidersRun
     proved : str
-        Sentence of the guarantee, used as the note.
+        Sentence of the guarantee, which becomes the note below the figure.
     """
     from matplotlib import colormaps
 
     drawing, axes = figure(2, 5.2, 2)
     size, unit = clock(float(run.times[-1]))
-    times, N, many = run.times / size, len(chain.blocks), colormaps["viridis"]
-    shades = [many(0.9 * i / max(N - 1, 1)) for i in range(N)]
+    times, N, palette = run.times / size, len(chain.blocks), colormaps["viridis"]
+    shades = [palette(0.9 * i / max(N - 1, 1)) for i in range(N)]
     errors = run.slip - run.reference[:, None]
     parts = ((axes[0, 0], errors, "m", "slip error"), (axes[0, 1], run.slip_rate, "m/s", "largest slip rate"))
     for axis, values, SI, title in parts:

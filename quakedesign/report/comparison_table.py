@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Comparison(Compared):
-    """Natural behaviour, published and designed controllers of one fault, see `Compared`."""
+    """Runs of one fault without control and with published and designed controllers; see `Compared`."""
 
     def to_dict(self) -> Json:
         """Keys of ``design --json``, see docs/reference/json.md."""
@@ -65,22 +65,22 @@ def compare(
     progress: Callable[[str, float], None] | None = None,
     **entered: Quantity | None,
 ) -> Comparison:
-    """Run all controllers of a fault with sampling period T_s: the whole task, or 500 D_c/V for friction with a state.
+    """Run all controllers of a fault at its T_s, for the whole task, or for 500 D_c/V if friction has a state.
 
     Parameters
     ----------
     fault : Fault
     designs : sequence of Design, Controller or SampledLaw
-        Designs, and given laws, which are assessed first; a design without a controller is reported but not run.
+        Designs, and given laws, which are first assessed; a design without a controller is reported but not run.
     setup : LoopSetup
         Loop setup of the given laws; a design has its own.
     with_published : bool
-        Add the paper's gains, if the fault has any, with their verdicts and premises; not for designs with a delay, a
-        lag or a diffusion path, for which those gains are not designed.
+        Add the paper's gains for the fault, if any, with their verdicts and premises; not with designs that have a
+        delay, a lag or a diffusion path, for which those gains are not designed.
     scheme, published_scheme : str
-        Schemes of the runs of designed and published gains, see `quakedesign.loop.schemes`; by default ``continuous``,
-        as in the paper. Labels distinguish them if they differ. A sampled law runs as designed, as do all designs that
-        are not continuous.
+        Schemes of the runs of designed and published gains in continuous time, see `quakedesign.loop.schemes`; by
+        default ``continuous``, as in the paper. Labels distinguish schemes that differ. All other laws run in the
+        scheme for which they are designed.
     whole_task : bool
         Run the whole task for friction with a state, however slow.
     plant : str, optional
@@ -149,5 +149,5 @@ def designed_comparison(
 
 
 def _schemes(scheme: str | None = None, published_scheme: str | None = None) -> dict[str, str]:
-    """Schemes by origin of the gains."""
+    """Scheme by origin of the gains."""
     return {"designed": scheme or AS_IN_THE_PAPER, "published": published_scheme or AS_IN_THE_PAPER}

@@ -134,7 +134,7 @@ def run_settings(runs: Iterable["Shown"]) -> str:
 
 
 def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Factor and prefixed unit that suit a largest value, such as ``(1e6, "MPa")`` for 5e6 Pa."""
+    """Factor and prefixed unit for a largest value, such as ``(1e6, "MPa")`` for 5e6 Pa."""
     size, prefix = next(((s, p) for s, p in _PREFIXES if largest >= s), (1.0, ""))
     return size, prefix + unit
 
@@ -231,7 +231,7 @@ def file_names(name: str, formats: Sequence[str]) -> str:
 
 
 # ----------------------------------------------------------------------
-# Figures as SVG inside a page: compact, with the colours of the page, and with axis data to read values by pointer.
+# Figures as SVG inside a page: compact, in the colours of the page, with axis data for reading values with the pointer.
 
 _INKS = {"#000000": "var(--ink)", "#444444": "var(--soft)", "#b0b0b0": "var(--line)", "#cccccc": "var(--line)"}
 """Page colours of frames, text and grids; curves keep their colours."""
@@ -311,7 +311,7 @@ def cached_figures(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str]
     alt : mapping of str to str
         Text alternatives of the figures, by name.
     shown : Any
-        All shown data; durations of computations are ignored.
+        All data that the figures show; durations of computations are ignored.
     """
 
     def texts() -> bytes:
@@ -324,7 +324,7 @@ def cached_figures(draw: Callable[[], Mapping[str, Any]], alt: Mapping[str, str]
 
 
 def _stated(alt: Mapping[str, str], shown: Any) -> bytes | None:
-    """Cache key of drawings from contents, settings and fonts; None if one of these cannot be serialised."""
+    """Cache key of figures from data, settings and fonts; None if one of these is not readable or serialisable."""
     import matplotlib as mpl
     from matplotlib.font_manager import fontManager
 

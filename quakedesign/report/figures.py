@@ -1,7 +1,6 @@
 """Figures of a comparison: states, pressure, errors, metrics, stability map, cycles.
 
-Cycles and slow sliding are for faults with friction state. Published and designed gains appear in one
-figure.
+Cycles and slow sliding are for friction with a state. Published and designed gains appear in one figure.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -57,9 +56,9 @@ def grid(comparison: "Compared") -> tuple[list[str], list[str], dict[tuple[str, 
 
 
 def states(comparison: "Compared") -> "Figure":
-    """Slip of all laws in the first row, below it the band of the slip rate of each law.
+    """Slip of all laws in the first row; below it, the slip rate of each law as a band.
 
-    The scale of the rate is linear up to the power of ten at or above the largest reference rate, then logarithmic.
+    The scale of the rate is linear up to the power of ten at or above the largest reference rate, and then logarithmic.
     """
     laws, origins, by_law = grid(comparison)
     rows = 1 + len(laws)
@@ -77,7 +76,7 @@ def states(comparison: "Compared") -> "Figure":
                 continue
             _rate(axes[row, column], entry, comparison, divisor)
         _time_below(axes[:, column], drawing, unit)
-    note = "slip rate: band between the extremes of every 40 stored samples; scale logarithmic beyond the linear part"
+    note = "slip rate: band between the extremes of every 40 stored samples; linear scale near 0, then logarithmic"
     rates = [axis for axis in drawing.axes if axis not in axes[0]]
     return finish(
         drawing,
@@ -121,7 +120,7 @@ def _power_of_ten(value: float) -> float:
 
 
 def _decades(axis: Any) -> "Locator":
-    """Ticks at zero and at powers of ten beyond the linear part, at least two decades apart: at most five."""
+    """At most five ticks: zero, and powers of ten beyond the linear part, at least two decades apart."""
     from matplotlib.ticker import FixedLocator
 
     last = int(np.floor(np.log10(max(np.abs(axis.get_ylim())))))
@@ -179,7 +178,7 @@ def pressure(comparison: "Compared", close_ups: "Mapping[str, Trajectory] | None
 
 
 def _inset(axis: "Axes", run: "Trajectory", shade: str) -> None:
-    """The last quarter of a short run, about its mean, in an inset with its own units."""
+    """Draw the pressure of the last quarter of a short run, minus its mean, in an inset with its own units."""
     late = slice(-(len(run.time) // 4 or 1), None)
     time, values = run.time[late], run.pressure[late] - run.pressure[late].mean()
     size, name = scaled(float(np.abs(values).max()) or 1.0, "Pa")
@@ -201,7 +200,7 @@ _PER_BAND = 16  # smallest number of instants of a band: four sampling periods
 
 
 def state_figures(comparison: "Compared") -> "dict[str, Figure]":
-    """``cycle``, if computed, and ``slow-sliding`` and ``sliding-errors`` of the first law with a run."""
+    """Figures ``cycle``, if computed, and ``slow-sliding`` and ``sliding-errors`` of the first law with a run."""
     drawn = {} if comparison.uncontrolled.failed else {"cycle": cycle(comparison)}
     for one in runs_of(comparison.entries)[:1]:
         drawn |= {"slow-sliding": slow_sliding(*one), "sliding-errors": errors(*one)}
@@ -226,7 +225,7 @@ def cycle(comparison: "Compared") -> "Figure":
 
 
 def slow_sliding(entry: "Entry", run: "Trajectory") -> "Figure":
-    """Slip, slip rate, pressure and state of a law that stabilises slow sliding."""
+    """Slip, slip rate, pressure and friction state of a run of controlled slow sliding."""
     fault, shade = entry.design.fault, colour(entry.design.name)
     drawing, ((slip,), (rate,), (pressure,), (state,)) = figure(4, 6.6)
     divisor, unit = clock(float(run.time[-1]))
@@ -239,8 +238,8 @@ def slow_sliding(entry: "Entry", run: "Trajectory") -> "Figure":
     _filled(rate, time, run.slip_rate / first, shade)
     rate.plot(time, speed / first, color="black", linestyle=":", linewidth=1, label="reference")
     if entry.proof is not None:
-        never = float(entry.proof.peak_slip_rate) / first
-        rate.axhline(never, color=PROVED, linestyle=(0, (10, 3)), label="proved upper bound")
+        bound = float(entry.proof.peak_slip_rate) / first
+        rate.axhline(bound, color=PROVED, linestyle=(0, (10, 3)), label="proved upper bound")
     rate.set_ylabel("slip rate / V [-]")
     largest, pascal = scaled(float(np.abs(run.pressure).max()) or 1.0, "Pa")
     _filled(pressure, time, run.pressure / largest, shade)
@@ -275,7 +274,7 @@ def _filled(axis: "Axes", time: "np.ndarray", values: "np.ndarray", shade: str) 
 
 
 def _width(time: "np.ndarray") -> int:
-    """Number of instants of a band."""
+    """Number of instants in a band."""
     return max(_PER_BAND, len(time) // _BANDS)
 
 
@@ -485,10 +484,10 @@ _COLOURS = {"unstable": "#F3C6B2", "stable": "#BFD9EC"}
 def stability_map(
     fault: Fault, *, pressure: float = 0, loading_rate: float | None = None, inertia: bool = True
 ) -> "Figure":
-    """Draw the stable and the unstable region of a fault, bounded by its symbolic stability conditions.
+    """Stable and unstable regions of a fault, whose boundaries are its symbolic stability conditions.
 
-    The left panel varies the effective normal stress σ' at the given pressure, the right one the pressure p at the
-    fault's σ'. Mass, damping and friction are the fault's. The marker is the fault; its verdict is exact.
+    The left panel varies the effective normal stress σ' at the given pressure, the right panel the pressure p at the
+    fault's σ'. Mass, damping and friction are the fault's. The marker is the fault, whose verdict is exact.
 
     Parameters
     ----------
@@ -503,7 +502,7 @@ def stability_map(
     Raises
     ------
     ParameterError
-        When the pressure opens the fault, or the rate is outside of the law's domain.
+        When the pressure opens the fault, or the rate is outside the law's domain.
     """
     regions = stability_regions(fault, pressure=pressure, loading_rate=loading_rate, inertia=inertia)
     drawing, ((left, right),) = figure(1, 3.6, 2, sharey=True)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def prepare(out: Path, *, force: bool) -> None:
-    """Raise OutputError early if a folder is not writable or exists; with `force`, a folder of results may exist."""
+    """Raise `OutputError` if a folder is not writable or exists; with `force`, a folder of results may exist."""
     if os.path.exists(out) and not force:
         raise OutputError(
             f"output folder must be new. Received {out}, which exists. Give another --out, or --force to replace it."
@@ -42,7 +42,7 @@ def results(comparison: Comparison, *, stored: bool = True) -> Json:
     Parameters
     ----------
     stored : bool
-        Name the certificate files; if False, None replaces their names.
+        Whether the results name the certificate files; otherwise None replaces their names.
     """
     results = {"fault": fault_dict(comparison.fault), **comparison.to_dict()}
     for origin, group in (("designed", "controllers"), ("published", "published")) if stored else ():
@@ -105,7 +105,7 @@ def write_folder(
     formats : sequence of str
         Formats of the figure files, see `quakedesign.report.drawing.FORMATS`.
     command : str
-        Command that the report states for its reproduction.
+        Command that reproduces the report, as stated in it.
     tell : callable
         Called with the current activity and the fraction done [-].
 

@@ -1,4 +1,4 @@
-"""Map of certified gains as a figure, a table and a folder; screened and proved cells look different."""
+"""Map of certified gains as a figure, a table and a folder, with screened and proved points."""
 
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -21,7 +21,7 @@ _FAILED = "#D55E00"
 
 
 def gain_map_figure(drawn: GainMap) -> "Figure":
-    """Draw a map: shades are levels screened in floating point, markers are exactly proved points."""
+    """Figure of a map: shades are levels screened in floating point, markers are points with exact proofs."""
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.figure import Figure
 
@@ -75,7 +75,7 @@ def _patch(shade: Any, label: str) -> Any:
 
 
 def _markers(axis: "Axes", drawn: GainMap, first: np.ndarray, second: np.ndarray) -> list[Any]:
-    """Markers of all tried points, and their legend entries."""
+    """Draw markers of all points for which a proof was tried; return their legend entries."""
     looks: dict[str, dict[str, Any]] = {
         "edge": {"marker": "s", "s": 5, "color": "black", "label": "proved, at the edge of a level"},
         "interior": {"marker": "o", "s": 7, "facecolors": "none", "edgecolors": "black", "linewidths": 0.5,
@@ -132,7 +132,7 @@ def _number(value: Any) -> str:
 
 
 def gain_map_rows(drawn: GainMap) -> list[dict[str, str]]:
-    """One row per point: gains, necessary limit of L̄, levels screened and proved, role, certificate file."""
+    """One row per point: gains, necessary limit of the bound L̄ on |h'|, levels, role, certificate file."""
     rows = []
     first, second = drawn.sheet.axes
     names = drawn.sheet.over
@@ -172,7 +172,7 @@ def gain_map_units(drawn: GainMap) -> dict[str, str]:
 
 
 def gain_map_values(drawn: GainMap) -> Json:
-    """Numbers of a map; exact quantities are strings."""
+    """JSON-able numbers of a map; exact quantities are strings."""
     sheet, top = drawn.sheet, len(drawn.sheet.levels)
     return {
         "law": sheet.loop.law,

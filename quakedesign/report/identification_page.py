@@ -26,7 +26,7 @@ _MEASURED, _FITTED, _OUTLIER = "#777777", "#0072B2", "#D55E00"
 _DASHED = 0, (4, 2)
 _MOST_OUTLIERS = 8
 _MOST_PANELS = 4
-_SHOWN = 12.0  # shown range after a step, in critical slips
+_SHOWN = 12.0  # range of displacement shown after a step, in critical slips
 _LAGS = 40
 _SMALL_EFFECT = 0.1  # friction below which values are written in thousandths
 _SYMBOLS = {"direct_effect": "a", "evolution_effect": "b", "critical_slip": "$D_c$"}
@@ -45,10 +45,10 @@ def identification_lines(result: Identification | Steps, *, verbose: bool = Fals
         text = f"All steps jointly: {result.common.assessment.checks[0].sentence}."
         return [*common[:head], "", *table, "", *_wrapped([text]), *common[head:], *(each if verbose else [])]
     assessment, summary = result.assessment, f"{result.record.name}: {result.law.name}"
-    unclear, refused = (assessment.verdict == each for each in (CANNOT_TELL, EXPLAINS_NOT))
+    unclear, unexplained = (assessment.verdict == each for each in (CANNOT_TELL, EXPLAINS_NOT))
     summary += f", {assessment}: {assessment.open[0]}." if unclear else f" {assessment}."
     sign = next((check for check in assessment.checks if check.name == "sign" and check.passed), None)
-    if sign is not None and not refused and result.difference is not None:
+    if sign is not None and not unexplained and result.difference is not None:
         does, (value, ends, _) = "weakens" if result.difference.value < 0 else "strengthens", _cells(result.difference)
         summary += f" Friction {does} with rate: a - b = {value} ({ends})."
     but = [f"But {each}." for each in assessment.cautions]
@@ -56,7 +56,7 @@ def identification_lines(result: Identification | Steps, *, verbose: bool = Fals
     more += [f"this experiment would decide: {each}" for each in assessment.experiments if unclear]
     more += (
         [*(f"- {each}" for each in result.undetermined()), f"suggested: {'; '.join(result.to_try())}"]
-        if refused
+        if unexplained
         else []
     )
     failed = [check.sentence for check in assessment.checks if not check.passed]
@@ -66,7 +66,7 @@ def identification_lines(result: Identification | Steps, *, verbose: bool = Fals
     notes = [each for each in result.record.remarks if verbose or " is read as " not in each]
     more += [
         *_warnings(result),
-        *([f"read from the file as: {'; '.join(notes)}"] if notes else []),
+        *([f"reading of the file: {'; '.join(notes)}"] if notes else []),
         *(_more(result) if verbose else []),
     ]
     return [*_wrapped([summary, *but, ""]), _HEAD, *map(_row, shown), "", *_wrapped(more)]
@@ -122,7 +122,7 @@ def _row(estimate: ParameterEstimate) -> str:
 
 
 def _cells(estimate: ParameterEstimate) -> tuple[str, str, str]:
-    """Value, interval and unit with its prefix, in as many digits as the interval justifies."""
+    """Value, interval and prefixed unit, with as many digits as the interval justifies."""
     power = power_of(estimate.value) if estimate.unit in _PREFIXED else 0
     wide = estimate.high - estimate.low
     finite = math.isfinite(wide) and wide > 0
@@ -153,12 +153,12 @@ def _warnings(identification: Identification) -> list[str]:
     if outliers:
         largest = ", ".join(f"{o.size:+.3g} at {o.time:.6g} s" for o in outliers[:_MOST_OUTLIERS])
         more = f", and {len(outliers) - _MOST_OUTLIERS} smaller" if len(outliers) > _MOST_OUTLIERS else ""
-        notes.append(f"outliers left out: {largest}{more}")
+        notes.append(f"excluded outliers: {largest}{more}")
     return notes
 
 
 def steps_figure(steps: Steps) -> "Figure":
-    """One panel per step with its own and the common fit, and the regions of a and b of all steps."""
+    """One panel per step with its own and the common fit, and the confidence regions of two parameters."""
     joint: Any = steps.common.fit.experiment
     at, count = steps.common.fit.fitted, len(steps.steps)
     names = [f"step {i}" for i in range(count)] + ["."] * (count % 2)
@@ -180,7 +180,7 @@ def steps_figure(steps: Steps) -> "Figure":
 
 
 def identification_figure(identification: Identification) -> "Figure":
-    """Friction with fit and trend, load-point rate, every step, residuals, their correlation, and a joint region."""
+    """Friction with fit and trend, load-point rate, residuals, every step, correlation, joint region, and profiles."""
     record, used, fit = identification.record, identification.used, identification.fit
     way = record.time[used] if record.path is None else record.path[used] * 1e6
     slipped = "time [s]" if record.slip is None else "slip [µm]"
@@ -267,7 +267,7 @@ def _friction(axis: "Axes", identification: Identification, way: ndarray, part: 
         axis.plot(way[part], line[part], color=NATURAL, linewidth=0.8, linestyle=_DASHED, label="trend")
     left = np.flatnonzero(~fit.used[part]) + (part.start or 0)
     if len(left):
-        axis.plot(way[left], fit.measured[left], "x", color=_OUTLIER, markersize=5, label="left out")
+        axis.plot(way[left], fit.measured[left], "x", color=_OUTLIER, markersize=5, label="outlier")
     axis.set_ylabel("friction [-]", fontsize=SMALL)
 
 
@@ -288,7 +288,7 @@ def _correlation(axis: "Axes", fit: Fit) -> None:
 
 
 def _profile(axis: "Axes", estimate: ParameterEstimate, fit: Fit) -> None:
-    """Profile likelihood: root of the excess cost at fixed values, with thresholds for one parameter and for all."""
+    """Profile: square root of the excess at fixed values, with thresholds for one parameter and for all jointly."""
     alone, jointly = (math.sqrt(fit.threshold(count)) for count in (1, len(fit.fitted)))
     small = not estimate.unit and abs(estimate.value) < _SMALL_EFFECT
     power = power_of(estimate.value) if estimate.unit in _PREFIXED else -3 * small
@@ -332,7 +332,7 @@ def _region(axis: "Axes", identification: Identification, label: str = "", colou
 
 
 def require_format(path: Path) -> None:
-    """Reject a figure format other than SVG, PNG or PDF."""
+    """Raise `OutputError` for a figure format other than SVG, PNG or PDF."""
     if path.suffix[1:] not in FORMATS:
         raise OutputError(f"a figure must end in .{', .'.join(FORMATS)}. Received {path}. Write {path.stem}.svg, say.")
 

@@ -50,7 +50,7 @@ def _meaning(limits: Limits) -> list[str]:
     if isinstance(limits, SlidingLimits):
         return _meaning_of_sliding(limits)
     if limits.peak_slip_rate_error.impossible_beyond is None:
-        return ["without a disturbance no limit is known: give amplitude in [disturbance] of the fault file"]
+        return ["without a disturbance no limit is known: give an amplitude in [disturbance] of the fault file"]
     within = "bounded" if limits.slip_error is None else f"within {limits.slip_error.quantity('m')}"
     signals = "knows slip, slip rate and disturbance"
     if limits.sensing.noisy:
@@ -59,7 +59,7 @@ def _meaning(limits: Limits) -> list[str]:
         "infeasible: every controller, linear or not, fails for some friction of the box and some disturbance of the "
         "stated size, which may jump",
         f"slip-rate error: for controllers that keep the slip error {within}, on the plant without stick, "
-        f"even for one that {signals} up to each sample",
+        f"even for a controller that {signals} up to each sample",
         "proved, slip-rate error: the smaller bound of the designs for the objectives tracking and peak, on the plant "
         "without stick",
     ]
@@ -87,12 +87,12 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     lines = [
         "infeasible: every controller, linear or not, fails for the nominal fault linearised about slow sliding along "
         "its task, without inertia; for the fault itself these limits are approximations by linearisation",
-        "slip-rate error: it holds even for a controller that knows slip, slip rate, state and stress up to each "
-        "sample; the stress may jump",
+        "slip-rate error: the limit applies even to a controller that knows slip, slip rate, state and stress up to "
+        "each sample; the stress may jump",
     ]
-    if limits.rock:
+    if limits.diffusion_time:
         holds = "INFEASIBLE for every controller, in the same sense" if limits.beyond else "not shown to be infeasible"
-        lines.append(f"the given well, L^2/D = {float(limits.rock):.4g} s: {holds}")
+        lines.append(f"the given well, L^2/D = {float(limits.diffusion_time):.4g} s: {holds}")
     if limits.largest_step.impossible_beyond is None:
         return [
             *lines,
@@ -101,8 +101,8 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
     return [
         *lines,
         "other rows: a constant stress begins just after a sample; before the next pressure acts, the errors have "
-        f"grown so far that a pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of what the reference "
-        f"needs no longer stops them; D = {float(limits.diffusivity):g} m^2/s",
+        f"grown so far that a pressure within {UpperBound(limits.withdrawal).quantity('Pa', 4)} of that for the "
+        f"reference no longer stops them; D = {float(limits.diffusivity):g} m^2/s",
         "proved: no design"
         if limits.guarantee is None
         else f"proved: bounds of an e-LQR that was designed for this table{_path(limits.guarantee)}, "
@@ -112,14 +112,14 @@ def _meaning_of_sliding(limits: SlidingLimits) -> list[str]:
 
 
 def _constants(proof: SlidingProof) -> str:
-    """Whether the design is for a spread of a, b and D_c."""
+    """Spread of a, b and D_c for which the design is proved, in words."""
     low, high = proof.task.ranges["direct_effect"]
     spread = LowerBound((high - low) / (high + low))  # a covered range: rounded inward
-    return f"for a, b and D_c with relative spreads of {spread:.3g}" if spread else "for a, b and D_c as they are given"
+    return f"for a, b and D_c with relative spreads of {spread:.3g}" if spread else "for the given a, b and D_c"
 
 
 def _box(limits: Limits) -> str:
-    """Name of the box; empty for slow sliding, which has no box."""
+    """Name of the uncertainty box; empty for slow sliding, which has no box."""
     return "" if isinstance(limits, SlidingLimits) else f"box {limits.fault.box.name}, "
 
 
@@ -152,7 +152,7 @@ def _shown(bound: Bound | None, unit: str) -> str:
 
 
 def limits_figure(limits: Limits) -> "Figure":
-    """Slip-rate errors over T_s: infeasible, proved, and the natural earthquake's slip rate."""
+    """Infeasible and proved slip-rate errors over T_s, and the slip rate of the natural earthquake."""
     drawing, axes = figure(1, 4.2)
     axis, natural = axes[0, 0], limits.natural_peak
     axis.set(xscale="log", yscale="log", xlabel="T_s [s]", ylabel="slip-rate error [m/s]")

@@ -1,7 +1,7 @@
 """HTML report on one page with its figures and equations, without external resources.
 
-Chapters: units and numbers as HTML; equations as MathML; account of every controller; parameter table;
-reproduction; captions; page.
+Chapters: units and numbers as HTML; equations as MathML; account of every controller; parameter table; reproduction;
+captions; page.
 """
 
 import os
@@ -61,7 +61,7 @@ def unit_html(unit: str) -> Markup:
 
 
 def typeset(text: object) -> object:
-    """A sentence of plain text, typeset: signs, raised exponents, powers of ten; markup is unchanged."""
+    """Plain text typeset with signs, raised exponents and powers of ten; other values are unchanged."""
     return _set(text) if isinstance(text, str) and not isinstance(text, Markup) else text
 
 
@@ -115,7 +115,7 @@ class Account:
 
     label: str
     badge: str
-    good: bool  # Whether there is a guarantee, or a certificate all of whose premises hold for this loop and task
+    good: bool  # Whether there is a guarantee, or a certificate whose premises all hold for this loop and task
     # guarantee, run, limits, verdict, proof: Sentences without a full stop
     guarantee: list[str]
     run: list[str]
@@ -168,7 +168,7 @@ def _account(entry: "Entry") -> Account:
             *compensated,
             *([f"it runs in the scheme {sampling.scheme}, once every {float(sampling.step):g} s"] if sampling else []),
             *_at_samples(entry),
-            *_slowly(entry),
+            *_slow_sliding_proof(entry),
             *domain,
         ],
         law=_equations(entry) + _difference(entry),
@@ -180,7 +180,7 @@ def _account(entry: "Entry") -> Account:
     )
 
 
-def _slowly(entry: "Entry") -> list[str]:
+def _slow_sliding_proof(entry: "Entry") -> list[str]:
     """Explanation of a guarantee of slow sliding; empty for other guarantees."""
     proof = entry.proof
     if proof is None or not proof.cells:
@@ -204,7 +204,7 @@ def _linear_law(entry: "Entry") -> "LinearLaw | None":
 
 
 def _at_samples(entry: "Entry") -> list[str]:
-    """Symbols of the difference equations of a stick–slip law; empty for other laws."""
+    """Definitions of the symbols in the difference equations of a stick–slip law; empty for other laws."""
     law = getattr(getattr(entry.proof, "sampled_loop", None), "law", None)
     if not isinstance(law, StickSlipLaw):
         return []
@@ -227,7 +227,7 @@ def _equations(entry: "Entry") -> list[Markup]:
 
 
 def _difference(entry: "Entry") -> list[Markup]:
-    """A sampled linear law as a difference equation, in four digits."""
+    """A sampled linear law as difference equations, rounded to four digits."""
     law = _linear_law(entry)
     if law is None or len(law.states) > _SHOWN_STATES:
         return []
@@ -243,7 +243,7 @@ def _difference(entry: "Entry") -> list[Markup]:
 
 
 def _python(entry: "Entry") -> list[str]:
-    """Lines for python-control."""
+    """Lines of Python that give a sampled linear law to python-control; empty for other laws."""
     law = _linear_law(entry)
     if law is None or entry.proof is None:
         return []
@@ -277,7 +277,7 @@ def _row(premise: "Premise") -> tuple[str, ...]:
 
 _OTHER_UNITS = {"scale": "", "weight": "", "divisor": "m^2/kg", "authority": "m^2/kg"}
 _OTHER_UNITS |= {"rest_width": "Pa", "rest_per_slip": "Pa/m", "rest_resolution": "m"}
-_OTHER_UNITS |= {"rest_least": "Pa", "rest_largest": "Pa", "rest_fastest": "m"}
+_OTHER_UNITS |= {"rest_least": "Pa", "rest_largest": "Pa", "rest_fastest": "m", "rest_slip": "m"}
 
 
 def _gains(entry: "Entry") -> list[tuple[str, str, Markup]]:
@@ -303,17 +303,17 @@ HEADINGS = ("parameter", "symbol", "value", "unit", "section")
 
 
 def parameter_rows(fault: Fault) -> list[Row]:
-    """One row per parameter under `HEADINGS`: from the fault file, its uncertainty, and derived ones.
+    """One row per parameter under `HEADINGS`: those of the fault file, half-widths of the box, and derived ones.
 
-    Faults with a friction state have no disturbance rows; their disturbance is the stress of the guarantee.
+    Faults whose friction has a state have no disturbance rows; their disturbance is the stress of the guarantee.
     """
-    refused = fault.friction.equilibrium.messages
+    messages = fault.friction.equilibrium.messages
     rows = [
         *_field_rows(fault, PLANT, "fault"),
         *_field_rows(fault.friction, fault.friction.quantities(), "friction"),
         *_field_rows(fault.reference, [name for name in TASK if name != _STEP], "task"),
         *_field_rows(fault, [_STEP], "task"),
-        *_field_rows(fault.disturbance, () if "disturbance" in refused else DISTURBANCE, "disturbance"),
+        *_field_rows(fault.disturbance, () if "disturbance" in messages else DISTURBANCE, "disturbance"),
     ]
     rows += [
         _parameter_row(f"half-width of {name}", float(getattr(fault.box, name)), "", "uncertainty", "±")
@@ -347,8 +347,8 @@ _PACKAGES = ("quakedesign", "sympy", "cvxpy", "clarabel", "casadi", "numpy", "sc
 class Reproduction:
     """Data to reproduce a report."""
 
-    date: str  # UTC; that of SOURCE_DATE_EPOCH if set, for pages that are reproducible bitwise
-    command: str  # Command as typed; empty if no command made the report
+    date: str  # UTC; from SOURCE_DATE_EPOCH if set, for pages that are reproducible bitwise
+    command: str  # Command as typed; empty for a report that was not made by a command
     versions: Mapping[str, str]  # Of the package, libraries that affect numbers, Python; and the machine
     scenario: list[str]  # Lines of the fault as TOML
 
@@ -374,31 +374,30 @@ def reproduction(fault: Fault, command: str = "") -> Reproduction:
 # Captions of the figures, which are also their text alternatives.
 
 CAPTIONS = {
-    "overview": "Slip rate and slip over logarithmic time, without control and with the "
-    "controllers of the legend; thick: the designed controller with the smallest proved bound. Horizontal lines are "
-    "for that controller.",
-    "uncontrolled": "Natural earthquake without control: slip and slip rate. Dotted: the slip at which the fault comes "
-    "to rest according to statics.",
+    "overview": "Slip rate and slip over logarithmic time, without control and with the controllers in the legend. "
+    "Thick line: designed controller with the smallest proved bound on the slip rate. Horizontal lines: bounds for "
+    "this controller.",
+    "uncontrolled": "Natural earthquake without control: slip and slip rate. Dotted: slip at which the fault comes to "
+    "rest according to statics.",
     "cycle": "Without control, loaded by the far end of the spring at the reference rate of the friction law: slip and "
     "slip rate. Dotted: the loading rate.",
     "slow-sliding": "Controlled fault in slow sliding. The stress is a sine with the amplitude that the guarantee "
     "allows. Slip and its reference, slip rate and its proved bound, fluid pressure in the fault, and friction state "
     "divided by its value in steady sliding.",
-    "sliding-errors": "How far slip and slip rate are from their references in the run of slow sliding.",
-    "states": "Closed loop: slip and its reference on top, then the range of the slip rate under each law. The "
-    "scale is linear near the reference rate and logarithmic beyond; dashed: the peak of the natural earthquake.",
-    "pressure": "Fluid pressure that every law commands; below zero fluid is withdrawn.",
-    "errors": "How far slip and slip rate are from their references, the largest of every 40 stored samples. Lower is "
-    "better.",
-    "metrics": "Largest errors, root mean square and total variation of the pressure after a quarter of the task. "
-    "Hatched: published gains.",
-    "friction-law": "Friction against slip, and the line along which the spring unloads: where friction falls "
-    "faster than this line, the fault is unstable.",
+    "sliding-errors": "Slip error and slip-rate error in the run of slow sliding.",
+    "states": "Closed loop: slip and its reference (top); range of the slip rate under each law (below). The scale of "
+    "the rate is linear near the reference rate and logarithmic beyond. Dashed: peak of the natural earthquake.",
+    "pressure": "Fluid pressure commanded by each law; at negative pressures fluid is withdrawn.",
+    "errors": "Magnitudes of slip error and slip-rate error: largest of every 40 stored samples. Lower is better.",
+    "metrics": "Largest errors, and root mean square and total variation of the pressure, after the first quarter of "
+    "the run. Hatched: published gains.",
+    "friction-law": "Friction coefficient against slip, and the line along which the spring unloads. Where friction "
+    "falls faster than this line, the fault is unstable.",
     "earthquakes": "Natural earthquake and the one that a constant injection induces.",
     "friction-coefficient": "Friction coefficient in closed loop; dotted: its smallest and largest values.",
     "errors-and-power": "Errors and pressure divided by those of the e-LQR; values below 1 are better.",
-    "peak-against-tracking": "What tracking costs: simulated errors against the guaranteed slip-rate error, one point "
-    "a design.",
+    "peak-against-tracking": "Trade-off between peak and tracking: simulated errors against the guaranteed slip-rate "
+    "error, one point per design.",
 }
 
 
@@ -406,11 +405,11 @@ CAPTIONS = {
 # The report as one HTML page that contains its figures and equations and loads nothing.
 
 MODEL_LIMITS = (
-    "the model is one block: it does not describe where an earthquake stops, rupture speed, heating, or seismicity "
+    "the model is one block: it does not describe the arrest of a rupture, rupture speed, heating, or seismicity "
     "around the fault",
     "a guarantee covers the friction laws, parameters and disturbances that it names; whether those of the real fault "
     "are among them must be decided from data",
-    "the pressure in the runs has no limits and is uniform over the patch",
+    "the pressure in the runs is not limited and is uniform over the patch",
 )
 REST_LIMITS = (
     "a guarantee that begins 'on the plant without stick' is for friction continued linearly to negative slip rates; "
@@ -418,8 +417,8 @@ REST_LIMITS = (
 )
 _WAYS = {"delay": "a delay of", "lag": "a lag of", "diffusion": "a diffusion path of L^2/D ="}
 SLIDING_LIMITS = (
-    "the fault slides at the rate of its task from the start, and the far end of its spring is at rest: how it came to "
-    "slide is part neither of the run nor of the proof",
+    "the fault slides at the rate of its task from the beginning, and the far end of its spring is fixed: neither run "
+    "nor proof includes the transition from rest to sliding",
     "the stress disturbance of the run is a sine, which need not be the worst; its period is that of the largest tide, "
     "or a quarter of the duration of a short run; the worst case found is reported with the guarantee",
 )
@@ -431,7 +430,7 @@ def table_html(comparison: "Compared") -> str:
 
 
 def page_html(comparison: "Compared", figures: Mapping[str, Markup], made: Reproduction) -> str:
-    """Whole report as HTML, including its figures, SVG elements by name."""
+    """Whole report as HTML; `figures` are its SVG elements by name."""
     every, first = accounts(comparison), summary(comparison)
     page: str = (
         _environment()
@@ -514,7 +513,7 @@ def _loop_stages(comparison: "Compared") -> str:
 
 
 def _tables(comparison: "Compared") -> Json:
-    """Columns and rows of both tables."""
+    """Columns and rows of the summary and of the table of metrics."""
     first = (SUMMARY_COLUMNS, summary_cells(summary(comparison).rows))
     return {"summary": first, "numbers": (COLUMNS, rows(comparison))}
 
@@ -539,5 +538,5 @@ def _environment() -> Any:
 
 
 def _shown(value: Any) -> Any:
-    """User text, escaped; the page's own markup is unchanged."""
+    """Text with its invisible characters made visible; markup of the page and other values are unchanged."""
     return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value

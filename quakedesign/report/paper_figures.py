@@ -1,7 +1,7 @@
 """Figures of the paper that show simulations, redrawn for any fault.
 
-Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV.
-The laboratory fault is simulated here; its figures in the paper show experiments.
+Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV. The paper's
+figures of the laboratory fault show experiments; here this fault is simulated like any other.
 """
 
 from collections.abc import Callable
@@ -36,12 +36,6 @@ if TYPE_CHECKING:
     from quakedesign.studies.comparison import Compared, Entry
 
 
-# ----------------------------------------------------------------------
-# Figures of the paper that show simulations, redrawn for any fault with published and designed gains.
-#
-# Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Control, sections II-D and IV. Its figures
-# of the laboratory show experiments; here the laboratory fault is simulated like any other.
-
 PAPER = {
     "friction-law": "figure 4",
     "earthquakes": "figure 3",
@@ -51,14 +45,14 @@ PAPER = {
     "friction-coefficient": "figure 11",
     "errors-and-power": "figures 8 and 12",
 }
-"""Corresponding figures of the paper, by name of our figure."""
+"""Corresponding figures of the paper, by name of the figure here."""
 
 
 def paper_figures(study: "PaperRuns") -> "dict[str, Figure]":
     """Figures of a study by name: those of a comparison, and the paper's (`PAPER`).
 
-    Closed-loop figures need a run, the bars a run of an e-LQR. For friction with a state there are no figures of
-    friction law and earthquakes.
+    Closed-loop figures need a run, ``errors-and-power`` a run of an e-LQR. For friction with a state there are no
+    figures of friction law and earthquakes.
     """
     comparison = study.comparison
     if study.induced is None:
@@ -93,9 +87,7 @@ def peak_against_tracking(study: "PaperRuns") -> "Figure":
         axis.set(xlabel=f"guaranteed slip-rate error [{unit}]", ylim=(0, 1.15 * max(seen) / divisor))
         axis.set_ylabel(f"simulated {'slip' if base == 'm' else 'slip-rate'} error [{name}]")
         axis.margins(x=0.12)
-    note = (
-        "plant without stick; peak: smallest guaranteed slip-rate error; numbers: allowed multiple of it for tracking"
-    )
+    note = "plant without stick; peak: smallest guaranteed slip-rate error; numbers: allowed multiple of this error"
     title = f"{study.comparison.fault.name}: peak against tracking of the e-LQR"
     return finish(drawing, title, [point.run for point in study.front], note)
 
@@ -177,7 +169,7 @@ def errors_and_power(comparison: "Compared") -> "Figure":
 
 
 def _bars(axis: "Axes", shown: "list[tuple[Entry, dict[str, Any]]]", name: str, title: str) -> None:
-    """Draw one panel; on a logarithmic axis bars start at 1, so that better and worse values have different sides."""
+    """Draw one panel; on a logarithmic axis bars begin at 1, so that better and worse values are on opposite sides."""
     values = [entry_ratios[name] for _, entry_ratios in shown]
     logarithmic = name != "rms_pressure" and min(values) > 0
     start = 1.0 if logarithmic else 0.0
@@ -234,5 +226,5 @@ class PaperStudy(PaperRuns):
 
 
 def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None] | None = None) -> PaperStudy:
-    """Simulate the additional short runs for the figures of the paper; see `paper_runs`."""
+    """Simulate the additional runs for the figures of the paper; see `paper_runs`."""
     return PaperStudy(**vars(paper_runs(comparison, progress=progress)))

@@ -36,9 +36,9 @@ COLUMNS = (
     "on tra- jectory",
 )
 FOOTNOTE = (
-    "On trajectory: largest |Δh/Δt| divided by the bound of the certificate (λ·L̄); a dash: no certificate here. "
-    "Certificates are about continuous time: none covers the errors of a scheme, and the compensated one "
-    "has an estimate in place of the law's integral state."
+    "On trajectory: largest |Δh/Δt| of the perturbation h, divided by the bound of the certificate (λ·L̄); a dash: no "
+    "certificate here. Certificates are for continuous time: none covers the errors of a scheme, and the compensated "
+    "scheme has an estimate in place of the law's integral state."
 )
 
 
@@ -83,7 +83,7 @@ def _table(head: tuple[str, ...], rows: list[tuple[str, ...]], widths: tuple[int
 
 
 def row_outcome(row: SchemeRow) -> tuple[str, ...]:
-    """Cells of one run under `OUTCOMES`; a dash means diverged or, for the share, no natural earthquake."""
+    """Cells of one run under `OUTCOMES`; a dash: diverged or, for the share, no natural earthquake."""
     extremes, outcome = pressure_extremes(row.run), row.run.outcome
     peak = "–" if outcome.peak_slip_rate is None else f"{outcome.peak_slip_rate:.2e}"
     share = "–" if outcome.share_of_natural is None else f"{100 * outcome.share_of_natural:.3g} %"
@@ -112,7 +112,7 @@ def study_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 
 def order_rows(study: Study) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Heading and rows of the orders as strings: one row per scheme, with orders and the errors at the longest T_s."""
+    """Heading and rows of convergence orders as strings: one row per scheme, and its errors at the longest T_s."""
     exponents = study.orders()
     names = list(next(iter(study.errors.values())))
     head = ("scheme", *(f"order of {QUANTITIES[n][0].removeprefix('max ')}" for n in names), *map(_quantity, names))

@@ -1,7 +1,7 @@
 """Sentences of reports: scope of a proof, outcome of a run, margins and limits.
 
-Chapters: loop and task that a proof covers; headline of a run; e-LQR margins and sampling; comparison;
-runs with friction state.
+Chapters: loop and task that a proof covers; headline of a run; e-LQR margins and sampling; comparison; runs of faults
+whose friction has a state.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -33,22 +33,22 @@ if TYPE_CHECKING:
 
 
 # ----------------------------------------------------------------------
-# Scope of a proof: the simulated loop and its task, or the premises that fail, and by how much.
+# Scope of a proof: the simulated loop and its task, or the premises that fail, with their ratios.
 
 BOUNDED_BY_PEAKS = frozenset({"constant_reference", "vanishing_disturbance"})
 """Premises of the stability of a linear law that its certified peaks do not require."""
 
 
 def grade(entry: "Entry") -> str:
-    """Verdict on one controller, and the parts of its loop and task that the proof does not cover."""
+    """Verdict on one controller, and those parts of its loop and task that the proof does not cover."""
     if entry.proof is not None:
         other = f"{entry.design.other_step_first}; " if entry.design.other_step else ""
         return f"{other}{_guaranteed(entry.proof)}{_unmet(entry)}"
     if entry.design.verdict is not Verdict.PROVED:
         return str(entry.design.verdict)
     missing = [_failing(p) for p in entry.design.premises if not (p.holds or _bounded(entry, p))] + _hold_gaps(entry)
-    reach = f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
-    return f"{reach}; UNSTABLE with zero-order hold over T_s" if _unstable_with_hold(entry) else reach
+    verdict = f"proved, but {'; '.join(missing)}" if missing else "proved for this loop and task"
+    return f"{verdict}; UNSTABLE with zero-order hold over T_s" if _unstable_with_hold(entry) else verdict
 
 
 def _guaranteed(proof: "FaultProof") -> str:
@@ -98,19 +98,19 @@ def _hold_gaps(entry: "Entry") -> list[str]:
         return ["with zero-order hold, stability is proved for no T_s"]
     own = used == entry.zero_order_hold.step and entry.zero_order_hold.verdict_at_step.verdict is Verdict.PROVED
     if not (used <= longest or own):
-        return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved"]
-    return ["with zero-order hold stability is proved, but no bound of the errors"]
+        return [f"T_s is {UpperBound(used / longest):.3g} times the largest proved T_s"]
+    return ["with zero-order hold stability is proved, but no error bound"]
 
 
 # ----------------------------------------------------------------------
 # First sentences about a run: outcome, pressure, and whether this pressure was sufficient.
 
 _NEGLIGIBLE = 1e-6
-"""An end of a range of pressures that is below this share of the larger end is printed as zero."""
+"""An end of a pressure range that is below this fraction of the larger end is printed as zero."""
 
 
 def run_sentences(run: Trajectory, fault: Fault) -> list[str]:
-    """Outcome of a run, the expected beginning of its event if the run is too short, and its pressure."""
+    """Outcome of a run, expected onset of its event if the run is too short, pressure, and shortfall of pressure."""
     extremes = pressure_extremes(run)
     pressure = pressure_sentence(*extremes) if extremes else None
     parts = [outcome_sentence(run), waiting_sentence(run, fault), pressure, shortfall(run, fault)]
@@ -128,7 +128,7 @@ def outcome_sentence(run: Trajectory) -> str:
 
 
 def waiting_sentence(run: Trajectory, fault: Fault) -> str | None:
-    """Expected beginning of the event, for an uncontrolled run that ends before it; None for other runs."""
+    """Expected onset of the event, for an uncontrolled run that ends before it; None for other runs."""
     event = waiting(run, fault)
     if event is None:
         return None
@@ -231,8 +231,8 @@ def margin_lines(analysis: Analysis) -> list[str]:
 
 
 def _near(vertex: Sequence[Fraction]) -> str:
-    """A corner of the box, rounded; its exact numbers are in the JSON facts."""
-    return "near β = {:.4g}, s = {:.4g} 1/s^2, w = {:.4g} 1/s".format(*map(float, vertex))
+    """A vertex of x2' = s·x1 − w·x2 + β·…, rounded; its exact numbers are in the JSON facts."""
+    return "near β = {:.4g}, slope s = {:.4g} 1/s^2, damping w = {:.4g} 1/s".format(*map(float, vertex))
 
 
 # ----------------------------------------------------------------------
@@ -250,7 +250,7 @@ def guarantee_lines(entry: "Entry") -> list[str]:
 
 
 def limit_lines(entry: "Entry") -> list[str]:
-    """The limits in `guarantee_lines`: for every controller, and for designs of this kind."""
+    """Limits that `guarantee_lines` contains: for every controller, and for designs of this kind."""
     return [] if entry.guarantee is None else [*entry.guarantee.limit_lines(), *_longest_step_and_delay(entry)]
 
 
@@ -267,7 +267,7 @@ def _longest_step_and_delay(entry: "Entry") -> list[str]:
 
 
 def brief(entry: "Entry") -> str:
-    """The guarantee, and the headline."""
+    """First lines of the guarantee, and the headline."""
     return "; ".join([*guarantee_lines(entry)[:2], headline(entry)])
 
 
@@ -391,7 +391,7 @@ def _sampled(design: Design) -> bool:
 
 
 def domain_sentence(domain: Domain) -> str:
-    """Domain where the certificate holds although the control itself changes h, and its limiting premise."""
+    """Domain where the certificate is valid although the control itself changes h, and its limiting premise."""
     which = (
         "certified domain" if domain.feedforward == "none" else f"certified domain, {domain.feedforward} feed-forward"
     )
@@ -428,8 +428,8 @@ def scheme_sentence(comparison: "Compared") -> str:
             runs.setdefault(entry.run.provenance["scheme"], []).append(f"{entry.design.title} ({entry.kind})")
     schemes = "; ".join(f"{scheme}: {', '.join(labels)}" for scheme, labels in runs.items()) or "none"
     return (
-        f"Schemes: {schemes}. Continuous evaluates the law in every Runge–Kutta stage, all others hold p over a "
-        "step, which no certificate in continuous time covers"
+        f"Schemes: {schemes}. Continuous evaluates the law in every Runge–Kutta stage; all others keep p constant over "
+        "a step, which no certificate in continuous time covers"
     )
 
 
@@ -455,7 +455,7 @@ _SAID = {
 _MOST_EVENTS = 8
 _LOCKED = 0.5  # below this ratio of slip to loading displacement a fault counts as locked
 FASTEST_PLATE = 1e-8
-"""Loading rate [m/s] that no tectonic plate exceeds: 0.3 m per year."""
+"""Loading rate [m/s] that no tectonic plate exceeds: about 0.3 m per year."""
 _LABORATORY = 10.0  # length of a fault [m] below which it counts as a laboratory sample
 
 
@@ -490,7 +490,7 @@ def state_run_lines(result: Json) -> list[str]:
 
 
 def cycle_sentences(comparison: "Compared") -> list[str]:
-    """Seismic cycle of a fault without control, and the beginning of run and proof; empty without a cycle."""
+    """Seismic cycle of a fault without control, and initial condition of run and proof; empty without a cycle."""
     run, fault = comparison.uncontrolled, comparison.fault
     return [] if run.cycle is None else [_cycle(run, run.cycle, fault), steady_start_sentence(run, fault)]
 
@@ -508,14 +508,14 @@ def _cycle(run: Trajectory, cycle: dict[str, float | None], fault: Fault) -> str
 
 
 def steady_start_sentence(run: Trajectory, fault: Fault) -> str:
-    """Beginning of run and proof of slow sliding, and the share of an earthquake's slip that their task uses up."""
+    """Initial condition of run and proof of slow sliding, and the slip of the task relative to an earthquake's."""
     task = fault.reference
     rate, slip = float(SlidingReference(task=task).first_rate), run.cycle["slip"] if run.cycle else None
     text = f"Run and proof begin in steady sliding at V = {quantity(rate, 'm/s')}; the transition from rest is not"
     share = (
         ""
         if slip is None
-        else f"; the task uses up {task.target_slip:.3g} m of the {slip:.3g} m of slip of an earthquake"
+        else f"; the task releases {task.target_slip:.3g} m of the {slip:.3g} m of slip of an earthquake"
     )
     return f"{text} covered{share}"
 
@@ -542,7 +542,7 @@ def left_out_lines(comparison: "Compared") -> list[str]:
 
 
 def proved_line(sentence: str | None, outside: list[str], exceeded: str = "") -> str:
-    """Guarantee of the law of a run, and options of the run that the proof does not cover; empty without a proof."""
+    """Guarantee of the law of a run, and settings of the run that the proof does not cover; empty without a proof."""
     if sentence is None:
         return ""
     if outside:
@@ -576,7 +576,7 @@ def sliding_run_lines(result: Json) -> list[str]:
         f"control errors grow at {result['growth_rate']:.3g} 1/s",
         f"|ln(v/r')| at most {metrics['max_log_rate']:.3g}, slip error at most {metrics['max_slip_error']:.3g} m",
         f"pressure from {least:.3g} MPa to {largest:.3g} MPa; feedback adds at most "
-        f"{metrics['max_asked'] / 1e6:.3g} MPa, of either sign, to what the reference needs",
+        f"{metrics['max_asked'] / 1e6:.3g} MPa, of either sign, to the pressure for the reference",
         proved_line((result["guarantee"] or {}).get("sentence"), result["outside"])
         or "no guarantee: all values are of this run",
     ]

@@ -1,4 +1,4 @@
-"""Summary of a comparison for terminal and report: main result in a sentence, one table, and notes."""
+"""Summary of a comparison for terminal and report: main result in a sentence, a table, and notes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -183,7 +183,7 @@ def _with_stick(guarantee: "Guarantee") -> Iterator[str]:
 
 
 def _published(verdict: str) -> str:
-    """Verdict on published gains without the names of failed conditions, which the report explains."""
+    """Verdict on published gains, without the names of failed premises, which the report explains."""
     if not verdict.startswith("proved, but "):
         return verdict
     missing = verdict.removeprefix("proved, but ").split("; ")
@@ -274,14 +274,14 @@ def _table(rows: Sequence[Row]) -> list[str]:
 
 
 def _scale(groups: Sequence[Sequence[Number]]) -> int:
-    """Power of ten of the proved bounds, or else of the simulated values under control."""
+    """Power of ten for the proved bounds or, without any, for the simulated values under control."""
     proved = [float(group[0]) for group in groups if group[0] is not None]
     seen = [float(group[2]) for group in groups[1:] if group[2] is not None]
     return power_of(max(proved, default=max(seen, default=0.0)))
 
 
 def _cells(group: Sequence[Number], power: int, unit: str) -> str:
-    """Three cells; a single number that is too wide has its own unit."""
+    """Three cells; if there is a single number and it is too wide, it has its own unit."""
     numbers = [value for value in group if value is not None]
     if len(numbers) == 1 and len(_cell(numbers[0], power)) >= _NUMBERS[-1]:
         return f"{quantity(float(numbers[0]), unit):>{sum(_NUMBERS)}}"
@@ -289,7 +289,7 @@ def _cells(group: Sequence[Number], power: int, unit: str) -> str:
 
 
 def _fitted(value: Number, power: int, width: int) -> str:
-    """Number in three digits, or fewer to leave a blank before it."""
+    """Number in three digits, or in fewer if otherwise no blank precedes it."""
     shown = (_cell(value, power, digits) for digits in (3, 2, 1))
     return next((cell for cell in shown if len(cell) < width), "–" if value is None else f"{_scaled(value, power):.0e}")
 

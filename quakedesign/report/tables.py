@@ -39,7 +39,7 @@ def rows(comparison: "Compared") -> list[tuple[str, ...]]:
     """One row per controller under `COLUMNS`, narrow enough for 80 columns; a dash means not applicable.
 
     Largest errors, RMS pressure, total variation of the pressure and fraction of time at rest are evaluated after the
-    first quarter of the run, least and largest pressure over the whole run.
+    first quarter of the run, smallest and largest pressure over the whole run.
     """
     return [(e.label, *_cells(e.run)) for e in comparison.entries]
 

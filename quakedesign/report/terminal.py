@@ -87,8 +87,7 @@ def _whole(entry: "Entry") -> list[str]:
 
 _OF_SLIDING = (
     "; pressure [Pa] per unit of the measured slip error (k1) and slip-rate error (k2: unused), and per unit of the "
-    "scaled "
-    "predictions of the law: slip error, state of friction, diffusion modes, and level of the unknown disturbance"
+    "scaled predictions of the law: slip error, friction state, diffusion modes, and level of the unknown disturbance"
 )
 
 
@@ -102,7 +101,7 @@ def _gains(entry: "Entry") -> str:
 
 
 def table(columns: Iterable[tuple[str, int | None, str]], rows: Iterable[Sequence[str]], indent: int = 0) -> Table:
-    """Table of columns with heading, width and alignment (l or r); within 80 characters no number is cut or broken."""
+    """Table from heading, width and alignment (l or r) of each column; within 80 characters no number is cut."""
     made = Table(box=None, pad_edge=False, padding=(0, 1, 0, indent))
     for heading, width, side in columns:
         made.add_column(heading, justify="left" if side == "l" else "right", width=width)
@@ -149,7 +148,7 @@ LABORATORY = (
 
 
 def printed_lines(rows: list[Json], fault: str = "") -> list[str]:
-    """Numbers printed in the paper beside computed ones, and the plant; empty if there are none for the fault."""
+    """Numbers printed in the paper and computed numbers, with the plant; empty if the paper has none for the fault."""
     if not rows:
         return ["", *LABORATORY] if fault == "lab-fault" else []
     sticks = any(row["plant"] == "stick-slip" for row in rows)
@@ -171,7 +170,7 @@ _KEYS = {"scale_factors", "title", "from", "to", "source_gains", "gains", "publi
 
 
 def scale_lines(result: Mapping[str, Any]) -> list[str]:
-    """The result of `scale_answer` as lines of text."""
+    """Result of `scale_answer` as lines of text; `ParameterError` for any other result."""
     if lacking := _KEYS - result.keys():
         raise ParameterError(f"result must be that of scale_answer. Received one without {', '.join(sorted(lacking))}.")
     factors = ", ".join(f"{SCALED[n][0]} = {_short(v)}" for n, v in result["scale_factors"].items())
@@ -192,7 +191,7 @@ def scale_lines(result: Mapping[str, Any]) -> list[str]:
 
 
 def _rounded(printed: Mapping[str, Any] | None) -> bool:
-    """Whether printed gains differ, but by no more than rounding to three digits."""
+    """Whether printed gains differ from computed ones, but by no more than rounding to three digits."""
     off = [abs(e["deviation"]) for e in (printed or {}).values() if not e["agrees"] and e["deviation"] is not None]
     return bool(off) and max(off) < _THREE_DIGITS
 
@@ -237,7 +236,7 @@ def _short(text: str) -> str:
 
 
 def export_lines(result: Json) -> list[str]:
-    """The result of `export_result` as lines of text."""
+    """Result of `export_result` as lines of text."""
     measured = ", ".join(f"{name} [{unit}]" for name, unit in result["measurement"].items())
     lines = [
         *result["remarks"],

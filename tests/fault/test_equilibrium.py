@@ -59,5 +59,5 @@ def test_every_message_of_the_tables_can_be_written():
 
 def test_of_several_that_do_not_apply_the_first_of_the_table_is_named():
     for given in ({"plant": "printed", "disturbance": 1.0}, {"disturbance": 1.0, "plant": "printed"}):
-        with pytest.raises(ParameterError, match="takes the bound of a shear stress, not a disturbance"):
+        with pytest.raises(ParameterError, match="needs the bound of a shear stress, not a disturbance"):
             PATCH.friction.require(**given)

@@ -140,7 +140,7 @@ def test_an_entry_is_declared_once_for_reading_writing_template_and_schema():
 def test_a_block_has_the_descriptions_of_a_block():
     block = fault_schema()["properties"]["block"]["items"]["properties"]
     assert block["length"]["description"].startswith("Length of the block")
-    assert "a file may omit it for a block with that of the fault" in block["effective_normal_stress"]["description"]
+    assert "default in a file: that of the fault" in block["effective_normal_stress"]["description"]
 
 
 def test_the_examples_of_a_law_decide_whether_the_template_needs_a_target_slip(tmp_path, monkeypatch):

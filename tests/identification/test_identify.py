@@ -143,7 +143,7 @@ def test_the_mass_from_which_inertia_counts_and_the_noise_of_slip_are_told():
     assert measured.remarks(at, 2e-3) == ()
     steepest = 0.17 / 2.5e-3 * np.exp(-measured.slip[0] / 2.5e-3)
     (felt,) = replace(measured, slip_noise=50e-6).remarks(at, 2e-3)
-    assert f"noise of 5e-05 m moves friction by {steepest * 50e-6:.2g}" in felt
+    assert f"noise of 5e-05 m changes friction by {steepest * 50e-6:.2g}" in felt
 
 
 def test_the_same_seed_gives_the_same_answer(weak):
@@ -207,7 +207,7 @@ def test_a_file_of_state_friction_says_which_spread_covers_a_b_and_d_c(weak, nam
     wide = replace(weak, law=law, estimates=estimates | {"critical_slip": slip})
     save_fault(wide, patch, path)
     for told in (next_command(wide, path), path.read_text()):
-        assert "too wide for a guarantee: critical_slip within 41%; about 20% is the most" in told
+        assert "too wide for a guarantee: critical_slip within 41%; at most about 20% is admissible" in told
         assert "Fit about 5 such steps together" in told
         assert "--spread 0" not in told
     low, high = slow_sliding_plant(replace(patch, friction=law), Fraction(0), Fraction("0.063")).ranges[
@@ -257,7 +257,7 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
     found = replace(weak, law=slip, rival=OtherLaw(law=patch.friction.name, squares=2.0, excess=300.0))
     assert "mu0 = 0.6 at 1 µm/s was converted to 0.63454 at 1 nm/s for the file" in task_remarks(found, patch)
     assert "the friction coefficient in steady sliding at 1 µm/s" in " ".join(identification_lines(found, verbose=True))
-    assert "aging fits worse: squares 2 times as large, AIC higher by 300" in " ".join(
+    assert "aging fits worse: 2 times the sum of squares, AIC higher by 300" in " ".join(
         " ".join(identification_lines(found, verbose=True)).split()
     )
     (said,) = law_remarks(found, patch)
@@ -268,7 +268,7 @@ def test_a_friction_at_another_rate_and_another_law_than_the_faults_are_told(wea
     assert "has regularised-rate-and-state, but the record was fitted by rate-and-state-slip" in said
     assert law_remarks(found, load_fault("lab-fault")) == []
     assert law_remarks(found, replace(patch, friction=slip)) == []
-    assert "hardly tells" in str(OtherLaw(law="x", squares=1.001, excess=3.0))
+    assert "hardly distinguishes" in str(OtherLaw(law="x", squares=1.001, excess=3.0))
 
 
 @pytest.mark.parametrize(("slip", "said"), [(4e-8, "40 nm is far shorter"), (0.02, "2 cm is far longer"), (1e-6, "")])
@@ -312,7 +312,7 @@ def test_friction_with_a_state_brings_its_sampling_time_unless_the_fault_has_one
         ("slip-rate-weakening", {}, "depends on the slip rate alone"),
         ("rate-and-state-aging", {}, "needs the motion of the load point"),
         ("exponential-slip-weakening", {"slip": None}, "needs the column slip"),
-        ("exponential-slip-weakening", {"slip": np.zeros(400)}, "slip must have grown"),
+        ("exponential-slip-weakening", {"slip": np.zeros(400)}, "slip must exceed its noise"),
         ("exponential-slip-weakening", {"friction": np.ones(400)}, "friction changes"),
         ("rate-and-state-aging", {"load_point": np.zeros(400)}, "must begin in steady sliding"),
     ],

@@ -82,8 +82,8 @@ def test_a_constant_normal_stress_stands_in_for_a_column(tmp_path):
         ([HEAD.replace("shear_stress [MPa]", "slip [mm]"), *ROWS], "exactly one column friction"),
         ([HEAD + ", friction", "0, 5, 3, 5000, 1", "1, 5, 3, 5000, 1"], "exactly one column friction"),
         ([HEAD, ROWS[1], ROWS[0]], "time must ascend"),
-        ([HEAD, ROWS[0], "1, 2, 3, 4, 5"], "line 3 must hold 4 values. Received 5"),
-        ([HEAD, ROWS[0], "1, 2, three, 4"], r"3 must hold a number in column shear_stress\. Received 'three'"),
+        ([HEAD, ROWS[0], "1, 2, 3, 4, 5"], "line 3 must have 4 values. Received 5"),
+        ([HEAD, ROWS[0], "1, 2, three, 4"], r"3 must have a number in column shear_stress\. Received 'three'"),
         ([*ROWS], r"begin with a line of headings\. Received 4 columns of numbers alone.*--columns 'time=1 \[s\]"),
         ([HEAD, ROWS[0], "100, 2, 3, -1"], "normal_stress must be positive"),
         ([HEAD, *["0, 0, 0, 0"] * 5], "at most 4 samples. Received 5"),
@@ -161,7 +161,7 @@ def test_a_column_of_weights_counts_samples_and_leaves_out_those_of_weight_0(tmp
     record = read_record(path)
     assert record.time.tolist() == [0, 1, 3]
     assert record.counts.tolist() == [1, 0.5, 1.5]
-    assert "1 samples of weight 0 left out" in record.remarks
+    assert "1 samples of weight 0 excluded" in record.remarks
     for rows, ends in (([*lines[:3], "2, 2, 0.6, -1"], "-1 to 2"), ([*lines[:2], "1, 1, 0.6, 0"], "0 to 2")):
         path.write_text("\n".join(rows))
         with pytest.raises(RecordError, match=rf"weight must be positive, or 0 for excluded samples. Received {ends}"):

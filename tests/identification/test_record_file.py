@@ -198,7 +198,7 @@ def test_rows_without_a_number_and_times_that_repeat_are_counted_once(tmp_path):
     path.write_text("\n".join([*text[:2], *rows[:2], *text[2:4], rows[2], rows[3], text[4]]))
     record = read_record(path)
     assert record.remarks == (
-        "3 of 8 rows left out, as a number is missing",
+        "3 of 8 rows excluded, because a number is missing",
         "1 samples at the time of another: replaced by the mean at this time",
     )
     np.testing.assert_allclose(record.time, [0, 0.1, 0.2, 0.4])

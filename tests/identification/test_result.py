@@ -115,8 +115,8 @@ def test_residuals_of_more_than_twice_the_noise_are_not_explained():
 
 
 def test_an_aic_higher_by_more_than_ten_tells_laws_apart():
-    assert "hardly tells" in str(OtherLaw(law="x", squares=1.5, excess=10.0))
-    assert "hardly tells" not in str(OtherLaw(law="x", squares=1.5, excess=math.nextafter(10.0, 11)))
+    assert "hardly distinguishes" in str(OtherLaw(law="x", squares=1.5, excess=10.0))
+    assert "hardly distinguishes" not in str(OtherLaw(law="x", squares=1.5, excess=math.nextafter(10.0, 11)))
 
 
 def test_a_set_on_the_edge_of_the_region_is_allowed_and_one_beyond_is_not(monkeypatch):

@@ -231,11 +231,11 @@ def test_windows_of_a_file_are_steps(tmp_path):
     assert [len(record.time) for record in read_steps(path, "0 s to 9 s, 9 s to 20 s")] == [10, 11]
     with pytest.raises(RecordError, match=r"must not overlap. Received 3 samples of 7 s to 30 s twice"):
         read_steps(path, "0 s to 9 s, 7 s to 30 s")
-    with pytest.raises(RecordError, match=r"one unit in all steps. Received 1/m, Pa/m. Give stresses alone"):
+    with pytest.raises(RecordError, match=r"one unit in all steps. Received 1/m, Pa/m. Use stresses in every step"):
         identify_steps([replace(first, normal_unit="Pa"), second])
     with pytest.raises(RecordError, match=r"must name windows as 0 s to 60 s, 60 s to 120 s. Received '0 s-9 s'"):
         read_steps(path, "0 s-9 s")
-    with pytest.raises(RecordError, match=r"--from and --to are for one window. Received them beside --steps"):
+    with pytest.raises(RecordError, match=r"--from and --to are for one window. Received them with --steps"):
         read_steps(path, "0 s to 9 s", begin="1 s")
     with pytest.raises(RecordError, match=r"a common fit must have at least 2 records. Received 1. Use identify"):
         identify_steps([first])

@@ -188,7 +188,7 @@ def test_a_beginning_that_moves_more_than_the_step_and_does_not_fade_hides_the_s
     said = unsteady_beginning(between(value, value), values, loading)
     assert bool(said) == hidden
     assert not hidden or said.endswith(
-        f"of {before / 1e-5:.2g} critical slips, is off steady sliding by 0.01 of friction"
+        f"of {before / 1e-5:.2g} critical slips, deviates from steady sliding by 0.01 in friction"
     )
     assert not unsteady_beginning(None, values, loading)
 
@@ -224,7 +224,7 @@ class Stubbed(_Choice):
 
     squares = None
 
-    def _among(self, _fitted, nuisance):
+    def _refitted(self, _fitted, nuisance):
         name = next(iter(nuisance - {START_STATE}), "")
         return _Fitted(kind=None, setup=name, best=best(self.squares[name], name)), self.squares[name]
 

@@ -241,3 +241,10 @@ def test_controllers_of_which_everything_is_the_same_share_a_card():
     ]
     labels = ["A, B (designed)", "C (designed)", "D (published)", "E (published)"]
     assert [card.label for card in page._shared_accounts(made)] == labels
+
+
+def test_numbers_of_a_sliding_mode_have_their_units():
+    gains = {"scale": F(2), "authority": F(3), "slip_weight": F(1, 2), "rest_slip": F(1, 10**6)}
+    rows = page._gains(SimpleNamespace(design=SimpleNamespace(controller=None, gains=gains)))
+    assert [(name, text) for name, text, _ in rows] == list(zip(gains, ("2", "3", "0.5", "1e-06"), strict=True))
+    assert [unit for *_, unit in rows] == [unit_html(unit) for unit in ("", "m^2/kg", "", "m")]

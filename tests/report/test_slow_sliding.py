@@ -121,7 +121,7 @@ def test_the_terminal_says_first_what_came_of_it(comparison):
     print_comparison(comparison, terminal(file=told, width=200))
     gains = next(line for line in told.getvalue().splitlines() if "gains: " in line)
     assert re.search(r"k1 = \S+ Pa/m, k2 = 0 Pa s/m, slip = \S+ Pa, ", gains)
-    assert "slip error, state of friction, diffusion modes" in " ".join(told.getvalue().split())
+    assert "slip error, friction state, diffusion modes" in " ".join(told.getvalue().split())
 
 
 def test_a_cycle_that_is_not_known_has_no_overview(comparison):
@@ -372,6 +372,6 @@ def test_the_slip_that_a_task_takes_stands_beside_that_of_an_earthquake(comparis
     run = comparison.uncontrolled
     whole = SimpleNamespace(cycle={"slip": 0.649})
     said = steady_start_sentence(whole, SHORT)
-    assert said.endswith("; the task uses up 0.3 m of the 0.649 m of slip of an earthquake")
+    assert said.endswith("; the task releases 0.3 m of the 0.649 m of slip of an earthquake")
     for other in (run, SimpleNamespace(cycle=None)):
         assert steady_start_sentence(other, SHORT).endswith("the transition from rest is not covered")

@@ -295,7 +295,7 @@ def test_friction_that_is_extrapolated_to_the_rate_of_the_task_is_said(monkeypat
     assert not any("extrapolated" in note for note in summary(one).notes)
     one.fault.friction = replace(patch.friction, fastest_rate=1e-7)
     (said,) = (note for note in summary(one).notes if "extrapolated" in note)
-    assert said.startswith("V = 1e-06 m/s is above the rates for which friction is known, 1e-20 to 1e-07")
+    assert said.startswith("V = 1e-06 m/s is above the rates of the working range, 1e-20 to 1e-07")
 
 
 def test_two_sliding_modes_with_deadbeat_steps_and_the_same_bounds_say_why(monkeypatch):

@@ -21,6 +21,7 @@ def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) 
 
     Parameters
     ----------
+    name : str
     in_file : bool
         Whether the name comes from a file, which may name only laws of the package unless code is allowed.
     allow_code : bool
@@ -29,6 +30,6 @@ def friction_law(name: str, *, in_file: bool = False, allow_code: bool = False) 
     Raises
     ------
     UnknownNameError
-        For an unknown name.
+        For an unknown name, or a user-defined law in a file without `allow_code`.
     """
     return named(name, friction_laws(), FrictionLaw, "friction law", in_file=in_file, code=allow_code)

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 
 class FrictionLaw(ABC):
-    """One friction coefficient μ(slip, slip rate, state …), written once with the parameters as attributes.
+    """A friction law μ(slip, slip rate, state …), written once, whose parameters are its attributes.
 
     A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (for pint), ``symbol``
     (LaTeX) and ``example`` (for templates); a field without a symbol is an option, not a quantity. The same methods
     serve numbers, exact rationals and symbols: `exact` and `symbolic` return copies of the law with such parameters.
 
-    A law without state defines `coefficient`, `extended`, `bounds`, `slip_slope` and `rate_slope`. A law with
-    state also names its variables in `state_names` (with `state_units`), and defines `state_rates`,
-    `steady_state`, `operating_rate` and `working_rates`.
+    A law without state defines `name`, `source`, `domain`, `coefficient`, `extended`, `bounds`, `slip_slope` and
+    `rate_slope`. A law with state also names its variables in `state_names` (with `state_units`), and defines
+    `state_rates`, `steady_state`, `operating_rate` and `working_rates`.
     """
 
     name: ClassVar[str]
@@ -74,18 +74,18 @@ class FrictionLaw(ABC):
 
     @property
     def working_rates(self) -> tuple[float, float]:
-        """Slip rates [m/s] between which the bounds hold for `coefficient` itself; all rates by default."""
+        """Slip rates [m/s] between which, if not negative, the bounds hold for `coefficient`; by default no limits."""
         return -math.inf, math.inf
 
     @property
     @abstractmethod
     def bounds(self) -> tuple[float, float]:
-        """Smallest and largest friction coefficient [-], eq. mug."""
+        """Smallest and largest friction coefficient [-], eq. mug of the paper."""
 
     @property
     @abstractmethod
     def slip_slope(self) -> float:
-        """Largest chord slope |Δμ/Δslip| [1/m]; with state, along a motion with evolving state."""
+        """Largest chord slope |Δμ/Δslip| [1/m]; with state, along a motion in which the state evolves."""
 
     @property
     @abstractmethod
@@ -93,7 +93,7 @@ class FrictionLaw(ABC):
         """Largest chord slope |Δμ/Δrate| [s/m] at a fixed state."""
 
     def require(self, **given: object) -> None:
-        """Reject arguments other than None that do not apply to the equilibrium of this law."""
+        """Raise `ParameterError` for arguments, other than None, that do not apply to the equilibrium of this law."""
         for name, message in self.equilibrium.messages.items():
             if (value := given.get(name)) is not None:
                 raise ParameterError(message.format(value=value, law=self.name, states=", ".join(self.state_names)))
@@ -120,11 +120,11 @@ class FrictionLaw(ABC):
         return {name: sp.Symbol(f.metadata["symbol"], positive=True) for name, f in self.quantities().items()}
 
     def symbolic(self) -> Self:
-        """Return the law with symbols for quantities; only for building expressions."""
+        """Law with symbols as quantities; only for building expressions."""
         return self._with_values(self._options() | self.symbols())
 
     def exact(self) -> Self:
-        """Return the law with SymPy rationals for quantities; only for building expressions."""
+        """Law with SymPy rationals as quantities; only for building expressions."""
         import sympy as sp
 
         exact = {name: sp.Rational(str(rational(getattr(self, name), name))) for name in self.quantities()}

@@ -1,8 +1,7 @@
 """Rate-and-state friction: ageing law, slip law, and the regularised form.
 
-The base class holds the parameters a, b and d_c, the range of validity and bounds of friction on it. The
-state evolves by Dieterich's ageing law or Ruina's slip law; the regularised form is finite at zero slip
-rate.
+The base class has the parameters, the working range, and the bounds of friction on this range. The state evolves by
+Dieterich's ageing law or Ruina's slip law; the regularised form is finite at zero slip rate.
 """
 
 from abc import abstractmethod
@@ -18,12 +17,8 @@ from quakedesign.fault.model import require_all, require_nonnegative, require_po
 if TYPE_CHECKING:
     import sympy as sp
 
-
-# ----------------------------------------------------------------------
-# Common base of the rate-and-state laws: parameters, working range, and bounds on it.
-
-_DIGITS = 40
-_ROUNDING = Fraction(1, 10**30)
+_DIGITS = 40  # of irrational bounds before rounding
+_ROUNDING = Fraction(1, 10**30)  # relative margin that covers the rounding to `_DIGITS`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +151,7 @@ class RateAndState(FrictionLaw):
 
     @property
     def slip_slope(self) -> float:
-        """Bound [1/m] on the change of friction per slip by the state, |∂μ/∂θ · θ'|/v ≤ (b/θ)|θ'|/v, rounded up."""
+        """Bound [1/m] on the change of friction per slip due to the state, |∂μ/∂θ · θ'|/v ≤ (b/θ)|θ'|/v, rounded up."""
         law = self.exact()
         return outward(law.evolution_effect / law.critical_slip * law._state_slope, up=True)
 
@@ -168,7 +163,7 @@ class RateAndState(FrictionLaw):
 
 
 def outward(value: "sp.Expr", *, up: bool) -> float:
-    """Float not below (`up`) or not above an exact SymPy number."""
+    """Float not below (with `up`) or not above an exact SymPy number."""
     import sympy as sp
 
     if value.is_Rational:

@@ -1,7 +1,4 @@
-"""Friction laws that weaken from a static to a residual coefficient.
-
-Exponential slip weakening, linear slip weakening and slip-rate weakening, with their common base class.
-"""
+"""Friction laws that weaken from a static to a kinetic coefficient with slip or slip rate."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
@@ -11,10 +8,6 @@ from quakedesign.fault.model import require_all, require_nonnegative, require_po
 
 if TYPE_CHECKING:
     import sympy as sp
-
-
-# ----------------------------------------------------------------------
-# Common base of friction laws that fall from a static to a residual coefficient.
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,8 +89,7 @@ class SlipWeakening(Weakening):
 class ExponentialSlipWeakening(SlipWeakening):
     """μ(slip) = residual + drop · exp(−slip/critical_slip), eq. mu of the paper, whose Δμ is −drop.
 
-    The law meets the bounds of eq. mug only for slip ≥ 0; `extended` holds μ at its static value for
-    slip < 0 (ERRATA 12).
+    The law meets the bounds of eq. mug only for slip ≥ 0; `extended` is μ(0) for slip < 0 (ERRATA 12).
     """
 
     name: ClassVar[str] = "exponential-slip-weakening"
@@ -115,8 +107,7 @@ class ExponentialSlipWeakening(SlipWeakening):
 class LinearSlipWeakening(SlipWeakening):
     """μ(slip) = residual + drop · max(0, 1 − slip/critical_slip).
 
-    Friction has a kink at the critical slip. It would grow without bound for slip < 0, where `extended` keeps it at its
-    static value.
+    Friction has a kink at the critical slip. For slip < 0 the formula grows without bound; `extended` is μ(0) there.
 
     Attributes
     ----------
