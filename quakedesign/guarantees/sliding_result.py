@@ -13,7 +13,7 @@ from quakedesign.exact import LowerBound, UpperBound, rational, shortly
 from quakedesign.fault import Fault
 from quakedesign.fault.fault_toml import SAMPLES_PER_STATE_TIME
 from quakedesign.files import Json
-from quakedesign.guarantees.exact.limit_theorems import SlidingPush, longest_diffusion
+from quakedesign.guarantees.exact.limit_theorems import DisturbedSliding, longest_diffusion
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.sampled_loop import PLAIN, ExactSetup, SampledLoop
 from quakedesign.guarantees.exact.sliding_proof import SlidingProof
@@ -167,7 +167,7 @@ def guarantee_sliding(
 def _beyond(fault: Fault, stress: Fraction, setup: ExactSetup) -> str:
     """Reason why the diffusion path is infeasible under a stress [Pa]; empty if not proved."""
     most = rational(fault.effective_normal_stress)
-    limit = SlidingPush(model=sliding_model(fault), amplitude=stress)
+    limit = DisturbedSliding(model=sliding_model(fault), amplitude=stress)
     far = longest_diffusion(limit, most, Fraction(0))
     if far is None or setup.diffusion <= far:
         return ""

@@ -6,8 +6,8 @@ from .actuators.lag_and_diffusion import Lag as Lag
 from .actuators.pump_limits import Quantisation as Quantisation
 from .actuators.pump_limits import RateLimit as RateLimit
 from .actuators.pump_limits import Saturation as Saturation
-from .diffusion_layer import Layer as Layer
-from .diffusion_layer import with_response_area as with_response_area
+from .diffusion_path import DiffusionPath as DiffusionPath
+from .diffusion_path import with_response_area as with_response_area
 from .error_loop import SHORTEST as SHORTEST
 from .error_loop import ContinuousLaw as ContinuousLaw
 from .error_loop import SlidingModel as SlidingModel

@@ -36,7 +36,7 @@ _SHORT = Fraction(1, 10**20)  # δ
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
-class Layer:
+class DiffusionPath:
     """Diffusion path between well and fault.
 
     Attributes
@@ -77,7 +77,7 @@ class Layer:
 
 
 # ----------------------------------------------------------------------
-# Effect of the fast modes of a layer on the slip rate at each pressure step: a known jump, and a remainder.
+# Effect of the fast modes of a diffusion path on the slip rate at each pressure step: a known jump, and a remainder.
 #
 # **Statement.** Let R be the error of truncating the series after the modes n < N (previous section), E that of a unit
 # step, and A = τ/2 − Σ_{n<N} ĉ_n/λ̂_n. Then ∫E = −A exactly. With F(t) = −∫_t^∞ E, Y = Σ_k Δu_k·F(t − t_k) over the
@@ -97,8 +97,8 @@ class Layer:
 #   A·bu′ is subtracted from v, and |Y| ≤ max|u′|·(|ĉ_N|/λ̂_N² + 6Nδτ²). ∎
 
 
-def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> PeriodicLoop:
-    """A loop of `sampled_error_loop` through a layer, with x2 in place of e2, and Y in place of β0·R.
+def with_response_area(loop: PeriodicLoop, gain: Fraction, path: DiffusionPath) -> PeriodicLoop:
+    """A loop of `sampled_error_loop` through a diffusion path, with x2 in place of e2, and Y in place of β0·R.
 
     The input ``awaited`` [m/s²] is bY divided by a time, the bound of |bY| over that of |bR|. So it has the same bound
     as bR: the output ``left_out``, with zero-order hold at the well times its decaying weight. The sampled input
@@ -109,23 +109,23 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
     loop : PeriodicLoop
     gain : Fraction
         β0 [-].
-    layer : Layer
+    path : DiffusionPath
         Diffusion path between well and fault.
     """
     size, slip_rate = len(loop.states), loop.states.index("e2")
     *others, last = loop.segments
     if loop.fading:
-        share, fading = _share_and_fading(loop, layer)
+        share, fading = _share_and_fading(loop, path)
         step = last.jump[loop.states.index("stepped")]
         kicked = [list(row) for row in last.jump]
-        kicked[slip_rate] = [v - gain * layer.area * d for v, d in zip(kicked[slip_rate], step, strict=True)]
+        kicked[slip_rate] = [v - gain * path.area * d for v, d in zip(kicked[slip_rate], step, strict=True)]
         last = replace(last, jump=tuple(map(tuple, kicked)))
         late = fading.weight(last.duration)  # at the sample, which comes before the next step
     else:
-        share, fading, late = layer.response_integral / layer.truncation_integral, None, Fraction(1)
+        share, fading, late = path.response_integral / path.truncation_integral, None, Fraction(1)
         behind = loop.states.index("behind")
         flow = [list(row) for row in loop.flow]
-        flow[slip_rate][behind] -= gain * layer.area * flow[behind][behind]
+        flow[slip_rate][behind] -= gain * path.area * flow[behind][behind]
         loop = replace(loop, flow=tuple(map(tuple, flow)))
     segments = (*others, last)
     measured = tuple(row[slip_rate] - (i == slip_rate) for i, row in enumerate(segments[0].jump))
@@ -141,10 +141,10 @@ def with_response_area(loop: PeriodicLoop, gain: Fraction, layer: Layer) -> Peri
     )
 
 
-def _share_and_fading(loop: PeriodicLoop, layer: Layer) -> tuple[Fraction, Fading]:
+def _share_and_fading(loop: PeriodicLoop, path: DiffusionPath) -> tuple[Fraction, Fading]:
     """Bound of |bY| divided by that of |bR| [s], and the decay of |bY|."""
     (own,) = loop.fading.values()
-    height, rate, floor = layer.truncation_bound(loop.period)
-    awaited = height / rate, floor * layer.time
+    height, rate, floor = path.truncation_bound(loop.period)
+    awaited = height / rate, floor * path.time
     most = sum(awaited)
     return most / (height + floor), replace(own, height=awaited[0] / most, floor=awaited[1] / most)

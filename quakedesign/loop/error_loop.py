@@ -21,7 +21,7 @@ from quakedesign.laws.sampled_law import (
     require_sizes,
     steady_states,
 )
-from quakedesign.loop.diffusion_layer import MODES, Layer
+from quakedesign.loop.diffusion_path import MODES, DiffusionPath
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
 from quakedesign.loop.signals import Interconnection, Signal
 
@@ -188,7 +188,7 @@ def _connected(
     `rates` and `signals` are those of the plant. `of_left_out` is the input column of the truncation error of the
     diffusion modes. The ``drift`` is added to the inputs.
     """
-    step, lag, layer, part = times.step, times.lag, Layer(time=times.diffusion), times.delay % times.step
+    step, lag, path, part = times.step, times.lag, DiffusionPath(time=times.diffusion), times.delay % times.step
     # the law
     own, measured = tuple(f"law {i}" for i in range(len(law.states))), ("slip", "slip_rate", "implicit")
     rows = zip((*law.measured, law.feedback), (*law.update, law.output), strict=True)
@@ -210,7 +210,7 @@ def _connected(
             "asked": {name: authority * v for name, v in output.items()},
             "push": {"valve": _ONE}
             | ({"behind": _ONE} if lag else {})
-            | {name: layer.share(n) for name, n in modes.items()},
+            | {name: path.share(n) for name, n in modes.items()},
             **signals,
         },
     )
@@ -220,7 +220,7 @@ def _connected(
     arrival |= {name: {name: _ONE, newest: -_ONE, "valve": _ONE} for name in well or modes}
     events = [(sample, part), (arrival, step - part)] if part else [(sample | arrival, step)]
     flow = {**rates, "behind": {name: -v for name, v in well.items()}}
-    flow |= {name: {name: -layer.rate(n), **well} for name, n in modes.items()}
+    flow |= {name: {name: -path.rate(n), **well} for name, n in modes.items()}
     # states are relative to those at which the law commands p*, at the reference
     change = tuple(tuple(v - (i == j) for j, v in enumerate(row)) for i, row in enumerate(law.update))
     steady = steady_states(change, law.output, (Fraction(0),) * len(own), _ONE)
@@ -233,9 +233,9 @@ def _connected(
     sampled = (*["root"] * (law.implicit_step is not None), *["reference_rate"] * bool(law.of_reference))
     left_out, fading = dict[str, Signal](), dict[str, Fading]()
     if modes and lag:
-        left_out["left_out"] = {"behind": layer.truncation_integral / lag}
+        left_out["left_out"] = {"behind": path.truncation_integral / lag}
     elif modes:
-        height, rate, floor = layer.truncation_bound(step)
+        height, rate, floor = path.truncation_bound(step)
         most, entry = height + floor, system.column(of_left_out)
         left_out["left_out"] = {"stepped": most}
         fading["left_out"] = Fading(

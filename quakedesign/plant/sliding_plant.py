@@ -160,10 +160,10 @@ class SlidingPlant:
         along = max(abs(self.stiffness * self.rate / mu - self.ramp) for mu in self.ranges["coefficient"])
         return along * (1 + self.swing)
 
-    def normal_stress(self, push: Fraction) -> Range:
-        """Range of N = σ′ − p [Pa] along the reference, for |p − p*| ≤ `push` [Pa]."""
+    def normal_stress(self, pressure: Fraction) -> Range:
+        """Range of N = σ′ − p [Pa] along the reference, for |p − p*| ≤ `pressure` [Pa]."""
         low, high = self.ranges["normal_stress"]
-        return low - self.pressure_per_slip * self.distance - push, high + push
+        return low - self.pressure_per_slip * self.distance - pressure, high + pressure
 
 
 def _in_words(value: Fraction | str | bool) -> str:

@@ -311,7 +311,7 @@ def to_statespace(
         A, B, np.eye(2, 2 + n), np.zeros((2, B.shape[1])), name=fault.name, inputs=["p", *disturbances], outputs=seen,
         states=states,
     )  # fmt: skip
-    return plant if setup.step is None else _held(plant, setup.step, setup.delay)
+    return plant if setup.step is None else _discretised(plant, setup.step, setup.delay)
 
 
 _ENDS = ("low", "middle", "high")
@@ -372,7 +372,7 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     plant, before = to_statespace(fault, at), _linear(_flow_system(flowing), ("p",))
     plant = plant * before if before.nstates else plant  # an actuator without states has gain 1
     if controller.sampling is not None:
-        plant = _held(plant, controller.sampling.step, late)
+        plant = _discretised(plant, controller.sampling.step, late)
     return control.ss(-law * plant, name=f"{controller.name} around {fault.name}", inputs=["p"], outputs=["commanded"])
 
 
@@ -530,7 +530,7 @@ def _flow_system(actuator: Actuator) -> Any:
     )
 
 
-def _held(plant: Any, step: Fraction, delay: Fraction) -> Any:
+def _discretised(plant: Any, step: Fraction, delay: Fraction) -> Any:
     """A plant sampled every step [s], with a zero-order hold of the pressure over a step after a delay [s].
 
     Exact: with a delay of m + f steps the pressure of m + 1 samples ago acts for f steps, then that of m samples ago.

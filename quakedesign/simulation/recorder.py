@@ -332,8 +332,8 @@ def metrics(
     kind = ActuatorMetrics if signals else Metrics
     if watched["diverged"] >= 0:
         peak = watched["peak_slip_rate"]  # meaningful if ξ, p or h diverged, but slip and slip rate did not
-        known = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
-        return kind(**known, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
+        finite_peak = {"peak_slip_rate": peak} if peak <= _FASTEST else {}
+        return kind(**finite_peak, settled_from=settled_from, steps=round(watched["diverged"] / step), seconds=seconds)
     figures = {"peak_slip_rate": watched["peak_slip_rate"]}
     if controlled:
         extremes = [f"{side}_{signal}" for signal in ("pressure", *signals) for side in ("max", "min")]

@@ -157,7 +157,7 @@ class StateTrajectory(Trajectory):
 
     def signals(self) -> dict[str, tuple["np.ndarray", str, str]]:
         """Values, long name and SI unit of every signal, by name."""
-        found = super().signals()
+        signals = super().signals()
         for name, values, unit in zip(self.state_names, self.states, self.state_units, strict=True):
-            found[name] = (values, f"state of friction {name}", unit)
-        return found
+            signals[name] = (values, f"state of friction {name}", unit)
+        return signals

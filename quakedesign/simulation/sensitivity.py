@@ -76,8 +76,8 @@ class Study:
         None if a run diverged or an error is zero.
         """
         return {
-            scheme: {name: _slope(self.levels, values) for name, values in found.items()}
-            for scheme, found in self.errors.items()
+            scheme: {name: _slope(self.levels, values) for name, values in errors.items()}
+            for scheme, errors in self.errors.items()
         }
 
     def to_dict(self) -> Json:

@@ -115,8 +115,8 @@ def simulate_sliding(
     require_known(method, adaptive_integrators(), "method")
     began, length = perf_counter(), fault.reference.operation_time if duration is None else duration
     require_positive(duration=length, step=float(step))
-    kept = 1 if samples is None else samples
-    setting = RunSetting.of(fault, float(step), max(length, float(step)), kept, settled_from)
+    count = 1 if samples is None else samples
+    setting = RunSetting.of(fault, float(step), max(length, float(step)), count, settled_from)
     path = PressurePath(lag=lag, diffusion=diffusion, stages=tuple(stages))
     varied = variation or SlidingVariation()
     loop = _Loop.of(fault, path, tide or Tide(), varied, inertia, pressure_per_slip)

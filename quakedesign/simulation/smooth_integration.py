@@ -346,9 +346,9 @@ def scales(loop: ClosedLoop) -> list[float]:
     """Scales of x1 [m], x2 [m/s] and ξ, from target slip and natural frequency; 1 for integrals in other units."""
     fault = loop.fault
     slip, pace = fault.reference.target_slip, fault.natural_frequency
-    known = {"m s": slip / pace, "m s^2": slip / pace**2}
+    converted = {"m s": slip / pace, "m s^2": slip / pace**2}
     units = loop.controller.integral_units if loop.controller else ()
-    return [slip, slip * pace, *(known.get(unit, 1.0) for unit in units)]
+    return [slip, slip * pace, *(converted.get(unit, 1.0) for unit in units)]
 
 
 def smooth_march(

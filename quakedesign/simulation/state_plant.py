@@ -21,7 +21,7 @@ from quakedesign.exact import rational
 from quakedesign.fault import Fault, FrictionLaw
 from quakedesign.fault.model import require_nonnegative, require_positive
 from quakedesign.laws import Sampling
-from quakedesign.loop import Actuator, Delay, Diffusion, Lag, Layer
+from quakedesign.loop import Actuator, Delay, Diffusion, DiffusionPath, Lag
 from quakedesign.loop.actuators.base import SampledStage
 from quakedesign.loop.sensing import Transducer
 from quakedesign.symbolic import plant
@@ -93,13 +93,13 @@ class SpringSlider:
     @property
     def numbers(self) -> dict[sp.Symbol, sp.Rational]:
         """Exact values of the symbols in the force balance of 1 m²; for a block without mass, the mass is set to 1."""
-        held = {
+        fixed = {
             plant.m: self.mass or 1.0,
             plant.k: self.stiffness,
             plant.eta: self.damping,
             plant.sigma: self.normal_stress,
         }
-        exact = {symbol: sp.Rational(str(rational(value))) for symbol, value in held.items()}
+        exact = {symbol: sp.Rational(str(rational(value))) for symbol, value in fixed.items()}
         return exact | {plant.A: sp.Integer(1)}
 
     @cached_property
@@ -127,8 +127,8 @@ class SpringSlider:
     def rates(self) -> ca.Function:
         """CasADi Function (y as in `names`, (loading rate [m/s], p [Pa], dp/dt [Pa/s])) → dy/dt, Jacobian."""
         y, load, values = self._variables()
-        known = values | {loading_rate: load[0], plant.p: load[1], pressure_rate: load[2]}
-        _, _, *logged = to_casadi(self.derivation, known, [y[0], y[2]])
+        inserted = values | {loading_rate: load[0], plant.p: load[1], pressure_rate: load[2]}
+        _, _, *logged = to_casadi(self.derivation, inserted, [y[0], y[2]])
         logged = [change / values[x] for change, x in zip(logged, list(values)[2:], strict=True)]
         field = ca.cse([ca.vertcat(values[rate], load[0] - values[rate], *logged)])[0]
         return ca.Function("rates", [y, load], [field, ca.jacobian(field, y)])
@@ -173,12 +173,12 @@ class SpringSlider:
         SimulationError
             If the forces do not balance at any slip rate.
         """
-        found = np.array(y)
+        balanced = np.array(y)
         change = math.log((self.normal_stress - after) / (self.normal_stress - before))
-        found[3:] += np.array(self.law.stress_exponents, dtype=float) * change
+        balanced[3:] += np.array(self.law.stress_exponents, dtype=float) * change
         if not self.mass:
-            found[2] = self._balanced(found, after)
-        return found
+            balanced[2] = self._balanced(balanced, after)
+        return balanced
 
     def _balanced(self, y: "np.ndarray", pressure: float) -> float:
         """Logarithm of the rate at which the forces balance, next to that of y in the direction of its acceleration."""
@@ -325,7 +325,7 @@ class PressurePath:
         Partial fractions of the diffusion path in series with the lag: exact but for the truncation error of 24
         modes. If the rate of the lag equals that of a mode, it is reduced by a relative 1e-9.
         """
-        path = Layer(time=self.diffusion or Fraction(1))
+        path = DiffusionPath(time=self.diffusion or Fraction(1))
         modes = [(float(path.rate(i)), float(path.share(i))) for i in range(MODES if self.diffusion else 0)]
         rates, shares = np.array(modes).reshape(-1, 2).T
         if not self.lag:
@@ -389,8 +389,8 @@ def _actuator_function(stages: Sequence[SampledStage], step: float) -> "tuple[ca
     chain, start = Actuator(stages=tuple(stages)), tuple(v for stage in stages for v in stage.start)
     numbers = [ca.SX(v) for stage in stages for v in stage.numbers]
     memory, commanded = ca.SX.sym("memory", len(start)), ca.SX.sym("commanded")
-    held, _, after = chain.hold(numbers, ca.vertsplit(memory), commanded, step)
-    return ca.Function("held", [memory, commanded], [held, ca.vertcat(*after)]), start
+    output, _, after = chain.hold(numbers, ca.vertsplit(memory), commanded, step)
+    return ca.Function("held", [memory, commanded], [output, ca.vertcat(*after)]), start
 
 
 def _remembering(element: tuple[ca.Function, tuple[float, ...]] | None) -> Callable[[float], Any]:

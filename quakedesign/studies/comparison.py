@@ -184,7 +184,7 @@ def compared(
         simulation_scheme(name)
     progress("uncontrolled", 0.0)
     if fault.friction.equilibrium is STEADY_SLIDING:
-        return _slowly_compared(fault, [designed for designed, _ in designs], progress, whole=whole_task)
+        return _compared_in_slow_sliding(fault, [designed for designed, _ in designs], progress, whole=whole_task)
     begun: list[tuple[Entry, Future[Trajectory] | None]] = []
     with in_background() as runs:
         uncontrolled = runs.submit(natural_earthquake, fault, plant=plant)
@@ -227,7 +227,7 @@ def _guarantee_of(fault: Fault, design: Design, *, given: bool) -> Guarantee | N
     return result if proof.available or design.runs else replace(result, given=True)  # only T_s of the fault was tried
 
 
-def _slowly_compared(fault: Fault, designs: Sequence[Design], progress: Tell, *, whole: bool) -> Compared:
+def _compared_in_slow_sliding(fault: Fault, designs: Sequence[Design], progress: Tell, *, whole: bool) -> Compared:
     """Comparison for friction with a state: seismic cycle, and designs with their runs."""
     natural = natural_run(fault)
     entries = []
@@ -287,8 +287,8 @@ def _linear(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
         poles = vertex_poles(sectors(design.fault), list(design.gains.values()))
         growth = amplification(poles, run.provenance["step"], run.provenance["method"])
     progress(f"{entry.label}: zero-order hold and peaks", 0.0)
-    wanted = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
-    classes = [kind for kind in wanted if kind != "rate" or not design.fault.disturbance.constant]
+    named_classes = CLASSES if entry.origin == "designed" and design.verdict is Verdict.PROVED else ()
+    classes = [kind for kind in named_classes if kind != "rate" or not design.fault.disturbance.constant]
     peaks = {kind: design.certified_peaks(kind) for kind in classes}
     proved = {kind: peak for kind, peak in peaks.items() if peak.available}
     return replace(entry, growth_per_step=growth, zero_order_hold=sampled, peaks=proved)

@@ -357,7 +357,7 @@ def fault_sentences(fault: Fault) -> list[str]:
     return [
         f"mass {fault.mass:.4g} kg, stiffness {fault.stiffness:.4g} N/m, natural frequency "
         f"{fault.natural_frequency:.4g} rad/s, damping ratio {fault.damping_ratio:.4g}",
-        *_rock(fault),
+        *_material_lines(fault),
         *_event(fault),
         *(f"assumed: {assumption}" for assumption in fault.assumed),
         f"{state}; eigenvalues {poles} 1/s{about.format(fault.friction.operating_rate)}",
@@ -426,7 +426,7 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def _rock(fault: Fault) -> list[str]:
+def _material_lines(fault: Fault) -> list[str]:
     """Shear-wave speed, which reveals a wrong unit, the stress, friction as it was read, and its box."""
     speed, law = (fault.shear_modulus / fault.density) ** 0.5, fault.friction
     usual = fault.length < IN_A_LABORATORY or SHEAR_SPEEDS[0] <= speed <= SHEAR_SPEEDS[1]

@@ -23,8 +23,8 @@ from quakedesign.guarantees import (
     longest_step,
 )
 from quakedesign.guarantees.exact.limit_theorems import (
+    DisturbedSliding,
     Noise,
-    SlidingPush,
     farthest_well,
     longest_diffusion,
     longest_reaction,
@@ -144,7 +144,7 @@ class Sensing:
         return {"slip_noise": self.slip_noise, "rate_noise": None if self._alone else self.rate_noise}
 
     @property
-    def wanted(self) -> dict[str, Any]:
+    def options(self) -> dict[str, Any]:
         """Arguments of a search for a design."""
         return {"measured": self.measured, "setup": ExactSetup.of(self.setup)}
 
@@ -259,20 +259,20 @@ class Limits:
 class SlidingLimits(Limits):
     """Limits of a fault in slow sliding along its task, for its nominal plant linearised there."""
 
-    push: SlidingPush
+    disturbed: DisturbedSliding
     guarantee: SlidingProof | None
-    rock: Fraction  # L²/D [s] of the given well; 0 without one
+    diffusion_time: Fraction  # L²/D [s] of the given well; 0 without one
 
     @property
     def beyond(self) -> bool:
         """Whether the given diffusion path is infeasible for every controller."""
         farthest = self.largest_diffusion_time.impossible_beyond
-        return farthest is not None and self.rock > farthest
+        return farthest is not None and self.diffusion_time > farthest
 
     @property
     def against(self) -> str:
         """Disturbances of the limits, in words."""
-        return f"any shear stress of at most {UpperBound(self.push.amplitude).quantity('Pa')}"
+        return f"any shear stress of at most {UpperBound(self.disturbed.amplitude).quantity('Pa')}"
 
     @property
     def achieved(self) -> list[tuple[Fraction, UpperBound]]:
@@ -291,11 +291,11 @@ class SlidingLimits(Limits):
 
     def to_dict(self) -> Json:
         """Plain values, SI; proved bounds are decimal texts, rounded outwards."""
-        return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.push.amplitude)}
+        return Limits.to_dict(self) | {"disturbance": None, "stress": float(self.disturbed.amplitude)}
 
     def smallest_peaks(self, *, measured: bool = True) -> list[tuple[Fraction, LowerBound]]:
         """T_s [s] from a tenth of the fault's upward, and lower bounds of the slip-rate error [m/s]."""
-        return [(step, self.push.smallest_rate_error(step)) for step in self._steps()]
+        return [(step, self.disturbed.smallest_rate_error(step)) for step in self._steps()]
 
 
 def above_the_reference(proof: SlidingProof) -> UpperBound:
@@ -379,12 +379,12 @@ def _limits_at_rest(
         proved["largest_step"] = LowerBound(proofs[-1].sampled_loop.step)
     if own is not None:
         proved["peak_slip_rate_error"] = own.claims.slip_rate_error
-        longest = longest_delay(task, step, **sensing.wanted)
+        longest = longest_delay(task, step, **sensing.options)
         proved["largest_delay"] = LowerBound(longest.sampled_loop.delay) if longest else None
         proved["smallest_pressure"] = UpperBound(max(-own.claims.pressures[-1][0], Fraction(0)))
-        if (farthest := longest_diffusion_time(task, step, **sensing.wanted)) is not None:
-            proved["largest_diffusion_time"] = rock = LowerBound(farthest.sampled_loop.diffusion)
-            proved["farthest_well"] = nearest_proved_well(rock, spread)
+        if (farthest := longest_diffusion_time(task, step, **sensing.options)) is not None:
+            proved["largest_diffusion_time"] = largest = LowerBound(farthest.sampled_loop.diffusion)
+            proved["farthest_well"] = nearest_proved_well(largest, spread)
     return Limits(
         fault=fault,
         withdrawal=withdrawal,
@@ -401,17 +401,17 @@ def _limits_at_rest(
 
 
 def _limits_by_name(
-    theorem: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
+    task: FaultPlant | DisturbedSliding, withdrawal: Fraction, step: Fraction, diffusivity: Fraction, peak: Bound | None
 ) -> dict[str, Bound | None]:
     """Performance limits of every controller by name; None where no limit is known."""
-    reaction, path = longest_reaction(theorem, withdrawal), longest_diffusion(theorem, withdrawal, step)
+    reaction, path = longest_reaction(task, withdrawal), longest_diffusion(task, withdrawal, step)
     return {
         "peak_slip_rate_error": peak,
         "largest_step": reaction,
         "largest_delay": None if reaction is None else UpperBound(max(reaction - step, Fraction(0))),
         "largest_diffusion_time": path,
         "farthest_well": None if path is None else farthest_well(path, diffusivity),
-        "smallest_pressure": smallest_withdrawal(theorem, step),
+        "smallest_pressure": smallest_withdrawal(task, step),
     }
 
 
@@ -478,13 +478,13 @@ def _sliding_limits(
             "limits of slow sliding need a shear stress disturbance above 0. Received none, and no design was "
             f"found that withstands any{why}. Give --stress, such as '25 kPa'."
         )
-    theorem = SlidingPush(model=model, amplitude=amplitude)
-    farthest, diffusion = longest_diffusion(theorem, withdrawal, step), (path or IDEAL).diffusion
+    task = DisturbedSliding(model=model, amplitude=amplitude)
+    farthest, diffusion = longest_diffusion(task, withdrawal, step), (path or IDEAL).diffusion
     if path is not None and (farthest is None or diffusion <= farthest):
         behind = guarantee_sliding(fault, stress=requested, spread=off, setup=ExactSetup.of(path)).proof
         proof = behind if behind.available else None
-        theorem = replace(theorem, amplitude=proof.task.stress) if proof else theorem
-    impossible = _limits_by_name(theorem, withdrawal, step, spread, theorem.smallest_rate_error(step))
+        task = replace(task, amplitude=proof.task.stress) if proof else task
+    impossible = _limits_by_name(task, withdrawal, step, spread, task.smallest_rate_error(step))
     proved: dict[str, Bound | None] = {}
     if proof is not None:
         proved["peak_slip_rate_error"] = above_the_reference(proof)
@@ -500,9 +500,9 @@ def _sliding_limits(
         **limits_by_name | {"smallest_pressure": replace(limits_by_name["smallest_pressure"], title="pressure")},
         proved=(),
         sensing=Sensing(),
-        push=theorem,
+        disturbed=task,
         guarantee=proof,
-        rock=diffusion,
+        diffusion_time=diffusion,
     )
 
 
@@ -513,12 +513,12 @@ def _proved_steps(
     task: FaultPlant, step: Fraction, sensing: Sensing
 ) -> tuple[tuple[TrackingProof, ...], TrackingProof | None]:
     """Guarantees at increasing T_s up to nearly the longest, and that at the fault's own T_s, if there is one."""
-    own: TrackingProof | NoProof | None = design_sampled_law(task, step, objective="peak", **sensing.wanted)
-    longest = longest_step(task, **sensing.wanted)
+    own: TrackingProof | NoProof | None = design_sampled_law(task, step, objective="peak", **sensing.options)
+    longest = longest_step(task, **sensing.options)
     if own is not None and own.available:
         own = _best_at(own, sensing)
     else:
-        own = design_near_longer_step(task, step, longest, **sensing.wanted)
+        own = design_near_longer_step(task, step, longest, **sensing.options)
     proofs = [] if own is None else [own]
     if longest is not None and (own is None or longest.guarantee.sampled_loop.step > step):
         proofs.append(design_at(task, longest))
@@ -527,6 +527,8 @@ def _proved_steps(
 
 def _best_at(least_peak: TrackingProof, sensing: Sensing) -> TrackingProof:
     """The better of the designs for peak and for tracking: the one with the smaller proved slip-rate error."""
-    tracking = design_sampled_law(least_peak.task, least_peak.sampled_loop.step, objective="tracking", **sensing.wanted)
+    tracking = design_sampled_law(
+        least_peak.task, least_peak.sampled_loop.step, objective="tracking", **sensing.options
+    )
     proofs = [least_peak, *([tracking] if tracking.available else [])]
     return min(proofs, key=lambda g: g.claims.slip_rate_error)

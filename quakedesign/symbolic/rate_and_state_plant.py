@@ -56,8 +56,8 @@ def sliding_acceleration(names: tuple[str, ...] = ()) -> sp.Expr:
     balance = plant.force_balance().subs(far, far_start + loading_rate * plant.t)
     steady = balance.subs({acceleration: 0, p: 0} | ahead).subs({plant.x1: 0, rate: loading_rate})
     steady = steady.replace(plant.disturbance, lambda *_: sp.Integer(0)).replace(plant.mu, lambda *_: mu_star)
-    stretched = balance.subs(far_start, sp.solve(steady, far_start)[0])
-    moving = sp.solve(stretched, acceleration)[0].subs(ahead)
+    loaded = balance.subs(far_start, sp.solve(steady, far_start)[0])
+    moving = sp.solve(loaded, acceleration)[0].subs(ahead)
     named = moving.replace(plant.mu, lambda *_: _friction(names)).replace(
         plant.disturbance, lambda _, v_, t_: plant.disturbance(plant.x1, v_, t_)
     )

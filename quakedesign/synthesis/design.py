@@ -24,7 +24,7 @@ from quakedesign.guarantees import (
     StickSlipProof,
     TrackingProof,
 )
-from quakedesign.guarantees.search.default_designs import REACH
+from quakedesign.guarantees.search.default_designs import PREMISES_OF_TIMES
 from quakedesign.guarantees.sliding_result import SlidingGuarantee
 from quakedesign.laws import Controller, control_law, control_laws
 from quakedesign.laws.feed_forward import NONE, feed_forward
@@ -111,7 +111,7 @@ class Design:
     def conditions(self) -> tuple[Premise, ...]:
         """Premises of the main proof: of the guarantee if sampled, else of the certificate."""
         sampled = self.controller is not None and self.controller.sampling is not None
-        return tuple(p for p in self.premises if p.name in REACH) if sampled else self.premises
+        return tuple(p for p in self.premises if p.name in PREMISES_OF_TIMES) if sampled else self.premises
 
     @property
     def other_step(self) -> str:

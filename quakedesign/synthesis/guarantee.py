@@ -32,7 +32,7 @@ from quakedesign.laws import Controller, control_law
 from quakedesign.loop.loop_setup import IDEAL, LoopSetup, Quantity
 from quakedesign.parallel import crew_or_here
 from quakedesign.plant import FaultPlant, UncertainPlant, uncertain_plant
-from quakedesign.synthesis.method import Wanted, method_of
+from quakedesign.synthesis.method import GuaranteeRequest, method_of
 from quakedesign.synthesis.plant_guarantees import guarantee_plant
 from quakedesign.synthesis.state_feedback import may_stick
 
@@ -274,31 +274,31 @@ def guarantee(
         )
     require_known(disturbance_class, CLASSES, "class")
     task, family = uncertain_plant(fault, rate_limited=disturbance_class == "rate"), control_law(controller)
-    wanted = Wanted(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
+    request = GuaranteeRequest(gains=_exact_texts(gains), objective=objective, scheme=scheme, setup=setup)
     not_at_rest = ""
-    usual = scheme is None and (method_of(family).takes_base_gains or not wanted.gains)
+    usual = scheme is None and (method_of(family).takes_base_gains or not request.gains)
     if plant is None and usual and may_stick(family, setup, disturbance_class):
-        mode = method_of(family).base_law(task, family, wanted.gains)
+        mode = method_of(family).base_law(task, family, request.gains)
         sticking = guarantee_stick_slip(fault, setup, objective=objective, sliding=mode, progress=progress)
         if sticking.proof.available:
             return sticking
         not_at_rest = sticking.proof.reason
-    result = _sampled(fault, task, family, wanted)
+    result = _sampled(fault, task, family, request)
     return replace(result, not_at_rest=not_at_rest) if not_at_rest else result
 
 
-def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], wanted: Wanted) -> TrackingGuarantee:
+def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], request: GuaranteeRequest) -> TrackingGuarantee:
     """Guarantee for a moving reference; no design if no pressure up to σ′ makes it feasible."""
-    setup, most = wanted.setup, rational(fault.effective_normal_stress)
+    setup, most = request.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step
     exact = ExactSetup.of(setup)
     delay = exact.delay
     infeasible = infeasibility(task, most, delay, setup.diffusion)
-    if infeasible and not wanted.gains:
+    if infeasible and not request.gains:
         near = nearest_setup(task, step, measured=setup.measured, setup=exact) if law.name == "elqr" else None
         return TrackingGuarantee(fault=fault, proof=NoProof(reason=infeasible), nearest=near)
-    result = method_of(law).sampled(fault, task, law, step, wanted)
-    slow = "" if wanted.gains else too_slow(task, most, max(step, setup.longest_step), delay)
+    result = method_of(law).sampled(fault, task, law, step, request)
+    slow = "" if request.gains else too_slow(task, most, max(step, setup.longest_step), delay)
     if not slow or result.proved:
         return result
     return replace(result, proof=NoProof(reason=slow))

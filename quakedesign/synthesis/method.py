@@ -162,7 +162,7 @@ class GainProblem(Generic[Designed]):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wanted:
+class GuaranteeRequest:
     """Problem of a guarantee for a sampled loop."""
 
     gains: tuple[str, ...] = ()
@@ -268,7 +268,7 @@ class DesignMethod(Generic[L]):
         return ()
 
     def sampled(
-        self, fault: Fault, task: FaultPlant, law: type[L], step: Fraction, wanted: Wanted
+        self, fault: Fault, task: FaultPlant, law: type[L], step: Fraction, request: GuaranteeRequest
     ) -> TrackingGuarantee:
         """Guarantee of given gains, or of a design, with sampling every T_s [s]."""
         reason = f"no analysis of {law.title} under a held pressure is known here"

@@ -37,7 +37,7 @@ from quakedesign.lyapunov.exact.perturbation_bounds import (
 from quakedesign.lyapunov.exact.premises import Premise, Variant, feedforward_variants, sliding_mode_premises
 from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.plant import FaultPlant
-from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, Wanted
+from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, GuaranteeRequest
 from quakedesign.synthesis.state_feedback import may_stick, sticking_options
 
 _HEADROOM = Fraction(11, 10)
@@ -123,17 +123,17 @@ class SlidingModes(DesignMethod[SlidingMode]):
         return feedforward_variants(fault, controller, certificate)
 
     def sampled(
-        self, fault: Fault, task: FaultPlant, law: type[SlidingMode], step: Fraction, wanted: Wanted
+        self, fault: Fault, task: FaultPlant, law: type[SlidingMode], step: Fraction, request: GuaranteeRequest
     ) -> TrackingGuarantee:
         """Guarantee in a scheme, with given base gains or the first stored ones."""
-        wanted.require_all_measured()
-        options: Any = {"gains": wanted.gains, "scheme": wanted.scheme or GUARANTEED, "objective": wanted.objective}
-        setup = ExactSetup.of(wanted.setup)
+        request.require_all_measured()
+        options: Any = {"gains": request.gains, "scheme": request.scheme or GUARANTEED, "objective": request.objective}
+        setup = ExactSetup.of(request.setup)
         made = sliding_mode(task, law, step, **options, setup=setup)
         if isinstance(made, NoProof):
             return TrackingGuarantee(fault=fault, proof=made)
         if not made.proof.available:
-            laws, none = deadbeat(task, law, wanted.gains), made.proof
+            laws, none = deadbeat(task, law, request.gains), made.proof
             longest = longest_step(task, kind=laws, setup=setup)
             again = laws.design_near_longer_step(task, step, longest, setup=setup)
             if again is None:

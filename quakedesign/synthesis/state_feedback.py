@@ -42,7 +42,14 @@ from quakedesign.lyapunov import Certificate, Loop, Verdict
 from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.lyapunov.search.lyapunov_search import certificate_of, claims_of, find_certificate, quadratic_margin
 from quakedesign.plant import FaultPlant
-from quakedesign.synthesis.method import Designed, DesignMethod, GainProblem, SlowSlidingDesign, Wanted, method_of
+from quakedesign.synthesis.method import (
+    Designed,
+    DesignMethod,
+    GainProblem,
+    GuaranteeRequest,
+    SlowSlidingDesign,
+    method_of,
+)
 from quakedesign.text import quantity
 
 
@@ -92,29 +99,29 @@ class StateFeedback(DesignMethod[ExtendedLQR]):
         return sampled_stability(LinearProblem.of(fault), tuple(controller.gains.values()), fault.sampling_time)
 
     def sampled(
-        self, fault: Fault, task: FaultPlant, law: type[ExtendedLQR], step: Fraction, wanted: Wanted
+        self, fault: Fault, task: FaultPlant, law: type[ExtendedLQR], step: Fraction, request: GuaranteeRequest
     ) -> TrackingGuarantee:
         """Guarantee of given gains with summed integrals, or of a law with an estimate."""
-        setup, differs = wanted.setup, wanted.setup.measured == MEASURED[2]
-        if wanted.gains and not differs:
-            wanted.require_all_measured()
-        if wanted.scheme not in (None, "explicit"):
-            raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {wanted.scheme!r}. Omit scheme.")
+        setup, differs = request.setup, request.setup.measured == MEASURED[2]
+        if request.gains and not differs:
+            request.require_all_measured()
+        if request.scheme not in (None, "explicit"):
+            raise ParameterError(f"the e-LQR runs in the scheme explicit. Received {request.scheme!r}. Omit scheme.")
         exact = ExactSetup.of(setup)
-        if wanted.gains:
-            summed = summed_integrals(_four(wanted.gains), step)
+        if request.gains:
+            summed = summed_integrals(_four(request.gains), step)
             if differs and (reason := why_no_law(step, setup.measured, exact)):
                 return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
             summed = by_differences(summed, step) if differs else summed
             proof = best_guarantee(task, exact.with_law(summed, step))
             if proof.available:
                 return with_worst_case(fault, proof)
-            other = self.sampled(fault, task, law, step, replace(wanted, gains=()))
+            other = self.sampled(fault, task, law, step, replace(request, gains=()))
             if other.proof.available:
                 return TrackingGuarantee(fault=fault, proof=proof, nearest=(GAINS, other.proof))
             return replace(other, proof=proof)
         entries: Any = {"measured": setup.measured, "setup": exact}
-        designed = design_sampled_law(task, step, objective=wanted.objective, **entries)
+        designed = design_sampled_law(task, step, objective=request.objective, **entries)
         if designed.available:
             return with_worst_case(fault, designed)
         if setup.longest_step or designed.only_pressure_fails:
@@ -179,7 +186,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
     return problem.judged(runs.controller, name=law.name, details=details, runs=runs, premises=designed.premises())
 
 
-def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: type[ExtendedLQR]) -> Designed:
+def _sliding(problem: GainProblem[Designed], given: SlowSlidingDesign, law: type[ExtendedLQR]) -> Designed:
     """Design of a law of the slip alone for slow sliding along the task."""
     wrong = {
         "continuous": problem.continuous,
@@ -195,17 +202,15 @@ def _sliding(problem: GainProblem[Designed], wanted: SlowSlidingDesign, law: typ
             "or use guarantee, which takes slip noise."
         )
     fault = problem.fault
-    path = wanted.diffusion or near_path(sliding_model(fault))
+    path = given.diffusion or near_path(sliding_model(fault))
     result = guarantee_sliding(
-        fault, stress=wanted.stress, spread=wanted.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
+        fault, stress=given.stress, spread=given.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
     )
     reason = result.proof.reason if not result.proof.available else None
     if result.sampled_loop is None:
         return problem.undecided(law.name, str(reason), sliding=result)
     near = quantity(float(path) ** 0.5, "m")
-    assumed = (
-        None if wanted.diffusion else f"a well near the fault, L^2/D = {float(path):.3g} s ({near} at D = 1 m^2/s)"
-    )
+    assumed = None if given.diffusion else f"a well near the fault, L^2/D = {float(path):.3g} s ({near} at D = 1 m^2/s)"
     details = {"step": str(result.sampled_loop.step), "diffusion": str(path), "measured": MEASURED[1]}
     details |= {name: text for name, text in {"assumed": assumed, "reason": reason}.items() if text}
     return problem.judged(

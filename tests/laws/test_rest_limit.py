@@ -25,7 +25,7 @@ from quakedesign.laws import (
     summed_integrals,
 )
 from quakedesign.loop import Actuator, Delay, Diffusion, Lag
-from quakedesign.loop.diffusion_layer import Layer
+from quakedesign.loop.diffusion_path import DiffusionPath
 from quakedesign.loop.schemes.compensated import Compensated
 from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Variation, to_iosystem
@@ -291,7 +291,7 @@ def test_the_adversary_s_limit_is_that_of_the_run(proved):
 
 def test_what_the_adversary_cuts_off_moves_all_that_stands_at_the_valve(proved):
     """The pressure that waits alone; or the valve's, its last step, what is less it, and the kick of the rock."""
-    layer, gain = Layer(time=F(1)), float(sum(proved.task.beta) / 2)
+    layer, gain = DiffusionPath(time=F(1)), float(sum(proved.task.beta) / 2)
     modes = {f"layer{i}": -1.0 for i in range(8)}
     cases = (
         ({"delay": F("0.2")}, {"waiting0": 1.0}),

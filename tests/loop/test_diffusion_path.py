@@ -10,11 +10,11 @@ from scipy.special import erfc
 
 from quakedesign.errors import ParameterError
 from quakedesign.laws import LinearLaw, NominalModel, summed_integrals
-from quakedesign.loop import Diffusion, Fading, Layer, sampled_error_loop
-from quakedesign.loop.diffusion_layer import MODES
+from quakedesign.loop import Diffusion, DiffusionPath, Fading, sampled_error_loop
+from quakedesign.loop.diffusion_path import MODES
 
 TIME = F(3, 2)
-LAYER = Layer(time=TIME)
+LAYER = DiffusionPath(time=TIME)
 MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=F(12, 5))
 
 

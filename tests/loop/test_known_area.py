@@ -9,11 +9,11 @@ from scipy.linalg import expm
 from scipy.special import erfc
 
 from quakedesign.laws import LinearLaw, NominalModel
-from quakedesign.loop import Layer, sampled_error_loop, with_response_area
-from quakedesign.loop.diffusion_layer import MODES
+from quakedesign.loop import DiffusionPath, sampled_error_loop, with_response_area
+from quakedesign.loop.diffusion_path import MODES
 
 TIME, STEP, AUTHORITY, GAIN = F(3, 2), F(1, 5), F(2), F(6, 5)
-LAYER = Layer(time=TIME)
+LAYER = DiffusionPath(time=TIME)
 MODEL = NominalModel(slip=F(1, 2), rate=F(3, 2), gain=GAIN * AUTHORITY)
 MANY = 400
 ODD = 2 * np.arange(MANY) + 1

@@ -13,7 +13,7 @@ import quakedesign as qd
 from quakedesign.cli import main
 from quakedesign.errors import ParameterError
 from quakedesign.guarantees.exact.limit_theorems import (
-    SlidingPush,
+    DisturbedSliding,
     farthest_well,
     longest_diffusion,
     longest_reaction,
@@ -149,7 +149,7 @@ def one_block_pole(stiffer, critical_slip):
 
 def test_the_common_mode_of_sliding_blocks_has_the_limits_of_one_block():
     found = chain_limits(SLIDING, stress=1e4, pressure=1e6, diffusivity=2.0)
-    push = SlidingPush(model=sliding_model(SLIDING.faults[0]), amplitude=F(10_000))
+    push = DisturbedSliding(model=sliding_model(SLIDING.faults[0]), amplitude=F(10_000))
     common = found.modes[0]
     assert common.shape == pytest.approx([1, 1, 1])
     assert common.pole == pytest.approx(float(push.pole.mid()), rel=1e-9)

@@ -157,7 +157,7 @@ def test_noise_limits_the_slip_rate_of_who_is_told_no_more(designs):
     assert {"measured": "slip", "setup": ExactSetup(slip_noise=F(1, 10**6))} in designs[2]
     assert {"measured": "slip-and-rate", "setup": ExactSetup()} in designs[2]
     assert {key: found.to_dict()[key] for key in told} == {key: str(value) for key, value in told.items()}
-    said = "even for one that measures the slip with errors of no more than 1 µm up to each sample"
+    said = "even for a controller that measures the slip with errors of no more than 1 µm up to each sample"
     assert said in " ".join(" ".join(limits_lines(found)).split())
     assert found.smallest_peaks()[0][1] > 2 * found.smallest_peaks(measured=False)[0][1]
     label = "infeasible when measuring the slip with errors of no more than 1 µm"
@@ -169,7 +169,8 @@ def test_noise_of_both_is_told_and_that_of_one_hides_nothing(designs):
     both = study(REAL, slip_noise="1e-6", rate_noise="1e-5", prove=False)
     errors = "the slip with errors of no more than 1 µm, the slip rate with errors of no more than 10 µm/s"
     assert both.sensing.summary() == errors
-    assert f"even for one that measures {errors} up to each sample" in " ".join(" ".join(limits_lines(both)).split())
+    said = " ".join(" ".join(limits_lines(both)).split())
+    assert f"even for a controller that measures {errors} up to each sample" in said
     plain = study(REAL, prove=False).peak_slip_rate_error
     assert both.peak_slip_rate_error.impossible_beyond > plain.impossible_beyond
     for told in ({"slip_noise": "1e-6"}, {"rate_noise": "1e-6"}, {"measured": "slip"}):
@@ -194,7 +195,8 @@ def test_without_a_disturbance_nothing_is_impossible():
     found = study(quiet, prove=False)
     assert {limit.impossible_beyond for limit in found.named().values()} == {None}
     assert found.smallest_peaks() == []
-    assert "without a disturbance no limit is known: give amplitude in [disturbance]" in " ".join(limits_lines(found))
+    text = " ".join(limits_lines(found))
+    assert "without a disturbance no limit is known: give an amplitude in [disturbance]" in text
     assert limits_figure(found).axes[0].get_ylabel().endswith("[m/s]")
 
 

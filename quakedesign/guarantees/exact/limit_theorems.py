@@ -52,7 +52,7 @@ _ZERO, _ONE = Fraction(0), Fraction(1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SlidingPush:
+class DisturbedSliding:
     """A linearised fault in slow sliding and its stress disturbance.
 
     Attributes
@@ -318,28 +318,28 @@ def smallest_stick_slip_rate(task: FaultPlant, step: Fraction) -> LowerBound | N
     return LowerBound(peak) if peak > 0 else None
 
 
-def longest_reaction(task: FaultPlant | SlidingPush, withdrawal: Fraction) -> UpperBound | None:
+def longest_reaction(task: FaultPlant | DisturbedSliding, withdrawal: Fraction) -> UpperBound | None:
     """T + θ [s] beyond which every controller fails, without a diffusion path; None without a limit.
 
     `withdrawal` is P [Pa].
     """
     _require(withdrawal >= 0, "a withdrawal of at least 0", withdrawal)
 
-    def longest(plant: _DisturbedPlant | SlidingPush) -> arb:
+    def longest(plant: _DisturbedPlant | DisturbedSliding) -> arb:
         ratio = ball(plant.authority * withdrawal / task.amplitude)
         return _at_least_one(ratio).log() / plant.pole
 
     return _least(task, longest)
 
 
-def longest_diffusion(task: FaultPlant | SlidingPush, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
+def longest_diffusion(task: FaultPlant | DisturbedSliding, withdrawal: Fraction, step: Fraction) -> UpperBound | None:
     """L²/D [s] beyond which every controller with samples T apart fails; None without a limit.
 
     `withdrawal` is P [Pa], `step` is T [s].
     """
     _require(withdrawal >= 0 and step >= 0, "a withdrawal and a step of at least 0", withdrawal, step)
 
-    def longest(plant: _DisturbedPlant | SlidingPush) -> arb:
+    def longest(plant: _DisturbedPlant | DisturbedSliding) -> arb:
         pole = plant.pole
         ratio = ball(plant.authority * withdrawal / task.amplitude) * (-pole * ball(step)).exp()
         return _at_least_one(ratio).acosh() ** 2 / pole
@@ -361,7 +361,7 @@ def nearest_proved_well(diffusion_time: LowerBound, diffusivity: Fraction) -> Lo
         return LowerBound(end_of(ball(diffusion_time * diffusivity).sqrt().lower()))
 
 
-def smallest_withdrawal(task: FaultPlant | SlidingPush, step: Fraction) -> LowerBound | None:
+def smallest_withdrawal(task: FaultPlant | DisturbedSliding, step: Fraction) -> LowerBound | None:
     """P [Pa] below which every controller with samples T = `step` [s] apart fails; None without a limit."""
     _require(step >= 0, "a step of at least 0", step)
     with ctx.workprec(_BITS):
@@ -408,7 +408,9 @@ _ASSUMED = (
 )
 
 
-def _least(task: FaultPlant | SlidingPush, value: Callable[[_DisturbedPlant | SlidingPush], arb]) -> UpperBound | None:
+def _least(
+    task: FaultPlant | DisturbedSliding, value: Callable[[_DisturbedPlant | DisturbedSliding], arb]
+) -> UpperBound | None:
     with ctx.workprec(_BITS):
         bounds = [upper(value(plant)) for plant in _pushed(task)]
     return UpperBound(min(bounds)) if bounds else None
@@ -421,9 +423,9 @@ def _corners(task: FaultPlant) -> Iterator[tuple[Fraction, Fraction, Fraction]]:
         yield k - task.growths[0], eta - task.growths[1], area
 
 
-def _pushed(task: FaultPlant | SlidingPush) -> Sequence[_DisturbedPlant | SlidingPush]:
+def _pushed(task: FaultPlant | DisturbedSliding) -> Sequence[_DisturbedPlant | DisturbedSliding]:
     """Plants of theorem 2, of a fault or of slow sliding."""
-    if isinstance(task, SlidingPush):
+    if isinstance(task, DisturbedSliding):
         return [task] if task.grows else []
     law = task.friction
     plants = [

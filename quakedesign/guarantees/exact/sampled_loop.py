@@ -16,7 +16,7 @@ from quakedesign.errors import ParameterError, UnsupportedError
 from quakedesign.exact import shortly
 from quakedesign.guarantees.exact.norms import START
 from quakedesign.laws import NOISES, ImplicitStep, LinearLaw, NominalModel
-from quakedesign.loop import Instants, Layer, PeriodicLoop, sampled_error_loop, starts, with_response_area
+from quakedesign.loop import DiffusionPath, Instants, PeriodicLoop, sampled_error_loop, starts, with_response_area
 from quakedesign.loop.loop_setup import LoopSetup, Pump
 from quakedesign.plant.fault_plant import FaultPlant
 
@@ -243,7 +243,7 @@ class SampledLoop(ExactSetup):
         )
         if self.diffusion:
             gain = (model or task.model).gain / task.authority
-            loop = with_response_area(loop, gain, Layer(time=self.diffusion))
+            loop = with_response_area(loop, gain, DiffusionPath(time=self.diffusion))
         box = starts(self.law, len(loop.states), self.initial_errors, (self.slip_noise, self.rate_noise))
         return replace(loop, start=box)
 
@@ -359,7 +359,7 @@ def reference_channels(task: FaultPlant, names: Collection[str]) -> Iterator[Cha
         yield Channel(name=LATE, constant=_ZERO, coefficients={"stepped": Fraction(1)})
 
 
-def through_layer(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
+def through_diffusion(channels: Sequence[Channel], gains: Gains) -> Iterator[Channel]:
     """Inputs of a loop with a diffusion path.
 
     Without a lag the truncation error fades after each step, and is a separate input; with a lag it is part of the

@@ -26,7 +26,7 @@ from quakedesign.guarantees.exact.sampled_loop import (
     GainSpread,
     channels_of,
     reference_channels,
-    through_layer,
+    through_diffusion,
 )
 from quakedesign.laws import ImplicitStep, NominalModel, Power
 from quakedesign.loop import PeriodicLoop
@@ -111,7 +111,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 # is continuous and initially below E, so it never reaches E. ∎
 #
 # **Diffusion path.** In this paragraph R is b times the truncation error of the modes [m/s²], |R| ≤ sup|y| with the
-# output y = ``left_out``, and bY is its integral as in `loop.diffusion_layer`. The plant has β(v + R). The loop
+# output y = ``left_out``, and bY is its integral as in `loop.diffusion_path`. The plant has β(v + R). The loop
 # contains β0·v and, with the state e2 − β0·bY in place of e2, also β0·R, as known jumps. So (β − β0)R enters like
 # ``acceleration``; its c for y is that of ``acceleration`` for v. If the well pressure is continuous, this term is part
 # of ``acceleration``. If it has steps, R decays after every step and is a separate input. With a slowly varying gain,
@@ -224,7 +224,7 @@ def bounds_from(
         *reference_channels(task, {name for _, name in gains}),
     )
     if ("push", "awaited") in gains:
-        channels = tuple(through_layer(channels, gains))
+        channels = tuple(through_diffusion(channels, gains))
     if all(isinstance(values[0], float) for values in gains.values()):
         channels = tuple(channel.rounded() for channel in channels)
     small_gain, peaks = channel_bounds(channels, gains)

@@ -41,7 +41,7 @@ from quakedesign.plant.fault_plant import FaultPlant
 # ----------------------------------------------------------------------
 # The default designs of a fault: for its own T_s, else for the longest T_s that has a guarantee.
 
-REACH = frozenset({"sampling_time", "delay"})
+PREMISES_OF_TIMES = frozenset({"sampling_time", "delay"})
 """Premises of a guarantee, see `SampledDesign.premises`."""
 
 

@@ -56,7 +56,7 @@ def estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | N
     return BoundsEstimate(_bounds(task, sampled_loop, gains), max(gains["slip_error", "drift"]))
 
 
-def slowly_estimated(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | None:
+def varying_gain_estimate(task: FaultPlant, sampled_loop: SampledLoop) -> BoundsEstimate | None:
     """Estimate with a slowly varying input gain, at the ends and the middle of its range."""
     low, high = task.beta
     every = []

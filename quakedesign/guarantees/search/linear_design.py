@@ -41,16 +41,10 @@ from quakedesign.guarantees.search.float_bounds import (
     estimated,
     own_poles,
     short,
-    slowly_estimated,
     spectral_radius,
+    varying_gain_estimate,
 )
-from quakedesign.guarantees.search.lqg import (
-    LawFamily,
-    family_of,
-    measured_by,
-    require_setup,
-    why_no_law,
-)
+from quakedesign.guarantees.search.lqg import LawFamily, family_of, measured_by, require_setup, why_no_law
 from quakedesign.laws.elqr import ExtendedLQR
 from quakedesign.loop import PeriodicLoop, exact_integrals
 from quakedesign.loop.loop_setup import MEASURED, Pump, require_step
@@ -306,7 +300,7 @@ class _Laws:
 
     def seen(self, x: np.ndarray) -> BoundsEstimate | None:
         """Estimate of the law with these parameters; None if they give no law."""
-        judged = slowly_estimated if self.template.diffusion and not self.task.friction.rate_slope else estimated
+        judged = varying_gain_estimate if self.template.diffusion and not self.task.friction.rate_slope else estimated
         judged = unclocked_estimate if self.template.longest_step else judged
         try:
             return judged(self.task, self.sampled_loop(x)) if self.family.admits(x) else None
@@ -582,12 +576,7 @@ def _first_step(task: FaultPlant, late: float = 0.0) -> Fraction:
 
 
 def design_near_longer_step(
-    task: FaultPlant,
-    step: Fraction,
-    longest: Longest | None,
-    *,
-    measured: str = MEASURED[0],
-    setup: ExactSetup = PLAIN,
+    task: FaultPlant, step: Fraction, longest: Longest | None, *, measured: str = MEASURED[0], setup: ExactSetup = PLAIN
 ) -> TrackingProof | None:
     """Design at T_s by a search near the law for a longer T_s; for a failed direct design. None without a proof."""
     if longest is None or longest.guarantee.sampled_loop.step < step:

@@ -23,8 +23,8 @@ from quakedesign.guarantees.exact.sampled_loop import ExactSetup
 from quakedesign.guarantees.search.float_bounds import rounded, short
 from quakedesign.laws import ErrorModel, LinearLaw, NominalModel, compensator, disturbance_estimate, slip_observer
 from quakedesign.laws.sampled_law import Matrix, Row, unit_row
-from quakedesign.loop import SHORTEST, Layer, SlidingModel
-from quakedesign.loop.diffusion_layer import MODES
+from quakedesign.loop import SHORTEST, DiffusionPath, SlidingModel
+from quakedesign.loop.diffusion_path import MODES
 from quakedesign.loop.loop_setup import MEASURED
 from quakedesign.loop.sensing.differentiator import ORDER, by_differences, names_before
 from quakedesign.plant.fault_plant import FaultPlant
@@ -46,9 +46,9 @@ def path_modes(step: Fraction, setup: ExactSetup, *, observed: bool = False) -> 
     Negative if the loop exceeds the limit without any mode. A law of the slip alone has one additional state.
     """
     ages = -int(-setup.delay // step)
-    layer, behind = MODES if setup.diffusion else 0, bool(setup.lag)
-    free = _MOST_STATES - _WITHOUT_PATH - layer - behind - 2 * ages - observed
-    return free if layer else min(free, 0)
+    modes, behind = MODES if setup.diffusion else 0, bool(setup.lag)
+    free = _MOST_STATES - _WITHOUT_PATH - modes - behind - 2 * ages - observed
+    return free if modes else min(free, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,10 +112,10 @@ def _sampled(model: NominalModel, step: Fraction, setup: ExactSetup, modes: int)
     delay, lag = setup.delay, setup.lag
     whole, late = int(delay // step), float(delay % step)
     ages = whole + (late > 0)
-    lagging, layer = int(lag > 0), Layer(time=setup.diffusion or lag)
+    lagging, path = int(lag > 0), DiffusionPath(time=setup.diffusion or lag)
     size = 2 + lagging + modes
-    shares = np.array([float(layer.share(i)) for i in range(modes)])
-    rates = np.array([float(layer.rate(i)) for i in range(modes)])
+    shares = np.array([float(path.share(i)) for i in range(modes)])
+    rates = np.array([float(path.rate(i)) for i in range(modes)])
     flow = np.zeros((size + 1, size + 1))  # the last entry is the valve pressure
     well = 2 if lagging else size
     flow[0, 1] = 1
@@ -222,8 +222,8 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
     if measured == MEASURED[2]:
         plain = family_of(task, step, MEASURED[0], setup)
         return replace(plain, law=lambda x: by_differences(plain.law(x), step), starts=(*_GENTLE, *plain.starts))
-    observed, layer = measured == "slip", bool(setup.diffusion)
-    path = layer or (bool(setup.lag) and path_modes(step, setup, observed=observed) >= 0)
+    observed, diffusing = measured == "slip", bool(setup.diffusion)
+    path = diffusing or (bool(setup.lag) and path_modes(step, setup, observed=observed) >= 0)
     feedback: PathFeedback | DelayFeedback
     if path:
         feedback = PathFeedback.of(task.model, step, setup, observed=observed)
@@ -241,7 +241,7 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
         exponents = np.abs(x[0 if path else 2 : 4 if observed else 2])
         return bool((exponents < _WIDEST).all() and (observed or 0 < x[2] < 1))
 
-    starts: tuple[tuple[float, ...], ...] = (THROUGH_PATH if layer else BEHIND_LAG) if path else _STARTS
+    starts: tuple[tuple[float, ...], ...] = (THROUGH_PATH if diffusing else BEHIND_LAG) if path else _STARTS
     if observed:
         decades = kalman.decades(float(task.amplitude), setup.slip_noise)
         first = starts if path else _OBSERVERS
@@ -377,9 +377,9 @@ def sliding_law(
     ParameterError
         When the Riccati equations have no solution: the step or the diffusion time is too long for the instability.
     """
-    layer = Layer(time=diffusion * model.state_rate) if diffusion else None
-    shares = [layer.share(i) for i in range(SLIDING_MODES)] if layer else []
-    rates = [layer.rate(i) for i in range(SLIDING_MODES)] if layer else []
+    modes = DiffusionPath(time=diffusion * model.state_rate) if diffusion else None
+    shares = [modes.share(i) for i in range(SLIDING_MODES)] if modes else []
+    rates = [modes.rate(i) for i in range(SLIDING_MODES)] if modes else []
     scaled_step, size = step * model.state_rate, 2 + len(shares)
     stress, length = model.weakening / model.evolution, model.rate / model.state_rate
     # Flow of (x, z, modes, level, pressure), and their coefficients in y: x′ = y, z′ = −y − z.

@@ -93,8 +93,8 @@ def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Frac
     within = [sector.within for sector in part.sectors[:2]]
     if len(part.A) <= size or not part.A[size][size] < 0 or len(within) < 2 or None in within:
         raise _of_another(chain)
-    lag, push = -1 / part.A[size][size], max(claim.claims.controls) * MPA * (1 + Fraction(1, 10**9))
-    claims = BlockClaims(log_state=within[0], pull=within[1] * MPA, push=push)  # type: ignore[arg-type, operator]
+    lag, pressure = -1 / part.A[size][size], max(claim.claims.controls) * MPA * (1 + Fraction(1, 10**9))
+    claims = BlockClaims(log_state=within[0], pull=within[1] * MPA, push=pressure)  # type: ignore[arg-type, operator]
 
     def covers(stress: Fraction) -> bool:
         plant = SlidingBlocks(chain=chain, lag=lag, stress=stress).plant(claims)

@@ -69,7 +69,7 @@ _NEARLY = (
 _ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
 # cosine above which two normals count as equal; relative margin of a facet that is unchanged at rest
 _ALIKE, _WIDER = 1 - 1e-8, 1e-5
-_KEPT, _FOLLOWED = 0.6, 14  # share of growth kept when facets are added; turns after that until heights only grow
+_RETAINED, _FOLLOWED = 0.6, 14  # share of growth kept when facets are added; turns after that until heights only grow
 _MARGINS = 2e-6, 2e-5  # margins of a polytope over its images; the second if the first gives no proof
 _FAR = 30  # a set larger than this factor times its first extents counts as unbounded
 _RATE_SHARES, _NEAR = (0, 0.3, 0.6, 1, 1.6), (1, 0.8, 1.2)  # multipliers tried, relative to a size and to present ones
@@ -683,7 +683,7 @@ class _Growing:
         before = np.concatenate([self.heights, self.least[len(self.heights) :]])
         self.normals = self._neutral(self.normals, chord)
         self.least = np.maximum(self.least, (self.normals @ self.points.T).max(axis=1))
-        self.heights = self.least + _KEPT * (before - self.least)
+        self.heights = self.least + _RETAINED * (before - self.least)
 
     def _scaled(self) -> np.ndarray:
         """Multipliers of n/h instead of n."""

@@ -126,7 +126,7 @@ class Diffusion(FlowStage):
 
     @classmethod
     def of_time(cls, time: float, *, storage: float | None = None, cells: int = 16) -> Self:
-        """Layer with a given τ = L²/D [s]; its length of 1 m is arbitrary."""
+        """Stage with a given τ = L²/D [s]; its length of 1 m is arbitrary."""
         require_positive(time=time)
         return cls(length=1.0, diffusivity=1.0 / time, storage=storage, cells=cells)
 

@@ -165,18 +165,18 @@ def _largest_split(problem: DomainProblem) -> int | None:
     """Largest step for which `split` is proved, searched downwards from the step for sensitivities at zero errors."""
     degree = problem.sets.degree
 
-    def holds(step: int, errors: Errors | None = None) -> bool:
+    def is_valid(step: int, errors: Errors | None = None) -> bool:
         parts = problem.split(_level(step, degree), errors)
         return parts is not None and sum(parts.values()) < 1
 
     low, high = _STEPS
-    if not holds(low):
+    if not is_valid(low):
         return None
-    guess = _largest(lambda step: holds(step, Errors()), low, high)
+    guess = _largest(lambda step: is_valid(step, Errors()), low, high)
     above, stride = guess, 1
-    while not holds(guess):
+    while not is_valid(guess):
         above, guess, stride = guess, max(low, guess - stride), 2 * stride
-    return _largest(holds, guess, above)
+    return _largest(is_valid, guess, above)
 
 
 def _level(step: int, degree: Fraction) -> Fraction:

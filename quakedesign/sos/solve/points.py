@@ -266,11 +266,11 @@ def _constrained(statement: Statement, hints: Sequence[Sequence[float]]) -> Iter
                 )
         except (ValueError, FloatingPointError, OverflowError):
             continue
-        reach = float(np.abs(answer.x).max())
-        if reach < _FAR:
+        largest = float(np.abs(answer.x).max())
+        if largest < _FAR:
             yield answer.x.tolist()
-        elif np.isfinite(reach):
-            yield from ((answer.x / reach * far).tolist() for far in (1e1, 1e2, 1e4))
+        elif np.isfinite(largest):
+            yield from ((answer.x / largest * far).tolist() for far in (1e1, 1e2, 1e4))
 
 
 def negative_point(

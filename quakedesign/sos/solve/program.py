@@ -251,8 +251,8 @@ class Program:
             return
         best = float(problem.value)
         margin, least = cp.Variable(), cp.Parameter()
-        wanted = [self._value(self._objective) >= least] if self._objective else []
-        within = Compiled(cp.Problem(cp.Maximize(margin), [*self._constraints(margin), margin <= 1, *wanted]))
+        least_objective = [self._value(self._objective) >= least] if self._objective else []
+        within = Compiled(cp.Problem(cp.Maximize(margin), [*self._constraints(margin), margin <= 1, *least_objective]))
         for loss in (share * max(1.0, abs(best)) for share in (losses if self._objective else losses[:1])):
             least.value = best - loss
             if within.solve():

@@ -15,7 +15,7 @@ from quakedesign.guarantees import Claims, SampledLoop, TrackingProof, load_guar
 from quakedesign.guarantees.exact.guarantee_files import guarantee_document, guarantee_text
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, ResponseBounds
 from quakedesign.guarantees.exact.plant_proof import PlantClaims, PlantProof, peaks
-from quakedesign.guarantees.exact.sampled_loop import Channel, reference_channels, through_layer
+from quakedesign.guarantees.exact.sampled_loop import Channel, reference_channels, through_diffusion
 from quakedesign.guarantees.exact.sliding_proof import _inside
 from quakedesign.laws import ImplicitStep, Power, compensated, summed_integrals
 from quakedesign.loop.loop_setup import Pump
@@ -90,7 +90,9 @@ def test_the_truncation_error_of_a_layer_acts_where_the_pressure_does(fades):
     given = (("acceleration", F(7), push), ("aged", F(2), push), ("drift", F(1), slip))
     channels = [Channel(name=name, constant=own, coefficients=shares) for name, own, shares in given]
     gains = {("left_out", "left_out"): (F(1),)} if fades else {}
-    found = {channel.name: (channel.constant, dict(channel.coefficients)) for channel in through_layer(channels, gains)}
+    found = {
+        channel.name: (channel.constant, dict(channel.coefficients)) for channel in through_diffusion(channels, gains)
+    }
     left = {"left_out": F(1, 3)}
     assert found["acceleration"] == (7, push if fades else push | left)
     assert found["aged"] == (2, push | left)

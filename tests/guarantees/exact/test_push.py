@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from quakedesign.fault import load_fault
 from quakedesign.guarantees.exact.guarantee_files import parse_guarantee
 from quakedesign.guarantees.exact.limit_theorems import (
-    SlidingPush,
+    DisturbedSliding,
     longest_diffusion,
     longest_reaction,
     smallest_withdrawal,
@@ -20,7 +20,7 @@ from quakedesign.guarantees.search.lqg import sliding_model
 from quakedesign.studies import limits
 
 PATCH = load_fault("crustal-patch")
-PUSH = SlidingPush(model=sliding_model(PATCH), amplitude=F(25_000))
+PUSH = DisturbedSliding(model=sliding_model(PATCH), amplitude=F(25_000))
 V, D, N, A, B, K = 1e-6, 8e-3, 50e6, 0.010, 0.015, 32.04e9 / 15e3
 MU = 0.63454 + (A - B) * np.log(1e3)
 S = N * A + 1.0405e15 / 15e3**2 * V
@@ -68,7 +68,7 @@ def test_the_surprise_is_the_answer_of_the_rate_to_a_step_of_stress(step):
 def test_no_guarantee_contradicts_the_limits():
     path = Path(__file__).parents[3] / "proofs" / "certificates" / "sliding_crustal-patch.json"
     proved = parse_guarantee(path.read_text())
-    push = SlidingPush(model=PUSH.model, amplitude=proved.task.stress)
+    push = DisturbedSliding(model=PUSH.model, amplitude=proved.task.stress)
     assert push.smallest_rate_error(proved.sampled_loop.step) < proved.peak_slip_rate - proved.task.rate
     assert smallest_withdrawal(push, proved.sampled_loop.step) < proved.claims.push
     assert longest_diffusion(push, F(50 * 10**6), proved.sampled_loop.step) > proved.sampled_loop.diffusion
@@ -76,7 +76,7 @@ def test_no_guarantee_contradicts_the_limits():
 
 def test_a_fault_that_creeps_has_a_smallest_rate_error_and_no_other_limit():
     found = limits(load_fault("creeping-patch"), stress=1e5, prove=False)
-    assert not found.push.grows
+    assert not found.disturbed.grows
     assert found.peak_slip_rate_error.impossible_beyond >= 0
     assert found.largest_step.impossible_beyond is found.farthest_well.impossible_beyond is None
     assert found.smallest_pressure.impossible_beyond is None

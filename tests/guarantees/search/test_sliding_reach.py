@@ -80,7 +80,7 @@ def test_where_a_well_is_too_far_a_slower_task_and_a_nearer_well_are_named():
     assert "extrapolated" not in said
     known = replace(FAULT, friction=replace(GOUGE, slowest_rate=1e-8, reference_rate=1e-8))
     said = possible_remedy(known, TASK, reach, setup, proved, spread=Fraction(0))
-    assert "(but V = 2.17e-09 m/s is below the rates for which friction is known" in said
+    assert "(but V = 2.17e-09 m/s is below the rates of the working range" in said
 
     def unproved(task, held, log_rate):
         return NoProof(reason="")
