@@ -1,4 +1,4 @@
-"""Exceptions of quakedesign: each message gives quantity, condition, value and remedy."""
+"""Exceptions of quakedesign; messages give quantity and condition, and where possible value and remedy."""
 
 import math
 import re
@@ -9,7 +9,7 @@ from quakedesign.text import nearest_name, one_line, shown
 
 
 class QuakedesignError(Exception):
-    """Base class of all errors of quakedesign; the command line prints one line and exits with code 2.
+    """Base class of all errors of quakedesign; one that ends a command is printed in one line, with exit code 2.
 
     Attributes
     ----------

@@ -53,10 +53,10 @@ class DiscontinuousIntegral(SlidingMode):
     def loop_field(cls) -> LoopField:
         """Closed loop with λ = 1 in (f1, e2, e3), where f1 = κ³e1 and κ = √k_I1.
 
-        Then ν = −k_I2⌈⌈e2⌋^{3/2} + f1⌋^⅓ + ξ1 contains no root, and κ is a factor of f1' = κk_I1e2 alone: V̇ is affine
-        in κ, so that an interval around the root suffices. It also suffices for k_I4 ≠ 0, where the argument of the
-        sign contains κ: a proof treats the two signs of this argument separately, and assumes in each case only that
-        the argument has this sign for some κ of the interval.
+        Then ν = −k_I2⌈⌈e2⌋^{3/2} + f1⌋^⅓ + ξ1 does not contain κ, which is a factor of f1' = κk_I1e2 alone: V̇ is
+        affine in κ, so that an interval that contains κ suffices. It also suffices for k_I4 ≠ 0, where the argument of
+        the sign contains κ: a proof treats the two signs of this argument separately, and assumes in each case only
+        that the argument has this sign for some κ of the interval.
         """
         f1, e2, e3, beta, d, root = sp.symbols("f1 e2 e3 beta d kappa", real=True)
         k1, k2, k3, k4 = sp.symbols("kI1 kI2 kI3 kI4", real=True)

@@ -1,7 +1,8 @@
 """Gains scaled from one fault to a similar one, with exponents from the terms of the law.
 
-A law keeps its effect if every term scales like the sum to which it belongs. The pressure scales with λ_p, the rate of
-an integral state like this state divided by time, slip errors with λ_δ, and slip-rate errors with λ_δ/λ_t. These
+Let λ_p, λ_δ and λ_t be the ratios of pressure, slip and time, target fault over source fault (Table I of the paper). A
+law keeps its effect if every term scales like the sum to which it belongs. The pressure scales with λ_p, the rate of an
+integral state like this state divided by time, slip errors with λ_δ, and slip-rate errors with λ_δ/λ_t. These
 conditions are linear in the exponents of the gains. They are derived from the SymPy expression of the law and solved
 exactly, so that user-defined laws are scaled like those of the paper (appendix, with ERRATA 19 and 20).
 """
@@ -45,7 +46,7 @@ class LawDimensions(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ScaledGains:
-    """Exact gains of a law on a fault in `gain_units`, and factors of its integral states from the source fault."""
+    """Exact gains of a law in `gain_units`, and its integral states over those on the source fault."""
 
     law: Controller
     gains: Mapping[str, Radical]
@@ -72,7 +73,7 @@ def carry(gains: Controller | ScaledGains, scales: Scales, *, divisor: Fraction 
     Raises
     ------
     ParameterError
-        For a divisor of a law without one, or a law with inconsistent terms.
+        If a divisor is given for a law that has none, or the terms of the law are inconsistent.
     """
     start = gains if isinstance(gains, ScaledGains) else exact(gains)
     law, output = start.law, scales.of("Pa")

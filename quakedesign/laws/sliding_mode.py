@@ -72,7 +72,7 @@ class SlidingMode(Controller):
     @property
     @abstractmethod
     def lipschitz_limit(self) -> Fraction:
-        """Least |h'| [m/s³] for which no Lyapunov function exists with these gains."""
+        """Value of |h'| [m/s³] from which on no Lyapunov function exists with these gains; below it none need exist."""
 
     @property
     def numbers(self) -> dict[str, Fraction]:

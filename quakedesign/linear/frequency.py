@@ -1,4 +1,7 @@
-"""Frequency-domain limits of the e-LQR: margins that no certificate can exceed."""
+"""Frequency-domain limits of the e-LQR: margins that no certificate can exceed.
+
+The loop and its symbols s [1/s²], w [1/s], β [-], b [m²/kg] and K = (k1, …, k4) are those of `FeedbackLoop`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,8 +16,9 @@ from quakedesign.linear.linear_problem import FeedbackLoop, Vertex, characterist
 def slip_limit(loop: FeedbackLoop, rate: Fraction) -> tuple[Fraction, Fraction] | None:
     """Smallest constant s [1/s²] that destabilises the loop for some constant β, and that β; None if β alone does.
 
-    For a constant β the loop is stable if and only if s is below βbk1 − βbk3/(w + βbk2) − (w + βbk2)k4/k3, which is
-    convex in β; the value is exact at the β returned, an end of the range or a rational next to the least point.
+    For a constant β and w = `rate` the loop is stable if and only if s is below βbk1 − βbk3/(w + βbk2) − (w +
+    βbk2)k4/k3. This is convex in β if w·k2 ≥ 0; else it is concave and least at an end. The value is exact at the β
+    returned, an end of the range or a rational next to the least point.
     """
     k1, k2, k3, k4 = loop.gains
     low, high = loop.sectors.beta
@@ -61,7 +65,7 @@ def circle_limit(loop: FeedbackLoop, beta: Fraction, rate: Fraction, least: Frac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrequencyFacts:
-    """Classical margins at one vertex of the box, computed with python-control in scaled time."""
+    """Classical margins (python-control), and norms on a frequency grid, at one vertex of the box, in scaled time."""
 
     # beta, slip, rate: The vertex: β [-], s [1/s²], w [1/s]
     beta: float
@@ -73,13 +77,13 @@ class FrequencyFacts:
     phase_margin: float | None  # Smallest over all crossings [deg]
     delay_margin: float | None  # Smallest dead time in the loop that destabilises [s]
     return_difference: float  # min |1 + L(jω)| [-]; at least 1 for an optimal K
-    # disturbance_peak_slip, disturbance_peak_rate: H∞ norms from the force to e1 [s²] and to e2 [s]
+    # disturbance_peak_slip, disturbance_peak_rate: H∞ norms from the disturbance [m/s²] to e1 [s²] and to e2 [s]
     disturbance_peak_slip: float
     disturbance_peak_rate: float
 
 
 def frequency_properties(loop: FeedbackLoop, corner: Vertex) -> FrequencyFacts:
-    """Margins of L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and norms of the closed loop at one vertex."""
+    """Margins of the loop gain L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and closed-loop norms at a vertex."""
     beta, slip, rate = corner
     k1, k2, k3, k4 = loop.gains
     closed = [float(c) for c in characteristic(loop.matrix(corner))[1:]]

@@ -82,7 +82,7 @@ def peak_against_tracking(study: "PaperRuns") -> "Figure":
         across = [float(claim.slip_rate_error) / size for claim in claims]
         axis.plot(across, [value / divisor for value in seen], "o-", color=colour("elqr"), linewidth=1)
         for x, value, point in zip(across, seen, study.front, strict=True):
-            short = point.objective.removeprefix("tracking, ").removesuffix(" times the peak")
+            short = point.objective.removeprefix("tracking, ").removesuffix(" times the least slip-rate error")
             axis.annotate(short, (x, value / divisor), textcoords="offset points", xytext=(4, 4), fontsize=SMALL - 1)
         axis.set(xlabel=f"guaranteed slip-rate error [{unit}]", ylim=(0, 1.15 * max(seen) / divisor))
         axis.set_ylabel(f"simulated {'slip' if base == 'm' else 'slip-rate'} error [{name}]")

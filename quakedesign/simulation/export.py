@@ -58,7 +58,8 @@ _USE_OF_WELLS = {
     "limited": "{plan}If pump or valve limits act, the law winds up: the proved pressures must be within the limits.",
 }
 _ADDED = """Add the planned pressure (below) to each, as a continuous function of time: the proof assumes that the
-planned pressure reaches the fault unchanged, and that the pressure written here passes through the lag. """
+planned pressure reaches the fault unchanged, and that the pressure written here passes through the lag between valve
+and fault for which the law is designed. """
 _APPLIED_INPUT = " and the pressure [Pa] applied since the last call"
 _APPLIED = """
    applied may be a null pointer: the pressure of the last call is then taken as applied (0 before the first call)."""
@@ -210,7 +211,7 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
 
 
 def _binary(sources: dict[str, str]) -> tuple[dict[str, bytes], str]:
-    """Compiled interface for this platform, if a compiler works."""
+    """Compiled interface on Linux and macOS (x86-64), if a C compiler works; and which binary the FMU contains."""
     if platform.system() not in _PLATFORMS or platform.machine() not in {"x86_64", "AMD64"}:
         return {}, "sources only: no binary of FMI 2.0 is built for this platform"
     name, suffix = _PLATFORMS[platform.system()]
@@ -345,8 +346,8 @@ def export_controller(
     step, scheme, remarks
         As in `controller_step`; step [s].
     fmu : bool
-        Also write ``controller.fmu``: the same step for co-simulation with FMI 2.0, with the sources, and a binary for
-        this platform if a C compiler works.
+        Also write ``controller.fmu``: the same step for co-simulation with FMI 2.0, with the sources and, on Linux and
+        macOS (x86-64) with a C compiler, a binary.
     force : bool
         Replace a folder that contains an earlier export and nothing else.
 
@@ -388,7 +389,7 @@ def block_step(chain: BlockChain, law: Any, *, remarks: tuple[str, ...] = ()) ->
     Parameters
     ----------
     chain : BlockChain
-        Gives the reference, and the averages that wells measure.
+        Gives the reference, and the weights of the averages of measurements that the law uses.
     law : MatrixLaw
         Law without delay, such as the law that a guarantee returns.
     remarks : tuple of str

@@ -48,14 +48,17 @@ def perturbation(text: str) -> "sp.Expr":
     Raises
     ------
     ParameterError
-        For text outside this grammar, or a number that is not real and finite.
+        For text outside this grammar, text or powers that are too large, or a number that is not real and finite.
     """
     try:
         tree = parsed(text.strip(), "eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise _text_error(text, text) from None
     if (nodes := sum(1 for _ in ast.walk(tree))) > MOST_NODES:
-        raise ParameterError(f"a perturbation must be short, {MOST_NODES} terms at most. Received {nodes}. Shorten it.")
+        raise ParameterError(
+            f"a perturbation must have at most {MOST_NODES} numbers, names, operators and calls. Received {nodes}. "
+            "Shorten it."
+        )
     expression = _value(tree.body, text.strip())
     if not all(part.is_real and part.is_finite for part in sp.preorder_traversal(expression) if part.is_number):
         raise _text_error(text, text)
@@ -107,8 +110,8 @@ _OPERATIONS: dict[type[ast.operator], Callable[[sp.Expr, sp.Expr, str], sp.Expr]
 def _text_error(text: str, part: str) -> ParameterError:
     inside = f" in {text!r}" if part != text else ""
     return ParameterError(
-        f"a perturbation consists of numbers, pi, {', '.join(SYMBOLS)}, + - * / ** with numbers as exponents, and "
-        f"{', '.join(FUNCTIONS)}, and is real. Received {part!r}{inside}."
+        f"a perturbation consists of numbers, pi, {', '.join(SYMBOLS)}, + - * / ** with rational exponents of moderate "
+        f"size, and {', '.join(FUNCTIONS)}, and is real. Received {part!r}{inside}."
     )
 
 
@@ -225,7 +228,7 @@ def _instant(part: str) -> tuple[float, float]:
 
 
 def _rows(path: str) -> Iterator[tuple[float, float]]:
-    text = read_text(path, "course of pressure", largest=_LARGEST_FILE, refusal=ParameterError)
+    text = read_text(path, "pressure history", largest=_LARGEST_FILE, refusal=ParameterError)
     head, *rows = [row for row in csv.reader(text.splitlines()) if row] or [[]]
     units = [_unit_of(name, column) for name, column in zip(_COLUMNS, (*head, "", ""), strict=False)]
     for number, row in enumerate(rows, start=2):

@@ -134,7 +134,7 @@ class Recorder:
         return ca.cse([self.moved(vector, moved, meter.works)])[0]
 
     def moved(self, vector: ca.SX, state: ca.SX, done: ca.SX) -> ca.SX:
-        """Vector (SX) at the next instant, given its state and works; quantities at this instant are accumulated."""
+        """Vector (SX) at the next instant, given state and works there; those of `vector` are accumulated first."""
         now = self.parts(self.observe(vector))
         watched = now.watched | dict(zip(WORKS, (done[i] for i in range(len(WORKS))), strict=True))
         return replace(now, counter=now.counter + 1, state=state, watched=watched).joined()
@@ -292,7 +292,7 @@ class ActuatorMetrics(Metrics):
     Attributes
     ----------
     max_well_pressure, min_well_pressure : float or None
-        Pressure at the well, after delay, saturation and other stages [Pa].
+        Pressure at the well, after delay, saturation and other sampled stages, before lag and diffusion path [Pa].
     max_injected_volume, min_injected_volume : float or None
         Fluid volume injected into the rock since t = 0 [m³]; None if no stage of the actuator stores fluid.
     max_flow_rate, min_flow_rate : float or None

@@ -1,6 +1,6 @@
 """Studies for the figures and tables of the paper: metrics, extra runs, and trade-off.
 
-The trade-off is between the certified peak of the slip rate and the tracking error.
+The trade-off is between the certified slip-rate error and the tracking error.
 """
 
 import tomllib
@@ -85,7 +85,7 @@ def _outcome(run: Trajectory) -> Json:
 
 
 def printed(comparison: Compared) -> list[Json]:
-    """Printed numbers of the paper and ours for these runs, their ratio, our plant, and the reason of differences."""
+    """Printed numbers of the paper and ours for these runs, their ratio, our plant, and the reason for differences."""
     data = tomllib.loads((files(__package__) / "printed.toml").read_text(encoding="utf-8"))
     runs: dict[str, Trajectory | None] = {"uncontrolled": comparison.uncontrolled}
     runs |= {f"{e.origin} {e.design.name}": e.run for e in comparison.entries}
@@ -102,7 +102,7 @@ def printed(comparison: Compared) -> list[Json]:
 
 
 # ----------------------------------------------------------------------
-# Trade-off between certified peak and tracking error of designs for the sampled loop.
+# Trade-off between certified slip-rate error and tracking error of designs for the sampled loop.
 
 ROOMS = (1.2, 1.4, 1.6, 2.2)
 """Slip-rate errors admitted for tracking, as multiples of the smallest certified one; the default design uses 1.6."""
@@ -116,7 +116,7 @@ class FrontPoint:
     Attributes
     ----------
     objective : str
-        ``peak``, or ``tracking`` with the admitted increase of the peak.
+        ``peak``, or ``tracking`` with the admitted multiple of the smallest certified slip-rate error.
     guarantee : TrackingProof
     run : Trajectory
         Run under the fault's own disturbance, from rest.
@@ -128,7 +128,7 @@ class FrontPoint:
 
 
 def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
-    """Designs from the smallest certified peak to the best tracking, each with a guarantee.
+    """Designs from the smallest certified slip-rate error to the best tracking, each with a guarantee.
 
     Parameters
     ----------
@@ -139,7 +139,8 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
     task = uncertain_plant(fault)
     designs = {"peak": design_sampled_law(task, step, objective="peak")}
     designs |= {
-        f"tracking, {factor:g} times the peak": design_sampled_law(task, step, allowance=factor) for factor in ROOMS
+        f"tracking, {factor:g} times the least slip-rate error": design_sampled_law(task, step, allowance=factor)
+        for factor in ROOMS
     }
     length = min(_PERIODS * 2 * pi / fault.natural_frequency, fault.reference.operation_time)
     return tuple(
@@ -157,7 +158,7 @@ def objective_front(fault: Fault, step: Fraction) -> tuple[FrontPoint, ...]:
 # Further runs for the figures of the paper: the induced earthquake, and a close-up of every law.
 
 INDUCING_SHARE = 0.1
-"""Constant pressure over σ'_n of the induced earthquake: 5 MPa on the paper's fault at 50 MPa."""
+"""Ratio of the constant pressure of the induced earthquake to σ'_n: 5 MPa on the paper's fault at 50 MPa."""
 PERIODS = 16
 """Length of a close-up in natural periods."""
 
@@ -172,11 +173,11 @@ class PaperRuns:
     induced: Trajectory | None = None
     # By label of the entry: its first `PERIODS` natural periods with every step stored
     close_ups: Mapping[str, Trajectory] = field(default_factory=dict)
-    front: tuple[FrontPoint, ...] = ()  # Trade-off between peak and tracking, if a sampled law was designed
+    front: tuple[FrontPoint, ...] = ()  # Trade-off between peak and tracking, if a sampled e-LQR was designed
 
 
 def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] | None = None) -> PaperRuns:
-    """Make the short runs that the figures of the paper need beside a comparison.
+    """Make the short runs that the figures of the paper need in addition to a comparison.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Weighted homogeneity of functions and vector fields, weights, and relative degree.
 
-Homogeneity is proved symbolically or refuted by an exact counterexample. The weights are computed from
-the terms of the field. The relative degree is the order of the first derivative of an output that depends
-on the control.
+Homogeneity is proved symbolically or refuted by an exact counterexample. Δ is the dilation x_i → ε^{r_i}x_i, Δ² that
+with ε² in place of ε, and m the degree. The weights r_i are computed from the terms of the field. The relative degree
+is the order of the first derivative of an output that depends on the control.
 """
 
 from collections.abc import Iterator, Mapping
@@ -221,7 +221,10 @@ def _claims(
         return
     for e in components.values():
         twice = e.subs(dilation(weights, epsilon**2), simultaneous=True)
-        yield Identity(left=twice * e, right=at[e] ** 2), f"f(Δ²x)·f(x) = f(Δx)², necessary for any degree, for f = {e}"
+        yield (
+            Identity(left=twice * e, right=at[e] ** 2),
+            f"f(Δ²x)·f(x) = f(Δx)², Δ the dilation, necessary for any degree, for f = {e}",
+        )
     for (s, e), (other, f) in combinations(components.items(), 2):
         left, right = epsilon ** weights[other] * at[e] * f, epsilon ** weights[s] * at[f] * e
         yield Identity(left=left, right=right), f"equality of the degrees of the components of {s} and {other}"

@@ -213,7 +213,7 @@ def plant_values(fault: Fault) -> dict[sp.Symbol, sp.Rational]:
 
 
 def hatted_parameters(fault: Fault, values: Mapping[str, Any]) -> dict[sp.Symbol, Any]:
-    """k̂, η̂, N̂ and σ'_n from values (SI) or symbols of `PARAMETERS`, with m = nρh³, A = nh², k = nGh (see `Fault`)."""
+    """k̂, η̂, N̂, σ'_n from values (SI) or symbols of `PARAMETERS`; n squares of side ℓ: m = nρℓ³, A = nℓ², k = nGℓ."""
     rho, G, damping, stress = (values[name] for name in PARAMETERS)
     h = sp.Rational(str(rational(fault.side)))
     mass, shared = rho * h**3, damping / sp.Rational(str(fault.squares))
@@ -299,7 +299,7 @@ def _named(h: sp.Expr) -> sp.Expr:
 
 
 # ----------------------------------------------------------------------
-# Notation of derived equations in LaTeX or plain text: dots for rates, the reference without its argument.
+# Notation of derived equations: dots (LaTeX) or primes (plain text) for rates, the reference without its argument.
 
 
 class _Latex(LatexPrinter):  # type: ignore[misc]

@@ -18,12 +18,12 @@ B = TypeVar("B")
 class Proof(ABC, Generic[B]):
     """Claims about one loop with their check; abstract base, with one subclass for each theorem.
 
-    **Principle.** A theorem bounds the claimed quantities for all t, and the claims follow if each bound is at most its
-    claim. Two theorems assume the claims up to time t. The theorem of slow sliding bounds all inputs by them, on every
-    cell of its box of constants. The theorem of tracking bounds by them the effect of an implicit step or of a slowly
-    varying input gain, if there is one. Then each bound must be below its claim, or at most equal to it where the
-    input depends on earlier samples alone. As the quantities are continuous and initially within the claims, they
-    stay within them.
+    **Principle.** A theorem bounds the claimed quantities over the time range `validity`, and the claims follow if each
+    bound is at most its claim. Two theorems assume claims up to time t. The theorem of slow sliding bounds all inputs
+    by them, on every cell of its box of constants. The theorem of tracking bounds by them the effect of an implicit
+    step or of a slowly varying input gain, if there is one. Then the bound of each assumed claim must be below this
+    claim, or at most equal to it where the input depends on earlier samples alone. As the quantities are continuous and
+    initially within the claims, they stay within them.
 
     Attributes
     ----------
@@ -32,9 +32,10 @@ class Proof(ABC, Generic[B]):
     kind : str
         Kind of its certificate file (proofs/FORMAT.md).
     plant : str
-        Value of `plant` in `simulate` that the proof is about; empty where only one applies.
+        Value of `plant` in `simulate` that the proof is about; empty where only one applies, and for laws in continuous
+        time and uncertain plants.
     scope : str
-        Idealisation of its plant, as text; empty for the stick–slip plant and slow sliding.
+        Idealisation of its plant, as text; empty without one, or if the sentence or the premises state it.
     motion : str
         Condition of the slip-rate bound, as text.
     validity : str
@@ -89,7 +90,7 @@ class Proof(ABC, Generic[B]):
     @property
     @abstractmethod
     def bounds(self) -> Mapping[str, Bound]:
-        """Claimed bounds by name, in SI units."""
+        """Claimed bounds by name, in SI units; for an uncertain plant in the units of that plant."""
 
     @property
     def validity(self) -> str:

@@ -1,46 +1,49 @@
 """Invariant polytope of the sampled loop on the stick–slip plant, in ball arithmetic.
 
 **Plant.** Let y = x2 ≥ 0 be the slip rate, p*(x1) the pressure that balances the fault at rest at slip x1, b·β(x1) =
-μN̂, and U = p*(x1) − p at a sample, p constant up to the next. For the slip ξ since the sample
+μN̂, and U = p*(x1) − p at a sample; p is constant until the next sample, a time T (T_s) later. For the slip ξ since the
+sample
 
     y′ = −w·y + G(ξ) + φ + λ,   G(0) = −bβU,   G′(ξ) ∈ [S⁻, S⁺],   λ ≥ 0, λy = 0,
 
 with w the damping, φ the disturbance, |φ| ≤ H, λ the reaction of the fault at rest, and S⁻ ≤ 0 ≤ S⁺ (the range is
 widened to contain 0); k̂, N̂, b, β, φ1 and μ* are those of `quakedesign.plant.fault_plant`. This is exact: G(ξ) =
 N̂μ(x1)(p − σ′) + N̂μ*σ′ − κx1, κ = k̂ − φ1, has the slope −κ − N̂μ′(σ′ − p). While the fault rests, its state is
-constant. Backward slip is excluded while the shear stress N̂μ*σ′ − κx1 + φ is positive, which is checked.
+constant. Backward slip is excluded while the shear force per mass N̂μ*σ′ − κx1 + φ is positive, which is checked.
 
 **Two maps.** Let the block rest within a period. If G ≥ −H, the reaction keeps φ + λ = −G within [−H, H]: the motion is
 one of the plant without stick under an admissible disturbance, with y ≥ 0. If G < −H, no disturbance releases the block
 before the next sample, and the period ends with y = 0. So each period follows either the *sliding* map, with y ≥ 0 and
 ξ ≥ 0 at its end, or the *rest* map with a slip δ until the last stop.
 
-**Sliding map.** With S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and y at the end are
-linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y + t²/2·(H −
-bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
+**Sliding map.** With S = (G(ξ) − G(0))/ξ, S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and
+y at the end are linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤
+(t·y + t²/2·(H − bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
 **Rest map.** Let τ = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(τ−t)})/w. As y
-= 0 at the stop, integration by parts gives δ = f(0)y + ∫f·(G + φ)dt up to the stop. Before the stop G ≤ −H + |S⁻|(δ −
-ξ), and this bound minus G decreases with the slip. So
+= 0 at the stop, integration by parts gives, for the damping w, δ = f(0)y + ∫f·(G + φ)dt up to the stop. Before the stop
+G ≤ −H + |S⁻|(δ − ξ); this bound minus G is not negative and decreases with the slip. As f decreases, and ∫f dt ≥ 0 up
+to the stop by the lower limit of θ, G may be replaced by its bound. So, with ε for larger damping,
 
     δ·(1 − |S⁻|T²/2 − ε) ≤ f(0)·y + 2H·(e^{wx} − 1 − wx)/w²,   x = (1 − θ)T,
 
-with ε = (w⁺ − w⁻)·(e^{wx} − 1)/w, [w⁻, w⁺] the range of the damping. Moreover, G(δ) ≤ −H gives the condition of rest,
+where ε = (w⁺ − w⁻)·(e^{wx} − 1)/w, [w⁻, w⁺] the range of the damping. Moreover, G(δ) ≤ −H gives the condition of rest,
 b·β_max·U ≥ H − |S⁻|δ.
 
 The possible δ and U depend on r′ at the sample. The condition of rest is taken at the least r′, where it is weakest; so
 both ends of the range of r′ suffice.
 
 **Reference.** r(t + T) − r(t) is within max|r″|T²/2 of T·r′ and never negative. It may be 0 for r′ up to max|r″|T/2. So
-where a facet function n_l·z after the period decreases with this increment, the end r′ = 0 covers all these r′.
+where a facet function n_l·z (*Law*) after the period decreases with this increment, the end r′ = 0 covers all these r′.
 
-**Input gain.** Let n3 be the third entry of a facet's normal, s the chord slope of G in the period, m1 the factor of ξ
-in the facet function after a slide, which contains −n3·s/(bβ), M·ξ the bound used for m1·ξ, X1 the slip due to a
-constant unit force, and J the contribution of the ranges of slope and damping to the factor of H − bβU (FORMAT.md,
-*Sliding map*). For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ + (|n3·s|ψ/b)·ξ,
-with M the chord of m1 and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1 the chord of β·m1
-may replace β·M if the term −bβU·X1 of the ξ in (|n3·s|ψ/b)·ξ is omitted; the same holds for J. Where U < 0 replace m1
-by the chord of β·m1, divided by β: all terms with U are convex in β, and |n3·s|ψ/b enters the terms with y and H alone.
+**Input gain.** Let n3 be the third entry of a facet's normal, −s/(bβ) the chord slope of p* in the period, m1 the
+factor of ξ in the facet function after a slide, which contains −n3·s/(bβ), X1 [s²] the slip in a period due to a
+constant unit force per mass, and J the contribution of the ranges of slope and damping to the factor of H − bβU
+(FORMAT.md, *Sliding map*). For β between its ends let ψ be the chord of 1/β minus 1/β. Where U ≥ 0, m1·ξ ≤ M·ξ +
+(|n3·s|ψ/b)·ξ, with M the chord of m1 and ξ ≥ 0. β·M is at least the chord of β·m1 minus β|n3·s|ψ/b. So in −bU·β·M·X1
+the chord of β·m1 may replace β·M if the term −bβU·X1 of the ξ in (|n3·s|ψ/b)·ξ is omitted; the same holds for J. Where
+U < 0 replace m1 by the chord of β·m1, divided by β: all terms with U are convex in β, and |n3·s|ψ/b enters the terms
+with y and H alone.
 
 **Sliding mode.** The target rate is r′ + ω, ω the solution of the implicit step. That step is shown to be deadbeat, ω =
 −e/T, for every measured slip error and slip rate of the polytope. Then the law is the linear one with return_rate =
@@ -52,21 +55,22 @@ is invariant if no facet function exceeds 1 after either map. A facet function a
 maximum is bounded by multipliers of three or four constraints, which a file names.
 
 **Noise.** The measured slip is x + n, |n| ≤ N, rest_slip ≥ 2N; the slip rate is measured exactly, including whether it
-is 0. Let e1 be the slip minus the reference plus N, and let d exclude the noise term m·n of the same sample; m is
-slip_gain and c is return_rate. Then this noise acts in one period alone: v is the target rate for r′ + c(N − n) in
-place of r′, a value in [0, max r′ + 2cN]; the reference moves up to 2cNT less than T times this value; U is m·n larger.
-Where the innovation is limited, it adds between −mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, and never less than the
-unlimited innovation would; otherwise d contains no noise. Initially e1 = N and d = 0, as x⁻ (the slip measured one
-sample before) = 0 and the first innovation, n, is not limited. All d from 0 to m·N are required to lie in the polytope.
+is 0. Let e1 = x1 − r + N, and let d exclude the noise term m·n of the same sample; m is slip_gain and c is return_rate.
+Then this noise acts in one period alone: v is the target rate for r′ + c(N − n) in place of r′, a value in [0, max r′ +
+2cN]; the reference moves up to 2cNT less than T times this value; U is m·n larger. Where the innovation is limited, it
+adds between −mTv⁺/2 − m(rest_slip + 2N) and −mTv⁺/2 to d, and never less than the unlimited innovation would; otherwise
+d contains no noise. Initially e1 = N and d = 0, as x⁻ (the slip measured one sample before) = 0 and the first
+innovation, n, is not limited. The check requires more: the states (N, 0, d) with all d from 0 to m·N must lie in the
+polytope.
 
 **Aperiodic sampling.** Each interval between samples is any h from T to T_m; T is a constant of the law. The bound of a
-facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|A(h − s)ds over [0, h]. Here g is its
-response to an impulse, and A(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with the bounds ξ̂, ŷ above as functions of t. A ≥ 0 is
-required up to T_m, also beyond the end of the actual interval, so that one formula of V is valid for all h. g is
-Lipschitz, so V″ ≥ −B almost everywhere, and V is below its chord over Δ plus Δ²B/8: bounds at five intervals suffice,
-with B from |l″|, |g′|A(0), |g|·|A′| and ∫|g|·|A″|. At rest the bound is convex in h, so both ends suffice. A shorter
-period that ends at rest can be extended to T_m, as nothing releases the block in the added time; so the bound for T_m
-of the slip until a stop covers it.
+facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|A(h − s)ds over [0, h]. Here l is the
+part without a, g the response of the facet function to an impulse of a, and A(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with
+the bounds ξ̂, ŷ above as functions of t. A ≥ 0 is required up to T_m, also beyond the end of the actual interval, so
+that one formula of V is valid for all h. g is Lipschitz, so V″ ≥ −B almost everywhere, and V is below its chord over Δ
+plus Δ²B/8: bounds at five intervals suffice, with B from |l″|, |g′|A(0), |g|·|A′| and ∫|g|·|A″|. After the rest map the
+bound is convex in h, so both ends suffice. A shorter period that ends at rest can be extended to T_m, as nothing
+releases the block in the added time; so the bound for T_m of the slip until a stop covers it.
 
 **Peaks.** Between samples y is at most the larger of its initial value and its final value under the largest force, as
 y″ = −wy′ + Sy admits no interior maximum where S ≥ 0, and S⁺ ≥ 0; e1 lies within max r′·T of its values at the samples.
@@ -115,7 +119,7 @@ COMBINATIONS = (
     (2, False, 0, 1),
 )
 LEAST = (0, 0, 2, 2, 4, 5, 5)
-"""The combination with the least r′ of the same slice and sign, whose condition of rest stands for all r′."""
+"""Per combination, that with the least r′ in its slice and for its sign of v: its condition of rest is the weakest."""
 # the rest map also needs the largest r′ of (1, v ≤ 0), c·e1
 _AT_REST = (*zip(LEAST, COMBINATIONS, strict=True), (4, (1, False, 1, 0)))
 Basis = tuple[int, ...]
@@ -144,7 +148,8 @@ class StickSlipPolytope:
     Raises
     ------
     ParameterError
-        When the dimensions do not match.
+        When dimensions do not match, there are too many facets or bases, the first five facets are not along the axes,
+        or a multiplier is out of its range.
     """
 
     facets: tuple[tuple[Fraction, ...], ...]
@@ -418,7 +423,8 @@ def ranges(task: FaultPlant, ahead: Fraction, feedback: Range, moved: Fraction) 
 
     The slip is at most `ahead` [m] beyond the target, and grows by at most `moved` [m] in a period.
 
-    β changes within a period by at most N̂|μ′|/b·`moved`, so σ exceeds S_chord/(bβ) by at most this fraction.
+    β ≥ 1 changes within a period by at most N̂|μ′|/b·`moved`, so |σ| exceeds |S*|/(bβ), S* the chord slope of G for
+    p = p*, by at most this fraction.
 
     Raises
     ------
@@ -449,8 +455,8 @@ def stop_bounds(
 ) -> tuple[tuple[Fraction, Fraction], ...]:
     """Pairs (g, h) with δ ≤ g·y + h for the slip δ [m] until a last stop within a period.
 
-    Upper bounds of the exponentials: (1 − e^{−wm})/w ≤ m − wm²/2 + w²m³/6, (e^{wx} − 1 − wx)/w² ≤ x²/2/(1 − wx/3) and
-    (e^{wx} − 1)/w ≤ x/(1 − wx/2).
+    Upper bounds of the exponentials, τ = θT: (1 − e^{−wτ})/w ≤ τ − wτ²/2 + w²τ³/6, (e^{wx} − 1 − wx)/w² ≤ x²/2/(1 −
+    wx/3) and (e^{wx} − 1)/w ≤ x/(1 − wx/2).
 
     Raises
     ------
@@ -463,11 +469,11 @@ def stop_bounds(
     pairs = []
     for i in range(LINES + 1):
         share = least + (1 - least) * i / LINES
-        m, x = share * step, (1 - share) * step
+        tau, x = share * step, (1 - share) * step
         factor = 1 + plant.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
         if least >= 1 or low * x >= 1 or factor <= 0:
             raise ParameterError("T_s is too long, for this damping and friction slope, to bound the slip until a stop")
-        start = m - low * m**2 / 2 + low**2 * m**3 / 6
+        start = tau - low * tau**2 / 2 + low**2 * tau**3 / 6
         pairs.append((start / factor, amplitude * x**2 / (1 - low * x / 3) / factor))
     return tuple(pairs)
 
@@ -528,7 +534,7 @@ class Period:
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
         """∫h(t)·t^j dt, j = 0 to 3, with h(t) ≥ |g(T − t)| for an impulse response g.
 
-        On a piece of length ℓ, h is the chord of its end values plus ℓ²/8·max|g″|. All integrals use this one function,
+        On a piece of length ℓ, h is the chord of |g| plus ℓ²/8·max|g″|. All integrals use this one function,
         since a factor of a single integral may be negative.
         """
         number, h = self.back.number, self.interval / NODES
@@ -770,7 +776,7 @@ Constraint = tuple[tuple[Fraction, ...], Fraction]
 
 
 def slices(task: FaultPlant, sampled_loop: SampledStickSlip) -> tuple[tuple[Constraint, ...], ...]:
-    """Ends of the three slices: e1 up to 0, from there to max r′/c, r′ with noise, and above."""
+    """Ends of the three slices: e1 up to 0, from 0 to (max r′ + 2cN)/c, and above."""
     threshold, one = (task.reference_rates[0] + sampled_loop.target_noise) / sampled_loop.law.return_rate, Fraction(1)
     up, down = (one, _ZERO, _ZERO), (-one, _ZERO, _ZERO)
     return ((up, _ZERO),), ((down, _ZERO), (up, threshold)), ((down, -threshold),)
@@ -852,10 +858,11 @@ class Verifier:
         return bases, shares
 
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
-        """Upper bounds of c·z + k; where `which` names facets, of the smaller of this and 1 + (c − n)·z + k.
+        """Upper bounds of c·z + k; where `which` names facets n, or that of 1 + (c − n)·z + k if smaller, as n·z ≤ 1.
 
-        The second bound decides where a period changes nothing, as at rest: there the entries of c − n have signs
-        opposite to those of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of its slice.
+        The second bound is the smaller one if a period changes nothing, as at rest: there the entries of c − n have
+        signs opposite to those of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of its
+        slice.
         """
         factors, off = _middles(factors)
         constants, above = _middles(constants)
@@ -954,7 +961,7 @@ def _bracket(task: FaultPlant, sampled_loop: SampledStickSlip, plant: Ranges, fe
     """Largest decrease [m/s²] of the bound H + δS·ξ + δw·y of |a| if ξ, y and U belong to different β (*Input gain*).
 
     If this decrease is below H, the bound of |a| is not negative at either end of β, also where the response of a facet
-    changes sign between them. For aperiodic sampling all of U counts, over the longest interval.
+    changes sign between them. For aperiodic sampling it is the decrease by all of U (β from 0) in the longest interval.
     """
     step, growth = sampled_loop.longest, 1 / (1 - plant.slope[1] * sampled_loop.longest**2 / 2)
     width, damping = (plant.slope[1] - plant.slope[0]) / 2, (plant.damping[1] - plant.damping[0]) / 2

@@ -1,7 +1,8 @@
-"""Sample space of a campaign, and pattern search for the worst sample.
+"""Sample space of a campaign, and compass search for the worst sample.
 
-Samples are points of a scrambled Sobol' sequence, a function of seed and index alone. The pattern search (Hooke and
-Jeeves 1961) starts from given points and all corners of the box. The worst value found is a lower bound.
+Samples are points of a scrambled Sobol' sequence, a function of seed and index alone. The compass search (pattern
+search without pattern moves) starts from given points and all corners of the box. The worst value found is a lower
+bound.
 """
 
 import math
@@ -180,7 +181,7 @@ def search(
     noise_seed: int,
     rounds: int,
 ) -> WorstSample:
-    """Worst sample by pattern search (Hooke and Jeeves 1961) from given points and all corners, evaluated in batches.
+    """Worst sample by compass search from given points and all corners, evaluated in batches.
 
     Every round evaluates all neighbours of the worst point so far; if none of these is worse, the span is halved. All
     samples have the same noise, so that they differ in their point alone.
