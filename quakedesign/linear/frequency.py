@@ -83,7 +83,7 @@ class FrequencyFacts:
 
 
 def frequency_properties(loop: FeedbackLoop, corner: Vertex) -> FrequencyFacts:
-    """Margins of the loop gain L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and closed-loop norms at a vertex."""
+    """Margins of the loop L(z) = βb(k2z³ + k1z² + k3z + k4)/(z²(z² + wz − s)) and closed-loop norms at a vertex."""
     beta, slip, rate = corner
     k1, k2, k3, k4 = loop.gains
     closed = [float(c) for c in characteristic(loop.matrix(corner))[1:]]
