@@ -444,7 +444,7 @@ def _follow_parent() -> None:
 
 
 # ----------------------------------------------------------------------
-# Executors of many tasks: this process, other processes of this machine, a cluster, any `concurrent.futures` executor.
+# Executors of many tasks: this process, other local processes, a cluster, any `concurrent.futures` executor.
 
 _CONNECTION_TIMEOUT = "10s"
 
@@ -595,7 +595,7 @@ class Cluster(UserExecutor):
             said = " ".join(str(error).split()) or type(error).__name__
             raise SimulationError(
                 f"workers of the cluster must live until their tasks are done. Received: {said.rstrip('.')}. Give "
-                "them more memory, or omit scheduler to use processes of this machine."
+                "them more memory, or omit scheduler to use local processes."
             ) from None
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

@@ -291,7 +291,7 @@ def to_statespace(
     if unknown := setup.given().keys() - {"step", "delay", "lag", "diffusion"}:
         raise ParameterError(
             f"to_statespace takes only step, delay, lag and diffusion of the loop setup. Received "
-            f"{', '.join(sorted(unknown))}. Omit these."
+            f"{', '.join(sorted(unknown))}. Omit these arguments."
         )
     if setup.delay and setup.step is None:
         raise ParameterError("delay requires discrete time. Received a delay without a step. Give step.")

@@ -219,7 +219,7 @@ def campaign_problem(
         if load not in (None, Load()) or initial_slip or initial_slip_rate:
             raise ParameterError(
                 "load, initial_slip and initial_slip_rate do not apply to friction with a state. Received one of "
-                f"these with {fault.friction.name}. Omit these; use stress for a disturbance."
+                f"these with {fault.friction.name}. Omit these arguments; use stress for a disturbance."
             )
         space = sliding_space(fault, rational(spread, "spread"))
         solver = "cvodes" if method == DormandPrince.name else method
