@@ -462,21 +462,21 @@ def test_the_name_of_a_class_and_of_a_file_occurs_once():
 
 BUDGETS = {
     "fault": 3246,
-    "symbolic": 3196,
+    "symbolic": 3190,
     "sos": 6372,
-    "laws": 3136,
-    "loop": 4209,
+    "laws": 3135,
+    "loop": 4195,
     "plant": 1477,
-    "guarantees": 13590,
+    "guarantees": 13575,
     "lyapunov": 7066,
     "linear": 2417,
     "synthesis": 1981,
-    "rocq": 853,
+    "rocq": 849,
     "simulation": 9797,
     "identification": 4054,
-    "studies": 4182,
-    "report": 4162,
-    "cli": 3588,
+    "studies": 4154,
+    "report": 4158,
+    "cli": 3573,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

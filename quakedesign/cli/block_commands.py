@@ -7,17 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from quakedesign.cli.app import app, new_file, progress
-from quakedesign.cli.options import (
-    PLAIN,
-    Box,
-    ExactSeconds,
-    FaultName,
-    Force,
-    Output,
-    Shaking,
-    Whole,
-    changed_options,
-)
+from quakedesign.cli.options import PLAIN, Box, ExactSeconds, FaultName, Force, Output, Shaking, Whole, changed_options
 from quakedesign.errors import ParameterError, UnknownNameError, require_known
 from quakedesign.exact import LowerBound, UpperBound, rational
 from quakedesign.files import Json, lock_folder, made_folder, require_writable
@@ -138,7 +128,7 @@ def _scope(proof: Any, chain: "BlockChain") -> list[str]:
     if chain.has_state:
         return [
             "log state: ln(θV/D_c), θ the friction state, V the reference slip rate; pull: shear stress by springs and "
-            "wells [MPa]; y in |y|: a log state or a pull; load of a pressure: the planned pressure",
+            "wells [MPa]; y in |y|: a log state or a pull; load of a pressure: the planned pressure"
         ]
     if (far := farthest_balance(chain, proof)) is not None:
         meant = (

@@ -247,12 +247,7 @@ _FIGURES_AS_USUAL = DesignOptions()
 
 @app.command
 def compare(
-    fault: FaultName,
-    /,
-    *,
-    options: DesignOptions = _FIGURES_AS_USUAL,
-    verbose: bool = False,
-    output: Output = PLAIN,
+    fault: FaultName, /, *, options: DesignOptions = _FIGURES_AS_USUAL, verbose: bool = False, output: Output = PLAIN
 ) -> int:
     """Do the same as `design`, but only print the comparison; no files are written.
 

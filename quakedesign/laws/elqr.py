@@ -75,10 +75,9 @@ class ExtendedLQR(Controller):
         return tuple(rate + back * excess for rate, back in zip(rates, self._back_calculation_gains(), strict=True))
 
     def _unlimited_pressure(self, signals: Signals) -> sp.Expr:
-        ends = {
-            "error": (signals.slip_error, signals.slip_rate_error),
-            "state": (signals.slip, signals.slip_rate),
-        }[self.feedback]
+        ends = {"error": (signals.slip_error, signals.slip_rate_error), "state": (signals.slip, signals.slip_rate)}[
+            self.feedback
+        ]
         commanded = -sum(k * x for k, x in zip(self._exact_gains(), (*ends, *signals.integrals), strict=True))
         return commanded + to_sympy(self.offset) if self.offset else commanded
 

@@ -12,15 +12,7 @@ from typing import Literal
 from quakedesign.arguments import checked_dataclass
 from quakedesign.errors import ParameterError
 from quakedesign.exact import apart, shortly
-from quakedesign.laws.sampled_law import (
-    NOISES,
-    LinearLaw,
-    Matrix,
-    NominalModel,
-    Row,
-    require_sizes,
-    steady_states,
-)
+from quakedesign.laws.sampled_law import NOISES, LinearLaw, Matrix, NominalModel, Row, require_sizes, steady_states
 from quakedesign.loop.diffusion_path import MODES, DiffusionPath
 from quakedesign.loop.periodic import EVEN, Fading, Instants, PeriodicLoop, Pulse, Segment
 from quakedesign.loop.signals import Interconnection, Signal

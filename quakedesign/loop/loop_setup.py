@@ -153,9 +153,7 @@ class LoopSetup:
     """
 
     step: Fraction | None = quantity(
-        "s",
-        "Sampling time T_s, such as '184 ms' or 7/50 (s); the fault's unless given.",
-        None,
+        "s", "Sampling time T_s, such as '184 ms' or 7/50 (s); the fault's unless given.", None
     )
     measured: str = MEASURED[0]
     delay: Fraction = quantity("s", "Delay from the measurement to the pressure at the valve.")
@@ -164,8 +162,7 @@ class LoopSetup:
         "Time constant of the lag from valve to fault, or to the well of a diffusion path; a designed e-LQR models it.",
     )
     diffusion: Fraction = quantity(
-        "s",
-        "L^2/D of the diffusion path between well and fault; a designed e-LQR models it.",
+        "s", "L^2/D of the diffusion path between well and fault; a designed e-LQR models it."
     )
     slip_noise: Fraction = quantity(
         "m",
@@ -184,8 +181,7 @@ class LoopSetup:
         "stick.",
     )
     jitter: Fraction = quantity(
-        "s",
-        "Largest timing error of a measurement and its pressure, early or late, such as '2 ms'.",
+        "s", "Largest timing error of a measurement and its pressure, early or late, such as '2 ms'."
     )
     delay_jitter: Fraction = quantity("s", "Largest additional timing error of the pressure, early or late.")
     averaging_time: Fraction = quantity(
@@ -205,9 +201,7 @@ class LoopSetup:
         None,
     )
     withdrawal: Fraction | None = quantity(
-        "Pa",
-        "Largest withdrawal below the initial pressure; 0 for a pump that only injects.",
-        None,
+        "Pa", "Largest withdrawal below the initial pressure; 0 for a pump that only injects.", None
     )
     rate_limit: Fraction | None = quantity(
         "Pa/s",

@@ -73,11 +73,7 @@ def _first_sentence(comparison: "Compared", best: "Entry | None") -> str:
 
 
 def guaranteed_sentence(
-    first: str,
-    proof: "FaultProof",
-    earthquake: float | None,
-    magnitude: float,
-    law: str = "",
+    first: str, proof: "FaultProof", earthquake: float | None, magnitude: float, law: str = ""
 ) -> str:
     """The guarantee in a sentence, relative to slip rate [m/s] and magnitude of a natural earthquake.
 

@@ -98,11 +98,7 @@ def _cleared_gram(square: Square, common: int) -> list[list[Fraction]]:
 def _square(square: Square, rows: Iterable[Iterable[Fraction]], common: int) -> IntegerSquare:
     gram = [[int(v * common) for v in row] for row in rows]
     basis = (as_polynomial(b) for b in square.basis)
-    return IntegerSquare(
-        product=square.product,
-        basis=tuple(scaled(b, denominator(b)) for b in basis),
-        gram=gram,
-    )
+    return IntegerSquare(product=square.product, basis=tuple(scaled(b, denominator(b)) for b in basis), gram=gram)
 
 
 # ----------------------------------------------------------------------

@@ -71,12 +71,7 @@ class BlocksResult:
 
 
 def one_block(
-    fault: Fault,
-    blocks: Sequence[int] = range(2, 11),
-    *,
-    wells: str = "one",
-    coupling: Any = None,
-    step: Any = None,
+    fault: Fault, blocks: Sequence[int] = range(2, 11), *, wells: str = "one", coupling: Any = None, step: Any = None
 ) -> BlocksResult:
     """Guarantees for a fault divided into blocks, as a check whether one block is an adequate model.
 

@@ -16,13 +16,7 @@ from quakedesign.exact import Enclosure, rational
 from quakedesign.fault import Fault, require_fault
 from quakedesign.fault.equilibrium import STEADY_SLIDING
 from quakedesign.files import Json
-from quakedesign.guarantees import (
-    CLASSES,
-    ContinuousProof,
-    FaultProof,
-    Guarantee,
-    with_worst_case,
-)
+from quakedesign.guarantees import CLASSES, ContinuousProof, FaultProof, Guarantee, with_worst_case
 from quakedesign.guarantees.stick_slip_result import stick_slip_with_worst_case
 from quakedesign.guarantees.tracking_result import given_law_with_worst_case
 from quakedesign.laws import Controller, published
@@ -241,10 +235,7 @@ def _compared_in_slow_sliding(fault: Fault, designs: Sequence[Design], progress:
 
 
 def designs_of(
-    fault: Fault,
-    names: Iterable[str],
-    progress: Tell,
-    options: Mapping[str, Any] | None = None,
+    fault: Fault, names: Iterable[str], progress: Tell, options: Mapping[str, Any] | None = None
 ) -> Iterator[Design]:
     """Designs of the named laws, one after the other, with options of `quakedesign.design`."""
     listed = list(names)
@@ -364,10 +355,7 @@ def shortfall(run: "Trajectory", fault: Fault) -> str | None:
     if least > needed.low + margin:
         end, lack = needed.low.quantity("Pa"), f"never falls below {_mega(least)}" if least < 0 else "never withdraws"
     elif largest < needed.high - margin:
-        end, lack = (
-            needed.high.quantity("Pa"),
-            "never injects" if largest <= 0 else f"never exceeds {_mega(largest)}",
-        )
+        end, lack = (needed.high.quantity("Pa"), "never injects" if largest <= 0 else f"never exceeds {_mega(largest)}")
     else:
         return None
     return f"falls short of its task: the reference needs {end} at equilibrium, and this run {lack}"

@@ -134,13 +134,7 @@ def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]
 
 
 def _row(
-    fault: Fault,
-    origin: str,
-    law: Controller,
-    scheme: str,
-    bound: Fraction | None,
-    duration: float | None,
-    tell: Tell,
+    fault: Fault, origin: str, law: Controller, scheme: str, bound: Fraction | None, duration: float | None, tell: Tell
 ) -> SchemeRow:
     label = f"{law.title}{f', λ {float(law.scale):.3g}' if law.scale is not None else ''}"
     label = f"{law.title}, published" if origin == "published" else label

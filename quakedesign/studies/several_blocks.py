@@ -26,12 +26,7 @@ from quakedesign.lyapunov.exact.claim import Verdict
 from quakedesign.plant import UncertainPlant, uncertain_plant
 from quakedesign.plant.block_plant import inverse_of
 from quakedesign.simulation.block_run import MPA, SUBSTEPS, BlockRun, simulate_blocks, whole_periods
-from quakedesign.simulation.coupled_sliders import (
-    BlockEvent,
-    SlidersRun,
-    natural_cycles,
-    simulate_sampled_blocks,
-)
+from quakedesign.simulation.coupled_sliders import BlockEvent, SlidersRun, natural_cycles, simulate_sampled_blocks
 from quakedesign.simulation.earthquake import STILL, event_nudge
 from quakedesign.simulation.state_plant import TIDE
 from quakedesign.studies.block_limits import chain_limits

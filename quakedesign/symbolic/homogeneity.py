@@ -134,9 +134,7 @@ def dilate(expression: sp.Expr, weights: Weights, factor: sp.Expr = epsilon) -> 
 
 
 def homogeneous(
-    subject: sp.Expr | Mapping[sp.Symbol, sp.Expr],
-    weights: Weights,
-    degree: int | sp.Rational | None = None,
+    subject: sp.Expr | Mapping[sp.Symbol, sp.Expr], weights: Weights, degree: int | sp.Rational | None = None
 ) -> Homogeneity:
     """Degree of homogeneity with a proof, or an exact counterexample.
 

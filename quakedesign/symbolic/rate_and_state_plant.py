@@ -336,8 +336,7 @@ def sliding_errors(law: FrictionLaw) -> SlidingErrors:
     change = law.coefficient(0, rate, state) - law.steady_coefficient(sliding_rate)
     moved = law.state_rates(0, rate, state)[0] / state
     return SlidingErrors(
-        friction_change=_tidy_sliding(change),
-        log_state_rate=sp.simplify(sp.expand_log(sp.simplify(moved), force=True)),
+        friction_change=_tidy_sliding(change), log_state_rate=sp.simplify(sp.expand_log(sp.simplify(moved), force=True))
     )
 
 

@@ -85,10 +85,7 @@ def value(term: Term, parameters: Mapping[str, Fraction]) -> Fraction:
 
 
 def cell_polynomial(
-    terms: Iterable[Term],
-    weights: Mapping[str, int],
-    signs: Mapping[str, int],
-    parameters: Mapping[str, Fraction],
+    terms: Iterable[Term], weights: Mapping[str, int], signs: Mapping[str, int], parameters: Mapping[str, Fraction]
 ) -> dict[tuple[int, ...], Fraction]:
     """Polynomial of a sum of terms on a sign cell, in the variables u_i ≥ 0 with x_i = s_i·u_i^{r_i}.
 

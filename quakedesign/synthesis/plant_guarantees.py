@@ -51,7 +51,7 @@ def guarantee_plant(
         seen = np.abs(np.array(behind.C, dtype=float) @ mode).max() > _UNSEEN
         return NoProof(
             reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
-            f"steepest the states ({shape}) grow by a factor of {radius:.4g} a sample",
+            f"steepest the states ({shape}) grow by a factor of {radius:.4g} a sample"
         )
     proof = plant_guarantee(behind, exact)
     return replace(proof, notes=notes) if proof.available else proof

@@ -200,12 +200,7 @@ def _tracking_entries(claim: TrackingProof | ContinuousProof) -> Any:
     )
     return written(
         TrackingFile(
-            **task,
-            loop=loop,
-            start=start,
-            slow_gain=claim.varying_gain,
-            reach=claim.invariant_set,
-            claims=claim.claims,
+            **task, loop=loop, start=start, slow_gain=claim.varying_gain, reach=claim.invariant_set, claims=claim.claims
         )
     )
 
@@ -242,10 +237,7 @@ def _read_tracking(raw: Json) -> TrackingProof | ContinuousProof:
     apart = "asked" in loop.outputs
     need(apart or claims.least_asked is None, "claims on the valve pressure need a lag or a diffusion path")
     counted = "stepped" in loop.outputs
-    need(
-        counted or claims.largest_step is None,
-        "largest_step may be claimed only with jitter or a pump rate",
-    )
+    need(counted or claims.largest_step is None, "largest_step may be claimed only with jitter or a pump rate")
     need(not paced or claims.largest_step is not None, "a pump rate needs the claim largest_step")
     need(
         not (pumped and apart) or claims.least_asked is not None,

@@ -11,14 +11,7 @@ from scipy.linalg import expm
 from quakedesign.errors import ParameterError
 from quakedesign.exact import UpperBound, rational
 from quakedesign.guarantees.exact.plant_loop import LinearPart, MatrixLaw, PlantLoop, ResponseBounds, response_bounds
-from quakedesign.guarantees.exact.plant_proof import (
-    MOST_PIECES,
-    PlantClaims,
-    PlantProof,
-    named,
-    peaks,
-    row_bounds,
-)
+from quakedesign.guarantees.exact.plant_proof import MOST_PIECES, PlantClaims, PlantProof, named, peaks, row_bounds
 from quakedesign.guarantees.exact.proof import NoProof
 from quakedesign.guarantees.exact.tracking_proof import MARGIN, above
 from quakedesign.plant.plant_values import Row

@@ -62,7 +62,7 @@ def sliding_block_guarantee(
             return NoProof(
                 reason="no law is found whose loop decays fast enough: with fewer wells than blocks, modes that no "
                 "well reaches must decay within some 60 T_s. Run limits, which says whether wells are missing; "
-                "else lengthen T_s",
+                "else lengthen T_s"
             )
         reason = f"no self-consistent bounds of slip rate and state: small gain {small:.3g}. Reduce the stress"
         return NoProof(reason=reason, small_gain=UpperBound(rational(f"{small:.6g}")))
