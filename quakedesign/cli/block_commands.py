@@ -53,7 +53,7 @@ def blocks(
         Stiffness of the springs between blocks divided by the mass of a block, in 1/s^2; by default that of elastic
         strips, G·blocks²/(ρL²), with shear modulus G, density ρ and length L of the fault.
     step
-        Sampling time T_s; the fault's by default.
+        Sampling time T_s, such as '184 ms'; the fault's by default.
     out
         Folder for the certificate files, one for each number of blocks that has a proof.
     """

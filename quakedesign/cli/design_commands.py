@@ -167,7 +167,7 @@ def design(
     Without --continuous, every designed controller runs as guaranteed: sampled, with a zero-order hold over T_s. Exit
     code 0 if every design is proved at the fault's T_s and no run of a designed controller is an earthquake, diverges
     or opens the fault; with --continuous, the premises control_coefficient, along_reference and friction_slope must
-    hold too. Exit code 1 otherwise.
+    hold too. Exit code 1 otherwise. Give quantities with a unit, such as '20 ms', or as numbers in SI units.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def compare(
 ) -> int:
     """Do the same as `design`, but only print the comparison; no files are written.
 
-    Exit code as for `design`.
+    Exit code and units as for `design`.
 
     Parameters
     ----------
@@ -296,7 +296,8 @@ def figures(
 ) -> int:
     """Draw the paper's figures of simulations for any fault, with published and designed gains.
 
-    Writes the folder of `design`, these figures, and their numbers in numbers.csv and results.json.
+    Writes the folder of `design`, these figures, and their numbers in numbers.csv and results.json. Units of quantities
+    as for `design`.
 
     Parameters
     ----------

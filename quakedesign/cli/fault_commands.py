@@ -100,8 +100,8 @@ def scale(
     controller
         cta, dia or elqr.
     gains
-        published, or the numbers of the gains (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, p the
-        pressure, μ_res the residual friction coefficient, N̂_min the smallest A/m of the source).
+        published, or the numbers of the gains in SI units (of a sliding mode: with scale λ = 1 and control ν =
+        p·μ_res·N̂_min, p the pressure, μ_res the residual friction coefficient, N̂_min the smallest A/m of the source).
     clock
         Time scale from operation-time or natural-period; by default operation-time, or natural-period if the ratio of
         the operation times differs from that of the natural periods.
@@ -226,8 +226,8 @@ def identify(
     data
         Text with headings and units, such as 'time [s], load_point_displacement [um], shear_stress [MPa],
         normal_stress [MPa]' (load_point_rate, shear_force, normal_force, friction and slip are accepted too), with any
-        column separator; or text or reduced binary of xlook; or vectors of a MATLAB file. A column weight (1/variance
-        of friction, in any unit) weights the samples.
+        column separator; or text or reduced binary of xlook; or vectors of a MATLAB file. A column weight,
+        proportional to 1/variance of the friction coefficient, weights the samples.
     more
         Further files, each with one velocity step of the same experiment. Each step is fitted alone; then one law is
         fitted to all steps.

@@ -228,7 +228,8 @@ def gain_map(
     points
         Grid points along each axis.
     degree
-        Degree of the Lyapunov functions; by default the lowest that proves --gains at the lowest level.
+        Degree of the Lyapunov functions; by default the lowest for which --gains at the lowest level pass the screening
+        with a clear margin, else the lowest.
     interior
         Number of random inner points for which a proof is sought.
     seed

@@ -72,6 +72,7 @@ def guarantee(
     disturbance of the class, from rest or from bounded initial errors, for all t >= 0. For rate-and-state faults they
     hold during the slip of the task, which begins in steady sliding. The controller is designed for the loop setup
     unless gains are given. Exit code 0 only if every fault has a proof.
+    Give quantities with a unit, such as '20 ms', or as numbers in SI units.
 
     Parameters
     ----------
@@ -81,13 +82,14 @@ def guarantee(
         Of a design. peak: the smallest certified slip rate (plant without stick: slip-rate error). tracking: a smaller
         slip error under a drifting disturbance, with a somewhat larger slip rate.
     gains
-        k1 to k4 of an e-LQR, whose integral is a sum over the samples; by default a law is designed with an estimate of
-        the disturbance instead of integral action. Of a sliding mode: base gains (λ = 1); the command chooses λ.
+        k1 to k4 of an e-LQR in SI units, whose two integrals are sums over the samples; by default a law is designed
+        with an estimate of the disturbance instead of integral action. Of a sliding mode: base gains (λ = 1); the
+        command chooses λ.
     law
         File of a user-defined sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
-        Sliding modes: stick-slip (default), or compensated on the plant without stick; no other scheme has a guarantee.
-        The e-LQR uses the scheme explicit.
+        Sliding modes: stick-slip on the stick-slip plant or compensated on the plant without stick, by default that of
+        the plant of the guarantee; no other scheme has one. The e-LQR uses the scheme explicit.
     measured
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
         differentiator (implicit, n_d = 2, any n_f), for which the smallest λ_d is printed.
@@ -232,7 +234,9 @@ def limits(
     The limits are the smallest slip-rate error (plant without stick) and slip rate (stick-slip plant), the longest T_s,
     delay and diffusion time, the largest distance of a well and the smallest withdrawal. Beyond a limit every
     controller fails for some disturbance of at most the given amplitude and, for slip weakening, some friction law of
-    the box.
+    the box. The distance of a well is for the diffusivity --diffusivity, 1 m^2/s by default. Delay, lag, diffusion,
+    timing errors and pump are those of the proved designs; with noise the limit on the slip-rate error is larger.
+    Give quantities with a unit, such as '20 ms', or as numbers in SI units.
 
     Parameters
     ----------
@@ -241,8 +245,7 @@ def limits(
         planned pressure. By default the effective normal stress, of several blocks the smallest. --withdrawal and the
         other options of the pump are for the proved designs alone.
     setup_options
-        Loop setup of the proved designs. The diffusivity, 1 m²/s by default, also gives the farthest well; with noise
-        the limit on the slip-rate error is larger.
+        Loop setup of the proved designs.
     stress
         Rate-and-state faults (limits of the plant linearised about slow sliding): bound of the shear stress
         disturbance, such as '25 kPa'; by default about the largest with a guarantee. For several blocks there is no

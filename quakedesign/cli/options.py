@@ -239,20 +239,22 @@ class LawOptions:
     controller
         cta, dia or elqr, or a user-defined law as module:Class; none (not for export): a run without control.
     gains
-        published, designed (for the T_s of the command and, for an e-LQR, its delay, lag and diffusion), continuous
-        (designed in continuous time), or the numbers of the gains in SI units (of a sliding mode: with scale λ = 1 and
-        control ν = p·μ_res·N̂_min, p the pressure, μ_res the residual friction coefficient, N̂_min the smallest A/m of
-        the box). Rate-and-state faults: always designed, for T_s and the diffusion path alone.
+        published, designed (for the T_s, delay, lag and diffusion path of the command), continuous (designed in
+        continuous time), or the numbers of the gains in SI units (of a sliding mode: with scale λ = 1 and control ν =
+        p·μ_res·N̂_min, p the pressure, μ_res the residual friction coefficient, N̂_min the smallest A/m of the box).
+        Rate-and-state faults: always designed, in simulate for T_s and the diffusion path, in campaign for the fault's
+        T_s, the diffusion path, --spread and --stress.
     scale
         Scale λ of a sliding mode, decimal or p/q; replaces that of --gains.
     feedforward
         none, nominal or centred: feed-forward of a sliding mode from the plant model; not with designed gains.
     certificate
-        Certificate file that guarantee --out wrote; it replaces the options above. The law runs with the T_s, pressure
-        limit at rest, noise, delay, lag and diffusion path of the file. Runs in slow sliding have a sinusoidal shear
-        stress of the certified amplitude; in simulate and campaign, --stress replaces this amplitude.
+        Certificate file that guarantee --out wrote; it replaces --controller, --gains, --scale and --feedforward. The
+        law runs with the T_s, pressure limit at rest, noise, delay, lag and diffusion path of the file. In slow sliding
+        simulate applies a sinusoidal shear stress of the certified amplitude, and campaign of at most this amplitude;
+        --stress replaces it.
     law
-        File of a user-defined sampled linear law (.json or .npz, see SampledLaw.load) instead of the options above.
+        File of a user-defined sampled linear law (.json or .npz, see SampledLaw.load) instead of these options.
     """
 
     controller: str = "cta"
@@ -318,8 +320,9 @@ class RunOptions:
         with the law evaluated in every stage of the integrator. By default continuous in simulate and explicit in
         campaign. Designed laws have their own scheme.
     method
-        Integrator: dormand-prince or rk4; with --plant printed also cvodes or idas. Rate-and-state faults: radau (by
-        default), dop853, cvodes or idas without control; cvodes (by default) or idas with control.
+        Integrator: dormand-prince or rk4; in simulate with --plant printed, and not for sliding modes, also cvodes or
+        idas. Rate-and-state faults: radau (by default), dop853, cvodes or idas without control; cvodes (by default) or
+        idas with control.
     plant
         stick-slip (by default; friction holds the fault at rest) or printed (the paper's plant, without stick).
         Rate-and-state faults never rest: smooth or quasi-dynamic (without inertia), by default smooth for one block and
@@ -327,8 +330,9 @@ class RunOptions:
     step
         Sampling time T_s, or integration step of the scheme continuous; the fault's T_s by default.
     duration
-        Duration of the run; the operation time by default. If neither a controller nor a duration is given, the run of
-        a slip-weakening fault is its natural earthquake, without disturbance and with an automatically chosen duration.
+        Duration of the run; the operation time by default. In simulate, if neither a controller nor a duration is
+        given, the run of a fault whose friction has no state is its natural earthquake, without disturbance and with an
+        automatically chosen duration.
     substeps
         Integrator steps per sample.
     drift
@@ -426,7 +430,8 @@ class WellOptions:
         str | None,
         Parameter(
             converter=_exact_reader("m"),
-            help="Distance between well and fault, such as '40 m'. Give it with --diffusivity, instead of --diffusion.",
+            help="Distance between well and fault, such as '40 m', instead of --diffusion. Give --diffusivity too; in "
+            "limits it is 1 m^2/s by default.",
         ),
     ] = None
     diffusivity: Annotated[

@@ -200,7 +200,9 @@ def sos(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Decide whether a polynomial is a sum of squares, with a proof. Exit code 0 only if it is proved to be one.
+    """Decide whether a polynomial is a sum of squares or, with --on or --multiplier, has such a proof of positivity.
+
+    Exit code 0 only if this is proved.
 
     Parameters
     ----------
@@ -282,16 +284,17 @@ def attraction(
     ----------
     field
         TOML file with a table [field]: the rate of every state, such as x = "-y" and y = "x + (x^2 - 1)*y", as a
-        polynomial that vanishes at the origin. A line V = "..." before this table is optional. By default V = x'Px with
-        A'P + PA = -I for the linearised field x' = Ax; with --everywhere a V of degree 2 or 4 is searched for.
+        polynomial that vanishes at the origin. A line V = "..." before this table is optional. By default V = x^T P x
+        with A^T P + P A = -I, A the Jacobian of the field at the origin; with --everywhere a V of degree 2 or 4 is
+        searched for.
     everywhere
         Prove global convergence. If that fails, look for a refutation: a point that refutes the given V or, without a
         given V, a second equilibrium, which refutes every V.
     relative
         Relative width of the last bisection interval, from 1e-6 to below 1.
     degree
-        Also search for V of at most this even degree, to enlarge the sublevel set of --shape that lies in the proved
-        region of attraction.
+        Also search for V of at most this even degree (or that of the given V, if higher), to enlarge the sublevel set
+        of --shape that lies in the proved region of attraction.
     shape
         Positive definite polynomial, such as "x^2 + 2*y^2": proves the largest b whose sublevel set shape <= b lies in
         the proved region. With --degree the default is the sum of squares of the states.

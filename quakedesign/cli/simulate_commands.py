@@ -236,24 +236,24 @@ def sampling(
 ) -> int:
     """Show effects of sampling on a law and on the published laws: errors by scheme, orders of accuracy, sensitivities.
 
-    Runs are on the plant without stick. Errors are evaluated after the first quarter of a run; for the orders of
-    accuracy, in the second half of shorter runs. Runs with noise last 1/16 of the duration. Writes results.json and
-    figures.
+    Runs are on the plant without stick. Errors are evaluated after the first quarter of a run, or of the task if that
+    is shorter; for the orders of accuracy, in the second half of shorter runs. Runs with noise last 1/16 of the
+    duration. Writes results.json and figures.
 
     Parameters
     ----------
     controller
         cta, dia or elqr.
     gains
-        designed or continuous (both: designed in continuous time), published, or the numbers of the gains (of a sliding
-        mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, p the pressure, μ_res the residual friction coefficient,
-        N̂_min the smallest A/m of the box).
+        designed or continuous (both: designed in continuous time), published, or the numbers of the gains in SI units
+        (of a sliding mode: with scale λ = 1 and control ν = p·μ_res·N̂_min, p the pressure, μ_res the residual friction
+        coefficient, N̂_min the smallest A/m of the box).
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes
         Schemes of the runs.
     duration
-        Duration of the runs; the operation time by default.
+        Duration of the runs, such as '1 hour' or in s; the operation time by default.
     out
         Output folder; ./quakedesign-FAULT-sampling by default.
     """
@@ -306,9 +306,11 @@ def export(
     Parameters
     ----------
     step
-        Sampling time T_s of the exported controller, for which gains are also designed; the fault's by default.
+        Sampling time T_s of the exported controller, such as '184 ms', for which gains are also designed; the fault's
+        by default.
     scheme
-        explicit (default), implicit, semi-implicit, compensated or stick-slip.
+        explicit (default), implicit, semi-implicit, compensated or stick-slip. Designed laws, and those of a
+        certificate, have their own scheme.
     fmu
         Also write controller.fmu for co-simulation (FMI 2.0).
     out

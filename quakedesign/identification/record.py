@@ -170,7 +170,7 @@ def _weighted(given: dict[str, ndarray]) -> tuple[dict[str, ndarray], list[str]]
     if np.any(weight < 0) or np.sum(weight > 0) < 2:
         raise RecordError(
             f"weight must be positive, or 0 for excluded samples. Received {np.min(weight):.6g} to "
-            f"{np.max(weight):.6g}. Write 1/variance of friction, in any unit."
+            f"{np.max(weight):.6g}. Write values proportional to 1/variance of friction."
         )
     given = {name: column[weight > 0] for name, column in given.items()}
     lost = f"{int(np.sum(weight == 0))} samples of weight 0 excluded"

@@ -37,8 +37,8 @@ COLUMNS = (
 )
 FOOTNOTE = (
     "On trajectory: largest |Δh/Δt| of the perturbation h, divided by the bound of the certificate (λ·L̄); a dash: no "
-    "certificate here. Certificates are for continuous time: none covers the errors of a scheme, and the compensated "
-    "scheme has an estimate in place of the law's integral state."
+    "certificate, a law that needs none (e-LQR), or a run that diverged. Certificates are for continuous time: none "
+    "covers the errors of a scheme, and the compensated scheme has an estimate in place of the law's integral state."
 )
 
 
@@ -61,7 +61,8 @@ def print_sampling(report: SamplingReport, console: Console) -> None:
     console.print(_table(COLUMNS, [row_cells(row) for row in report.rows], WIDTHS), soft_wrap=False)
     for row in report.rows:
         if not row.run.outcome.harmless:
-            console.print(f"{row.label}, {row.scheme}: {dict(row.run.events)}")
+            events = ", ".join(f"{name.replace('_', ' ')} at {t:.4g} s" for name, t in row.run.events.items())
+            console.print(f"{row.label}, {row.scheme}, first occurrences: {events}")
     console.print(FOOTNOTE)
     for name, study in report.studies.items():
         console.print()

@@ -43,8 +43,8 @@ from quakedesign.sos.exact.work_budget import limited
 # V = Σ bᵀQb and μ·(−V̇) = Σ σ_0 + (level − V)·Σ σ_1 with every Q positive definite and a polynomial μ whose
 # coefficients show that it is positive. If the bases of the squares of V contain a pure power of every state, V is
 # positive except at the origin and radially unbounded. If the bases of σ_0 and σ_1 contain a pure power of every state,
-# V̇ < 0 where V < level, except at the origin. Then {V < level} is bounded and invariant, and every solution in it tends
-# to zero.
+# V̇ < 0 where V < level, except at the origin. Then {V < level} is bounded and invariant, and every solution in it
+# tends to zero.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,10 @@ class Attraction:
         if len(self.field) != size:
             raise PolynomialError(f"a field of {size} states needs {size} polynomials. Received {len(self.field)}.")
         if origin in self.lyapunov or any(origin in f for f in self.field):
-            raise PolynomialError("V and the field must vanish at the origin. Received a constant term. Shift them.")
+            raise PolynomialError(
+                "V and the field must vanish at the origin. Received a constant term. Subtract V(0) from V, and choose "
+                "coordinates in which the equilibrium is the origin."
+            )
         if self.level is not None and self.level <= 0:
             raise PolynomialError(f"a level must be positive. Received {self.level}.")
 
@@ -134,7 +137,7 @@ class Attraction:
 
     @property
     def equilibrium(self) -> bool:
-        """Whether the field vanishes at the refuting point, so that the claim fails for every V."""
+        """Whether the field vanishes at the refuting point: it refutes every V, in a claim about the whole space."""
         point = self.refutation
         return point is not None and not any(evaluate(f, point.coordinates) for f in self.field)
 
@@ -331,11 +334,11 @@ def text(claim: Attraction) -> str:
     Raises
     ------
     CertificateError
-        When there is no proof.
+        When there is neither a proof nor a refutation.
     """
     proof = claim.proof
     if proof is None:
-        raise CertificateError("only a proof can be saved. Received an undecided answer.")
+        raise CertificateError("only a proof or a refutation can be saved. Received an undecided claim.")
     entries = made(
         AttractionEntries,
         claim,

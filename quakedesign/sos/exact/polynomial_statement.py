@@ -72,7 +72,7 @@ class Statement:
 
     @cached_property
     def structure(self) -> Structure:
-        """Statement without the coefficients of the target; the blocks depend on this part only."""
+        """Statement without the coefficients of the target; the reduced bases depend on this part only."""
         inequalities, equalities = (tuple(tuple(p.items()) for p in g) for g in (self.inequalities, self.equalities))
         return len(self.variables), frozenset(self.target), self.degree, self.products, inequalities, equalities
 
@@ -108,7 +108,7 @@ class Statement:
 
     @cached_property
     def dense(self) -> bool:
-        """Whether the set is ℝⁿ or an orthant; a multiplier may then vanish on a subset of measure zero."""
+        """Whether at most signs of variables are constrained; a multiplier may then vanish on a set of measure 0."""
         return not self.equalities and all(self.is_variable(g) for g in self.inequalities)
 
     @cached_property

@@ -46,14 +46,14 @@ from quakedesign.sos.solve.program import NoSolution, Program
 
 _SEED = 20240609
 _DIRECTIONS, _REFINED, _STARTS = 300, 3, 30  # directions per state, refined directions, starts for equilibria
-_NEAR = 1e-3  # distance of the point in a direction in which V does not decrease near the origin
+_NEAR = 1e-3  # distance from the origin of the point tried on a ray along which V̇ is not negative near the origin
 _PRECISE = {"xatol": 1e-12, "fatol": 1e-14, "maxiter": 200}
 _TOLERANCES = (1e-3, 1e-7, 1e-12)  # relative tolerances of the fractions tried for a point
 _BEYOND = (0.0, 1e-10, 1e-7, 1e-4)  # relative distance by which a point is moved outward
 
 
 class _Rays:
-    """V, and V̇ or another polynomial, along rays from the origin, in powers of the distance."""
+    """A function (V or a shape) at the first points on rays from the origin where a polynomial is not negative."""
 
     def __init__(self, size: int, lyapunov: Polynomial, rate: Polynomial) -> None:
         self.size = size
@@ -74,13 +74,13 @@ class _Rays:
         )
 
     def heights(self, directions: np.ndarray) -> np.ndarray:
-        """V at the first point with V̇ ≥ 0 in every direction; infinite where there is none."""
+        """The function at the first point of every ray; infinite where there is none."""
         points = self.crossings(directions, self.rate)
         finite = np.isfinite(points).all(axis=1)
         return np.where(finite, self.lyapunov.at(np.where(finite[:, None], points, 0.0)), np.inf)
 
     def height(self, direction: np.ndarray) -> float:
-        """V at the first point with V̇ ≥ 0 in one direction."""
+        """The function at the first point of one ray."""
         return float(self.heights((direction / np.linalg.norm(direction))[None, :])[0])
 
     def sampled(self) -> np.ndarray:
@@ -89,7 +89,7 @@ class _Rays:
         return np.concatenate([random / np.linalg.norm(random, axis=1)[:, None], np.eye(self.size), -np.eye(self.size)])
 
     def lowest(self, directions: np.ndarray) -> list[np.ndarray]:
-        """Refined directions in which V is lowest at the first point with V̇ ≥ 0."""
+        """Refined directions in which the function is lowest at the first point."""
         heights = self.heights(directions)
         order = np.argsort(heights, kind="stable")[:_REFINED]
         starts = [directions[i] for i in order if np.isfinite(heights[i])]
@@ -192,7 +192,7 @@ def with_shape(region: Region, shape: Polynomial) -> Region:
 
 
 def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
-    """Enlarge the β for which {shape ≤ β} lies in a proved region, by a search for V of degree up to `top`.
+    """Enlarge the β for which {shape ≤ β} lies in a proved region, by a search for V of degree `top`.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attr
         Proved region to start from.
     shape : Polynomial
     top : int
-        Largest degree of V; even.
+        Largest degree of V, even; that of the given V if it is higher.
     certify : callable
         Maps a claim with a new V to a region with a proved level.
     """
@@ -364,8 +364,8 @@ def region_of_attraction(
     relative : float
         Relative width of the final bracket of the bisection, in [1e-6, 1).
     degree : int, optional
-        Even degree up to which other V are tried, starting from `V` or its default, so that the region contains
-        {shape ≤ β} for a larger β.
+        Even degree up to which other V are tried (or that of `V`, if higher), starting from `V` or its default, so that
+        the region contains {shape ≤ β} for a larger β.
     shape : str, SymPy expression or mapping, optional
         A polynomial that is positive except at the origin. The result contains the largest β found for which
         {shape ≤ β} is proved to lie in the region. By default Σ x_i² if a degree is given, otherwise none.

@@ -100,7 +100,7 @@ def _listed(given: Any) -> list[Any]:
 
 
 def _square(product: tuple[int, ...], gram: Any, basis: Any, names: tuple[str, ...]) -> Square:
-    """Square of a given matrix, its floats exact, with a basis whose elements have monomials of their own."""
+    """`Square` of a Gram matrix, floats taken exactly; each element of the basis has a monomial that no other has."""
     elements = tuple(read_element(b, names) for b in _listed(basis))
     matrix = _matrix(gram, len(elements))
     upper = tuple(Fraction(float(matrix[i, j])) for i in range(len(elements)) for j in range(i, len(elements)))
