@@ -1,7 +1,7 @@
 """Exact rational numbers from decimal text and floats, and certified bounds.
 
-Every other module receives numbers as `fractions.Fraction` from here. The second chapter defines
-one-sided bounds and enclosures, which are printed rounded outward (an upper bound up, a lower bound down).
+Every other module receives numbers as `fractions.Fraction` from here. The second chapter defines one-sided bounds and
+enclosures, which are printed rounded outward (an upper bound up, a lower bound down).
 """
 
 import math

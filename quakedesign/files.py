@@ -1,7 +1,7 @@
 """File input with bounded size, atomic file output, and locked temporary folders.
 
-Input files are read whole and must be regular files. Output files and folders appear complete or not at
-all. Temporary folders of a killed process are removed at the next start.
+Input files are read whole and must be regular files. Output files and folders appear complete or not at all. Temporary
+folders of a killed process are removed at the next start.
 """
 
 import os
@@ -126,8 +126,8 @@ def temporary_folder(parent: Path | None = None) -> Iterator[Path]:
 def lock_of(target: Path) -> tuple[Path, int | None]:
     """Lock a path until `unlock`, by a temporary folder in its parent folder; return this folder and its descriptor.
 
-    A command on another machine does not see the lock. The descriptor is None on a file system without locks, or if
-    the folder cannot be made; then other processes are not excluded.
+    A command on another machine does not see the lock. The descriptor is None on a file system without locks, or if the
+    folder cannot be made; then other processes are not excluded.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Executors for independent tasks, worker processes, and handling of interrupts.
 
-Chapters: background thread; signals that end a command (exit code as in a shell, temporary folders removed);
-worker processes that end with their parent; the choice between this process, local workers and any executor
-of `concurrent.futures`.
+Chapters: background thread; signals that end a command (exit code as in a shell, temporary folders removed); worker
+processes that end with their parent; the choice between this process, local workers and any executor of
+`concurrent.futures`.
 """
 
 import atexit

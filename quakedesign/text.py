@@ -35,8 +35,7 @@ def one_line(message: str) -> str:
 def in_lines(text: str) -> list[str]:
     """Text in lines of at most 200 characters, each broken after the strongest mark in its last two thirds.
 
-    Marks are a full stop, semicolon, colon or comma outside brackets. No text is cut: without a mark a line is
-    longer.
+    Marks are a full stop, semicolon, colon or comma outside brackets. No text is cut: without a mark a line is longer.
     """
     lines, begin = [], 0
     ends = _divisions(text) if len(text) > _LONGEST_LINE else []

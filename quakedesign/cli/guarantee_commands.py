@@ -235,8 +235,8 @@ def limits(
     delay and diffusion time, the largest distance of a well and the smallest withdrawal. Beyond a limit every
     controller fails for some disturbance of at most the given amplitude and, for slip weakening, some friction law of
     the box. The distance of a well is for the diffusivity --diffusivity, 1 m^2/s by default. Delay, lag, diffusion,
-    timing errors and pump are those of the proved designs; with noise the limit on the slip-rate error is larger.
-    Give quantities with a unit, such as '20 ms', or as numbers in SI units.
+    timing errors and pump are those of the proved designs; with noise the limit on the slip-rate error is larger. Give
+    quantities with a unit, such as '20 ms', or as numbers in SI units.
 
     Parameters
     ----------

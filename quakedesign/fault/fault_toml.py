@@ -266,8 +266,8 @@ def load_fault(
     box : str, optional
         Name of an uncertainty box that replaces the one in the file.
     disturbance : str, optional
-        Amplitude in place of the file's: an acceleration, or a shear stress on the fault, such as ``"35 kPa"``,
-        which is converted with the area and mass of the fault.
+        Amplitude in place of the file's: an acceleration, or a shear stress on the fault, such as ``"35 kPa"``, which
+        is converted with the area and mass of the fault.
     allow_code : bool
         Whether the file may name a user-defined friction law ``module:Class``, whose module is imported and run.
 

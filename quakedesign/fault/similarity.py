@@ -106,8 +106,8 @@ def dimensional_matrix(units: Sequence[str]) -> "sp.Matrix":
 def quantities(fault: Fault) -> dict[str, Quantity]:
     """Every parameter of a fault by dotted name, including those of its friction law.
 
-    If the friction coefficient is not proportional to the dimensionless parameters of its law, it cannot be scaled.
-    The constant coefficient 1 is then one more parameter, the same for every fault.
+    If the friction coefficient is not proportional to the dimensionless parameters of its law, it cannot be scaled. The
+    constant coefficient 1 is then one more parameter, the same for every fault.
     """
     law = fault.friction
     named = {name: (unit, attrgetter(name)(fault)) for name, unit in PLANT_UNITS.items()}

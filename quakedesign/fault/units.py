@@ -84,8 +84,8 @@ def si_value(quantity: object, unit: str, name: str) -> float:
     Raises
     ------
     UnitError
-        For an unknown unit, a wrong dimension, a missing unit or number; and for hertz where an angular
-        frequency is required, because pint converts 1 Hz to 1 rad/s.
+        For an unknown unit, a wrong dimension, a missing unit or number; and for hertz where an angular frequency is
+        required, because pint converts 1 Hz to 1 rad/s.
     """
     if (plain := _plain(quantity, unit)) is not None:
         return float(plain)

@@ -1,7 +1,7 @@
 """Assessment of a fit: tests of its assumptions, and the verdict whether it explains the record.
 
-The reference noise is estimated without a friction law: from sample to sample, and about a straight line in the
-steady beginning.
+The reference noise is estimated without a friction law: from sample to sample, and about a straight line in the steady
+beginning.
 """
 
 from collections.abc import Mapping

@@ -93,8 +93,8 @@ class ExtendedLQR(Controller):
     def loop_field(cls) -> LoopField:
         """Return the loop about the equilibrium of a constant reference (ERRATA 8), all uncertainty in s, w and β.
 
-        x2' = s·x1 − w·x2 + β·b·p, where s [1/s²] is the chord slope of all terms that depend on slip (friction,
-        spring, disturbance), −w [1/s] that of all terms that depend on slip rate, and b = μ_res·N̂_min [m²/kg].
+        x2' = s·x1 − w·x2 + β·b·p, where s [1/s²] is the chord slope of all terms that depend on slip (friction, spring,
+        disturbance), −w [1/s] that of all terms that depend on slip rate, and b = μ_res·N̂_min [m²/kg].
         """
         x1, x2, xi1, xi2 = sp.symbols("x1 x2 xi1 xi2", real=True)
         beta, s, w, authority = sp.symbols("beta s w b", real=True)

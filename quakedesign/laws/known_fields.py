@@ -1,7 +1,6 @@
 """Closed loops of laws as plain data, and the cached loops of the package's laws.
 
-The cached loops are in `derived.json` and are derived again by a test; other loops are derived with
-SymPy.
+The cached loops are in `derived.json` and are derived again by a test; other loops are derived with SymPy.
 """
 
 import json

@@ -1,7 +1,6 @@
 """Closed loop of a control law as an uncertain vector field, the subject of a certificate.
 
-The first chapter checks names, roots, units and states, so that a certificate describes the intended
-loop.
+The first chapter checks names, roots, units and states, so that a certificate describes the intended loop.
 """
 
 import dataclasses

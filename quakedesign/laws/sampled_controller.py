@@ -1,7 +1,7 @@
 """Sampled laws as controllers of a simulation, and the compensated implicit step.
 
-Chapters: a law as expressions in states and reference; a sampled linear law as a controller; the implicit
-step with a disturbance estimate in place of integral states, for simulation and proof.
+Chapters: a law as expressions in states and reference; a sampled linear law as a controller; the implicit step with a
+disturbance estimate in place of integral states, for simulation and proof.
 """
 
 from collections.abc import Mapping
@@ -262,9 +262,9 @@ def _combined(numbers: tuple[Fraction, ...], signals: tuple[Any, ...]) -> sp.Exp
 # ----------------------------------------------------------------------
 # Implicit step with an estimate of the disturbance in place of integral states; simulated and proved.
 #
-# The first two functions take floats, SymPy and CasADi expressions. B0 [m²/kg] is the nominal input gain. The
-# estimate d [Pa] is corrected by the part of the change of e2 over the last period that T_s·B0·p does not explain.
-# The pressure p [Pa] is −d plus the pressure that drives e2 to the solution w within one period.
+# The first two functions take floats, SymPy and CasADi expressions. B0 [m²/kg] is the nominal input gain. The estimate
+# d [Pa] is corrected by the part of the change of e2 over the last period that T_s·B0·p does not explain. The pressure
+# p [Pa] is −d plus the pressure that drives e2 to the solution w within one period.
 
 _STATES = ("rate_error_before", "push_before", "disturbance")
 

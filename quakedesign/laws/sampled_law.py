@@ -1,7 +1,7 @@
 """Sampled linear control laws as exact matrices: p = Cz + Dy, z⁺ = Fz + Gy.
 
-Chapters: sizes, steady states and the sampled e-LQR; LQG compensators with an estimate of the disturbance,
-for a delay, a lag or a diffusion path; a pressure limit at rest that prevents integrator windup.
+Chapters: sizes, steady states and the sampled e-LQR; LQG compensators with an estimate of the disturbance, for a delay,
+a lag or a diffusion path; a pressure limit at rest that prevents integrator windup.
 """
 
 from collections.abc import Sequence
@@ -409,13 +409,13 @@ def slip_observer(gains: Row, corrections: tuple[Fraction, Fraction, Fraction], 
 class RestLimit:
     """Limit at rest: lower limit of the pressure relative to all earlier pressures while the fault is at rest.
 
-    The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since.
-    Let p* be the equilibrium pressure. A loop whose pressure stays within P of p*, with |dp*/dr| at most `per_slip`,
-    never reaches a limit with a width of 2P, so that the limit does not affect a guarantee. While friction holds the
-    fault at rest, measurements do not respond to the pressure, and while the slip is ahead of the reference an integral
-    would lower the pressure without bound. The limit then saturates the pressure, with anti-windup of the law. The
-    saturation ends when the fault moves, for any cause. The range of pressure that a proof covers is a limit too, at
-    rest and in motion, unless the fault moves faster than the proof covers.
+    The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since. Let
+    p* be the equilibrium pressure. A loop whose pressure stays within P of p*, with |dp*/dr| at most `per_slip`, never
+    reaches a limit with a width of 2P, so that the limit does not affect a guarantee. While friction holds the fault at
+    rest, measurements do not respond to the pressure, and while the slip is ahead of the reference an integral would
+    lower the pressure without bound. The limit then saturates the pressure, with anti-windup of the law. The saturation
+    ends when the fault moves, for any cause. The range of pressure that a proof covers is a limit too, at rest and in
+    motion, unless the fault moves faster than the proof covers.
 
     Attributes
     ----------

@@ -1,7 +1,6 @@
 """Base classes of continuous sliding-mode laws, p = ν/(μ0N̂0) with one integral state.
 
-The second class covers laws for a chain of integrators: continuous ν, a discontinuous integral, weights
-n+1 … 1.
+The second class covers laws for a chain of integrators: continuous ν, a discontinuous integral, weights n+1 … 1.
 """
 
 from abc import abstractmethod

@@ -1,7 +1,7 @@
 """Linear design problem of one fault with exact matrices, and its loop as a polytope.
 
-Chapters: operations on small rational matrices (Lyapunov and Riccati residuals, Hurwitz test); the plant
-x2' = s·x1 − w·x2 + βb·p over its uncertainty, in SI and nondimensional; the e-LQR loop as a polytope.
+Chapters: operations on small rational matrices (Lyapunov and Riccati residuals, Hurwitz test); the plant x2' = s·x1 −
+w·x2 + βb·p over its uncertainty, in SI and nondimensional; the e-LQR loop as a polytope.
 """
 
 import math

@@ -1,8 +1,7 @@
 """Riccati designs of the e-LQR with a sound bound on the uncertainty.
 
-The solution is proposed by python-control and refined with exact residuals. Chapters: Riccati equation;
-nondimensional design; design with Q = Q0 + R·W for the whole uncertainty box (ERRATA 6, 7, 9, 10);
-infimum of the guaranteed gain.
+The solution is proposed by python-control and refined with exact residuals. Chapters: Riccati equation; nondimensional
+design; design with Q = Q0 + R·W for the whole uncertainty box (ERRATA 6, 7, 9, 10); infimum of the guaranteed gain.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Robust stability of a gain K over the uncertainty box by a common quadratic V.
 
-V is proposed by a semidefinite programme and proved exactly. The analysis reports certified margins of
-friction slope, range of β and decay rate, each with its limit.
+V is proposed by a semidefinite programme and proved exactly. The analysis reports certified margins of friction slope,
+range of β and decay rate, each with its limit.
 """
 
 from collections.abc import Callable, Sequence

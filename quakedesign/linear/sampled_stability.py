@@ -1,8 +1,8 @@
 """Stability of the sampled e-LQR under zero-order hold with time-varying parameters.
 
-Chapters: Wirtinger inequality with one quadratic V (Liu, Suplin and Fridman 2010, IMA J. Math. Control
-Inf. 27, 445); clock-dependent V in Bernstein form; poles at constant parameters in ball arithmetic, which
-refute a sampling period; the longest proved sampling period; all results for one K.
+Chapters: Wirtinger inequality with one quadratic V (Liu, Suplin and Fridman 2010, IMA J. Math. Control Inf. 27, 445);
+clock-dependent V in Bernstein form; poles at constant parameters in ball arithmetic, which refute a sampling period;
+the longest proved sampling period; all results for one K.
 """
 
 import math

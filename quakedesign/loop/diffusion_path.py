@@ -1,9 +1,8 @@
 """Pressure diffusion between well and fault: exact slow modes, bounded fast modes.
 
-One-dimensional diffusion in a layer with a no-flow boundary at the fault (Carslaw and Jaeger, Conduction
-of Heat in Solids, 1959, sec. 3.4). The first chapter proves a bound of the truncation error of the modes.
-The second includes this error in the slip-rate error, as a known jump at each pressure step and a smaller
-remainder.
+One-dimensional diffusion in a layer with a no-flow boundary at the fault (Carslaw and Jaeger, Conduction of Heat in
+Solids, 1959, sec. 3.4). The first chapter proves a bound of the truncation error of the modes. The second includes this
+error in the slip-rate error, as a known jump at each pressure step and a smaller remainder.
 """
 
 from dataclasses import replace

@@ -1,7 +1,7 @@
 """Error loops of a linear law and a fault as exact periodic systems.
 
-Chapters: sampled law with zero-order hold, delay, lag and diffusion path; idealised law in continuous
-time; sampled law about slow sliding with rate-and-state friction, without inertia.
+Chapters: sampled law with zero-order hold, delay, lag and diffusion path; idealised law in continuous time; sampled law
+about slow sliding with rate-and-state friction, without inertia.
 """
 
 from collections.abc import Collection
@@ -321,9 +321,8 @@ def exact_integrals(gains: tuple[Fraction, ...], *, of_state: bool = False) -> C
 def continuous_loop(law: ContinuousLaw, model: NominalModel, authority: Fraction) -> PeriodicLoop:
     """The error loop about p*, with the inputs and outputs of `sampled_error_loop`; states e1, e2 and z − z*.
 
-    z* = ζ(p* − R(r, r′)) − ηR(r, r′)′ with Fζ = 0, Cζ = 1, Fη = ζ and Cη = 0, so that Cz* + R(r, r′) = p*. The
-    entries of R that are not 0 add the inputs ``reference_acceleration`` r″ and ``reference_jerk`` r‴, through
-    ηR(r, r′)″.
+    z* = ζ(p* − R(r, r′)) − ηR(r, r′)′ with Fζ = 0, Cζ = 1, Fη = ζ and Cη = 0, so that Cz* + R(r, r′) = p*. The entries
+    of R that are not 0 add the inputs ``reference_acceleration`` r″ and ``reference_jerk`` r‴, through ηR(r, r′)″.
 
     Parameters
     ----------

@@ -2,13 +2,13 @@
 
 With as many independent wells as blocks, errors are relative to the reference r(t). With fewer wells, only one average
 of the slips per well can follow r. Let C be the weights of these averages; each row sums to 1. Slip errors are then
-relative to the balance x*(t) under well pressures p* with Cx* = r. Block i has e1′ = e2 + (r′ − x*′) and
-e2′ = s·e1 + ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ − r″, where s, w and β are chord slopes of its friction
-within their ranges and S are the shares of the wells.
+relative to the balance x*(t) under well pressures p* with Cx* = r. Block i has e1′ = e2 + (r′ − x*′) and e2′ = s·e1 +
+ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ − r″, where s, w and β are chord slopes of its friction within their
+ranges and S are the shares of the wells.
 
-**Balance.** Let N = σ′ − Sp* for each block. Its forces are n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, with n the area
-per mass. With μ = μ0 + δ and |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gc, where c = nδN and G is S times
-a block of the inverse of a constant matrix. Then |N − N0| ≤ |G|nh|N|, which bounds N, and with it s and w.
+**Balance.** Let N = σ′ − Sp* for each block. Its forces are n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, with n the area per
+mass. With μ = μ0 + δ and |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gc, where c = nδN and G is S times a
+block of the inverse of a constant matrix. Then |N − N0| ≤ |G|nh|N|, which bounds N, and with it s and w.
 
 With x*′ = r′(1 + ξ) and p*′ = r′q the derivative of the forces is s(1 + ξ) + ΣK(ξ_j − ξ) + βb·Sq = 0, and Cξ = 0.
 With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The inverse of the matrix with s0 and β0 bounds
@@ -16,10 +16,10 @@ With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The
 of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the balance is a Lipschitz function of r
 (Clarke), and |ξ| ≤ X and |q| ≤ Q follow from F.
 
-With one well, identical blocks and symmetric springs, the springs drop out of the mean force. The mean force is that
-on one block whose friction coefficient is the mean of μ(x*) over the blocks. N then lies in the range of one block
-whose friction weakens and strengthens 1 + X times as fast. If X > 1, blocks may move backward, at up to X − 1 times
-the rate of the reference; weakening friction then increases again.
+With one well, identical blocks and symmetric springs, the springs drop out of the mean force. The mean force is that on
+one block whose friction coefficient is the mean of μ(x*) over the blocks. N then lies in the range of one block whose
+friction weakens and strengthens 1 + X times as fast. If X > 1, blocks may move backward, at up to X − 1 times the rate
+of the reference; weakening friction then increases again.
 
 If no F with M·F + f < F is found, nothing is proved: the bound `within` of the slope sectors is then 1e-30 m.
 """

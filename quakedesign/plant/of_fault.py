@@ -32,8 +32,8 @@ def static_friction(fault: Fault) -> Fraction:
 def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
     """Slow-sliding plant at V, the first rate of the reference, under a stress of at most `stress` [Pa].
 
-    The ranges of a, b and D extend to both sides by the fraction `spread` [-]; the range of μ* follows from those of
-    a and b, as μ* depends on a − b if V is not the reference rate of friction.
+    The ranges of a, b and D extend to both sides by the fraction `spread` [-]; the range of μ* follows from those of a
+    and b, as μ* depends on a − b if V is not the reference rate of friction.
 
     Raises
     ------

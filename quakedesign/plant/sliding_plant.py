@@ -18,8 +18,8 @@ from quakedesign.loop import StateLaw
 # Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at V,
 # μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
 # state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). Initially the fault slides at V,
-# without pressure; the far end of its spring is at rest. Along a reference r from 0, whose rate stays within
-# V(1 ± ``swing``), it then needs p* = Kr/μ*; the planned pressure is ``ramp``·r/V. If ``swing`` is 0, r = Vt.
+# without pressure; the far end of its spring is at rest. Along a reference r from 0, whose rate stays within V(1 ±
+# ``swing``), it then needs p* = Kr/μ*; the planned pressure is ``ramp``·r/V. If ``swing`` is 0, r = Vt.
 
 Range = tuple[Fraction, Fraction]
 AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")

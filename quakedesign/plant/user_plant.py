@@ -38,8 +38,8 @@ class Sector:
         ``lambda y: (-5 * y**2 / 2, 0)``. A search then finds the bound, a `Fraction`; returned floats are read as the
         decimals that Python prints for them.
     within : number, optional
-        Bound of |y| for which the slopes are valid; the proof shows that |y| stays within it. y then depends on
-        states alone.
+        Bound of |y| for which the slopes are valid; the proof shows that |y| stays within it. y then depends on states
+        alone.
     """
 
     entry: Any
@@ -214,10 +214,10 @@ class UncertainPlant:
     ) -> Self:
         """Plant of the blocks of a fault, coupled by springs, each with its own disturbance and friction.
 
-        States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa].
-        With an independent well for each block, errors are relative to the reference, and all are measured. With
-        fewer wells, one average of the slips per well follows the reference. Slip errors are then relative to the
-        equilibrium of the blocks at these averages, and the averages of slip and slip rate are measured.
+        States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa]. With
+        an independent well for each block, errors are relative to the reference, and all are measured. With fewer
+        wells, one average of the slips per well follows the reference. Slip errors are then relative to the equilibrium
+        of the blocks at these averages, and the averages of slip and slip rate are measured.
 
         Parameters
         ----------

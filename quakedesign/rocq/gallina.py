@@ -1,7 +1,7 @@
 """Certificates as Gallina terms for the checker in proofs/rocq.
 
-Chapters: identity of a witness with integer coefficients; proof that a multiplier is non-negative
-(positivity.v); integers, rationals and polynomials as terms of Gallina, the language of Rocq.
+Chapters: identity of a witness with integer coefficients; proof that a multiplier is non-negative (positivity.v);
+integers, rationals and polynomials as terms of Gallina, the language of Rocq.
 """
 
 from collections.abc import Iterable, Sequence

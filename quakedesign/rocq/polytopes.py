@@ -122,8 +122,8 @@ def _near(value: arb) -> str:
 def _terms(period: Period) -> str:
     """Text "terms n": number of terms of the Taylor polynomials of the impulse responses, and n with e^(KT) <= 3^n.
 
-    K is the growth rate of the error of the polynomials [1/s] and T the sampling time [s].
-    Raises `UnsupportedError` for a sampling time that is too long compared with the time scales of the plant.
+    K is the growth rate of the error of the polynomials [1/s] and T the sampling time [s]. Raises `UnsupportedError`
+    for a sampling time that is too long compared with the time scales of the plant.
     """
     step, (s, w) = (
         period.sampled_loop.step,

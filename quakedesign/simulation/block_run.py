@@ -42,8 +42,8 @@ class BlockRun:
     rest : ndarray
         Fraction of the time that each block is at rest [-].
     reversed, opened : bool
-        Whether the load on a block, at rest or not, exceeded friction backward, or an effective normal stress
-        fell to 0.
+        Whether the load on a block, at rest or not, exceeded friction backward, or an effective normal stress fell to
+        0.
     """
 
     times: np.ndarray

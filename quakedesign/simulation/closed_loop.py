@@ -1,7 +1,7 @@
 """Closed loop of plant, control law and reference as CasADi functions.
 
-Chapters: far-field loading and user-defined perturbation; variation of parameters within the uncertainty box, with
-the same compiled code; energy budget of a run [J]; closed loop.
+Chapters: far-field loading and user-defined perturbation; variation of parameters within the uncertainty box, with the
+same compiled code; energy budget of a run [J]; closed loop.
 """
 
 import math

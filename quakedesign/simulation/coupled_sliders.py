@@ -5,8 +5,8 @@ shear stress, s a further shear stress that depends on time, H the damping. For 
 
     ζ' = v − v_∞,    mv' = τ_0 − Sζ + s − Nμ(v, θ) − Hv,    θ' as given by the friction law.
 
-Without mass the right-hand side is 0, and its time derivative gives v' (quasi-dynamic). The logarithms of v and θ
-are integrated. Pressures h of cells or wells obey h' = Fh + Gu, and p is a linear combination of them.
+Without mass the right-hand side is 0, and its time derivative gives v' (quasi-dynamic). The logarithms of v and θ are
+integrated. Pressures h of cells or wells obey h' = Fh + Gu, and p is a linear combination of them.
 """
 
 import math
@@ -442,8 +442,8 @@ def simulate_sampled_blocks(
 ) -> SlidersRun:
     """Simulate blocks under a sampled law that tracks the slow-sliding reference, initially at its first rate.
 
-    The planned pressure reaches the blocks directly; the feedback pressure passes the lag. The far end is fixed.
-    A sinusoidal stress acts on block i = 0 … N − 1 from t = 0, with the phase 2πi/N.
+    The planned pressure reaches the blocks directly; the feedback pressure passes the lag. The far end is fixed. A
+    sinusoidal stress acts on block i = 0 … N − 1 from t = 0, with the phase 2πi/N.
 
     Parameters
     ----------

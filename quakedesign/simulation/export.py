@@ -191,10 +191,10 @@ def model_unit(exported: ControllerStep) -> tuple[bytes, str]:
     """Bytes of an FMU of a sampled step; and the platform of its binary, or the reason why it has no binary.
 
     Inputs are the measurement and, for one block, ``applied`` [Pa], the pressure that pump or valve applied since the
-    last sample. Unless set, it equals the commanded pressure. Once set after initialisation, it keeps its value:
-    set it again before every sample, or the law winds up. The output ``pressure`` [Pa], for
-    several wells ``pressure_1`` and so on, is the command of the last sample. Samples are T_s apart, from the start of
-    the experiment. The FMU contains the sources, so that any platform can compile them.
+    last sample. Unless set, it equals the commanded pressure. Once set after initialisation, it keeps its value: set it
+    again before every sample, or the law winds up. The output ``pressure`` [Pa], for several wells ``pressure_1`` and
+    so on, is the command of the last sample. Samples are T_s apart, from the start of the experiment. The FMU contains
+    the sources, so that any platform can compile them.
 
     References
     ----------

@@ -1,7 +1,6 @@
 """User-defined inputs of a run: a perturbation given as text, and a prescribed fluid pressure.
 
-The perturbation is an acceleration [m/s²]; the pressure [Pa] is piecewise linear in time and may have
-steps.
+The perturbation is an acceleration [m/s²]; the pressure [Pa] is piecewise linear in time and may have steps.
 """
 
 import ast

@@ -1,7 +1,7 @@
 """Integrators by name: fixed-step Runge–Kutta, and adaptive CVODES and IDAS.
 
-Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: backward differentiation formulas of
-SUNDIALS, called through CasADi. The last function tests whether a fixed step is short enough for a linear loop.
+Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: backward differentiation formulas of SUNDIALS,
+called through CasADi. The last function tests whether a fixed step is short enough for a linear loop.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -117,8 +117,7 @@ class StoppedError(RuntimeError):
 class AdaptiveIntegrator:
     """An adaptive solver for smooth, possibly stiff problems, with output at arbitrary instants.
 
-    Discontinuities are not located, since CasADi's events are not used: the caller must reject a discontinuous
-    field.
+    Discontinuities are not located, since CasADi's events are not used: the caller must reject a discontinuous field.
 
     Attributes
     ----------

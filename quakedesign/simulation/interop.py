@@ -350,8 +350,8 @@ def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actu
     Returns
     -------
     control.StateSpace
-        L, from the pressure [Pa] at the actuator's input to the pressure commanded by the law, for negative
-        feedback: the closed loop is ``control.feedback(L, 1)``. In discrete time for a sampled law.
+        L, from the pressure [Pa] at the actuator's input to the pressure commanded by the law, for negative feedback:
+        the closed loop is ``control.feedback(L, 1)``. In discrete time for a sampled law.
 
     Raises
     ------

@@ -42,8 +42,8 @@ class StateTrajectory(Trajectory):
         State variables of friction, shape (number of variables, n), with `state_names` and `state_units`.
     state_names, state_units : tuple of str
     imbalance : ndarray
-        Driving minus resisting stress, divided by σ' at p = 0 [-], shape (n,). It accelerates the mass; without mass
-        it is zero except for the integration error.
+        Driving minus resisting stress, divided by σ' at p = 0 [-], shape (n,). It accelerates the mass; without mass it
+        is zero except for the integration error.
     onsets : ndarray
         Times [s] at which the slip rate rises through `onset_rate`.
     onset_rate, loading_rate : float

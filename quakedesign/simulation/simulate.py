@@ -75,8 +75,8 @@ def simulate(
         Length of one step [s]; by default T_s of a sampled law, else of the fault.
     scheme : str or Scheme, optional
         Discretisation of the law, by name or as an instance, see `quakedesign.loop.schemes`. All but ``"continuous"``
-        sample once per step, with a zero-order hold of the pressure. A sampled law can be run only with
-        the scheme of its design; for other laws the default is ``"continuous"``.
+        sample once per step, with a zero-order hold of the pressure. A sampled law can be run only with the scheme of
+        its design; for other laws the default is ``"continuous"``.
     method : str
         Integrator with a fixed step, or, for the printed plant, ``"cvodes"`` or ``"idas"`` with an adaptive step; see
         `quakedesign.simulation.integrators`. The latter return the state at every multiple of `step`, where the run is
@@ -116,8 +116,8 @@ def simulate(
         stages the pressure acts at once. With a friction state: stages that act once per sample, then a lag, a
         diffusion path or both. If the actuator has neither of these, the lag and diffusion path of the design apply.
     measurement : Measurement, Sensor or Transducer, optional
-        Measurement noise, or a sensor that estimates signals from the slip alone, for a named sampled scheme.
-        With a friction state: the transducer of the slip.
+        Measurement noise, or a sensor that estimates signals from the slip alone, for a named sampled scheme. With a
+        friction state: the transducer of the slip.
     initial_slip, initial_slip_rate : float
         Initial x1 [m] and x2 [m/s], not negative. The reference r is 0 at t = 0 in any case.
     tide : Tide, optional
@@ -126,15 +126,15 @@ def simulate(
     Returns
     -------
     Trajectory
-        A `LoopTrajectory`; with a friction state a `SlidingRun`, or a `StateTrajectory` without a controller.
-        A run that diverges ends there, with the time in `events` and with no metric but, at most, the peak slip rate.
+        A `LoopTrajectory`; with a friction state a `SlidingRun`, or a `StateTrajectory` without a controller. A run
+        that diverges ends there, with the time in `events` and with no metric but, at most, the peak slip rate.
 
     Raises
     ------
     ParameterError
         For a step, duration or number of samples that is not positive and finite, an unknown scheme, method or plant,
-        an initial state that is negative, a variation outside the box, a sensor made for another step, or a
-        loop that is not smooth with a method that needs a smooth one.
+        an initial state that is negative, a variation outside the box, a sensor made for another step, or a loop that
+        is not smooth with a method that needs a smooth one.
     SimulationError
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         fails, or when the checkpoint is that of another run.

@@ -172,8 +172,8 @@ class SmoothProblem:
     ) -> SmoothSolution:
         """Integrate the equations from times[0] to times[-1], with times[0] as origin of time.
 
-        After years the steps of an earthquake are shorter than the resolution of the absolute time in floats. If
-        radau stops for this reason, it continues with a new origin of time.
+        After years the steps of an earthquake are shorter than the resolution of the absolute time in floats. If radau
+        stops for this reason, it continues with a new origin of time.
 
         Parameters
         ----------
@@ -182,9 +182,9 @@ class SmoothProblem:
         every_step : bool
             If True, return every accepted step; otherwise the values at `times`.
         method : str
-            ``"dop853"`` (explicit, order 8, with dense output of order 7), ``"radau"`` (implicit, order 5, for
-            stiff problems, with a step end at each instant), or ``"cvodes"`` or ``"idas"`` (implicit, orders 1 to 5;
-            nearly linear pieces replace the accepted steps).
+            ``"dop853"`` (explicit, order 8, with dense output of order 7), ``"radau"`` (implicit, order 5, for stiff
+            problems, with a step end at each instant), or ``"cvodes"`` or ``"idas"`` (implicit, orders 1 to 5; nearly
+            linear pieces replace the accepted steps).
         rtol : float
             Tolerance of one step, relative to variables larger than `scales`, absolute below; with CVODES and IDAS the
             limit is `FLOOR` times `scales`.

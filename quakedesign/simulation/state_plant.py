@@ -1,7 +1,7 @@
 """Spring-sliders with rate-and-state friction in logarithms of slip rate and state.
 
-The second chapter defines the setup of a run in slow sliding: tide, ratios of true to nominal constants,
-pressure path, and instruments with their memory.
+The second chapter defines the setup of a run in slow sliding: tide, ratios of true to nominal constants, pressure path,
+and instruments with their memory.
 """
 
 import math
@@ -39,9 +39,9 @@ _WIDEST = 1e3  # largest change of the logarithm of a rate in a step
 class SpringSlider:
     """A block per unit area: mass·v' = stiffness·stretch − (normal_stress − p)·μ(slip, v, state) − damping·v.
 
-    The rate of the stretch is the loading rate minus the slip rate. Without mass the balance of forces is a
-    constraint, whose time derivative gives v' (quasi-dynamic; needs (normal_stress − p)·∂μ/∂v + damping > 0).
-    The pressure p also changes the state if the law has `FrictionLaw.stress_exponents`.
+    The rate of the stretch is the loading rate minus the slip rate. Without mass the balance of forces is a constraint,
+    whose time derivative gives v' (quasi-dynamic; needs (normal_stress − p)·∂μ/∂v + damping > 0). The pressure p also
+    changes the state if the law has `FrictionLaw.stress_exponents`.
 
     Attributes
     ----------
@@ -322,8 +322,8 @@ class PressurePath:
     def modes(self) -> "tuple[np.ndarray, np.ndarray]":
         """Rates λ_i [1/s] and shares c_i [-] of parallel filters with the step response 1 − Σ c_i·e^{−λ_i·t}.
 
-        Partial fractions of the diffusion path in series with the lag: exact but for the truncation error of 24
-        modes. If the rate of the lag equals that of a mode, it is reduced by a relative 1e-9.
+        Partial fractions of the diffusion path in series with the lag: exact but for the truncation error of 24 modes.
+        If the rate of the lag equals that of a mode, it is reduced by a relative 1e-9.
         """
         path = DiffusionPath(time=self.diffusion or Fraction(1))
         modes = [(float(path.rate(i)), float(path.share(i))) for i in range(MODES if self.diffusion else 0)]

@@ -21,8 +21,8 @@ class StickSlipLoop(ClosedLoop):
     While the fault slips it obeys eq. shift, and results equal those of `ClosedLoop` bitwise as long as p < σ'. It
     stops when the slip rate falls to zero. It rests as long as friction can carry the load, with a slip rate of exactly
     zero. In one step at most one release and one stop are located, with the integrator's order. Backward slip is not
-    modelled: `reversing` indicates that the load would overcome friction backward. With healing, the friction at
-    rest is larger by `rest_excess` of the law; this excess vanishes at the release.
+    modelled: `reversing` indicates that the load would overcome friction backward. With healing, the friction at rest
+    is larger by `rest_excess` of the law; this excess vanishes at the release.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Trajectories of runs with export to xarray, pandas and NetCDF, their outcome and figure.
 
-Every run is a `Trajectory`; `LoopTrajectory` is that of a closed loop, with or without an actuator.
-The outcome of a closed loop is ``tracked``, ``slow slip``, ``earthquake``, ``diverged`` or ``opened``.
+Every run is a `Trajectory`; `LoopTrajectory` is that of a closed loop, with or without an actuator. The outcome of a
+closed loop is ``tracked``, ``slow slip``, ``earthquake``, ``diverged`` or ``opened``.
 """
 
 import json

@@ -6,8 +6,8 @@ the entries of ℓ that belong to x′. Here φ are the disturbing accelerations
 shares of the wells in the block pressures, P the well pressures and P* those of balance. Let φ be constant, of size H
 and with the signs of ℓ. Then, as long as friction weakens at this slope, z grows from 0 unless Σ_j|ℓ·βb_j||P_j − P*_j|
 reaches HΣ|ℓ_i|: every controller needs pressures this far from balance, with the largest β. A mode that no well reaches
-grows. For diffusing pressures q, q′ = Fq + G(P − P*) from q = 0, S(p) = (pI − F)⁻¹G replaces S: z grows
-unless the integral of e^{−pt}ℓ·(φ + βbq) is 0; the integral of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
+grows. For diffusing pressures q, q′ = Fq + G(P − P*) from q = 0, S(p) = (pI − F)⁻¹G replaces S: z grows unless the
+integral of e^{−pt}ℓ·(φ + βbq) is 0; the integral of e^{−pt}q is S(p) times that of e^{−pt}(P − P*).
 
 Blocks in slow sliding are linearised like a single block (`limit_theorems`): S_iy_i = −ΣK_ijx_j − W_iz_i +
 μ_iΣs_ijq_j + d_i, x_i′ = Vy_i and z_i′ = −ρ_i(y_i + z_i), where x_i is the slip error, y_i = ln(v_i/V), z_i the

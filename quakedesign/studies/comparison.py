@@ -58,8 +58,8 @@ class Entry:
     run : Trajectory or None
         None when there is no controller to run.
     largest_step : float or None
-        Largest T_s [s] for which the run would satisfy the premise on |h'|; None if not computed or not found, and
-        for sampled schemes.
+        Largest T_s [s] for which the run would satisfy the premise on |h'|; None if not computed or not found, and for
+        sampled schemes.
     growth_per_step : float or None
         For a linear law: growth of the fastest mode per step of the run [-]; below 1 is stable. None for sampled
         schemes, see `zero_order_hold`.

@@ -1,7 +1,7 @@
 """Facts about a fault: equations in LaTeX, stability regions, sampling, derived quantities.
 
-Stability regions are in stiffness, effective normal stress and injected pressure. The sampling period is
-compared with the fastest unstable pole.
+Stability regions are in stiffness, effective normal stress and injected pressure. The sampling period is compared with
+the fastest unstable pole.
 """
 
 import cmath

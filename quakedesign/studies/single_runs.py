@@ -1,7 +1,7 @@
 """Single runs: rate-and-state faults (free or controlled), estimated states, any law.
 
-The first chapter runs a fault with friction state, the second sets up sensor and differentiator with
-their premise, the third selects a controller and runs it once.
+The first chapter runs a fault with friction state, the second sets up sensor and differentiator with their premise, the
+third selects a controller and runs it once.
 """
 
 import math
@@ -408,9 +408,9 @@ def differentiator_premise(fault: Fault, law: Controller, seen: OutputFeedback, 
     """Premise: λ_d satisfies the joint condition of slip, law and sampling period (ERRATA 21).
 
     The largest |x1''| [m/s²] comes from `largest_acceleration`. The condition is sufficient for the differentiator to
-    converge, not necessary for the loop to work. If one of its two runs diverges, nothing is certified.
-    With n_d of 2 or more a bound of the next derivative is needed, which does not exist with zero-order hold: the
-    requirement is infinite.
+    converge, not necessary for the loop to work. If one of its two runs diverges, nothing is certified. With n_d of 2
+    or more a bound of the next derivative is needed, which does not exist with zero-order hold: the requirement is
+    infinite.
     """
     differentiator = seen.differentiator
     noise = max((DEVIATIONS * s.deviation for s in seen.stages if isinstance(s, Transducer)), default=0.0)
@@ -553,8 +553,8 @@ def choice(
 ) -> Choice:
     """Controller from a law's name and ``("published",)``, ``("designed",)``, ``("continuous",)`` or exact gains.
 
-    Designed gains run as guaranteed, with their own scheme and T_s; gains designed in continuous time, as in the
-    paper, run with any scheme and T_s.
+    Designed gains run as guaranteed, with their own scheme and T_s; gains designed in continuous time, as in the paper,
+    run with any scheme and T_s.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Rigorous enclosures of SymPy expressions over boxes, and proofs of upper limits.
 
-Interval arithmetic with rational ends over boxes that may be unbounded: rational operations are exact,
-all others are rounded outwards. The module also contains ball arithmetic (python-flint), and proofs by
-subdivision of the box that an expression stays below a limit.
+Interval arithmetic with rational ends over boxes that may be unbounded: rational operations are exact, all others are
+rounded outwards. The module also contains ball arithmetic (python-flint), and proofs by subdivision of the box that an
+expression stays below a limit.
 """
 
 import heapq

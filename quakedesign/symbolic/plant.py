@@ -1,8 +1,7 @@
 """Symbolic plant and error dynamics, derived from the force balance of the spring-slider.
 
-SymPy derives the shifted plant, the error dynamics, the matched perturbation and the instability
-conditions. The module also contains the notation in LaTeX and plain text, and stored derivations
-(`derived.json`, which a test derives again).
+SymPy derives the shifted plant, the error dynamics, the matched perturbation and the instability conditions. The module
+also contains the notation in LaTeX and plain text, and stored derivations (`derived.json`, which a test derives again).
 """
 
 import json

@@ -1,8 +1,8 @@
 """Plant with rate-and-state friction about steady sliding, with and without inertia.
 
-The module contains the third-order and the quasi-dynamic plant with slopes and stability conditions; the
-error dynamics about slow sliding, in slip and the logarithms of slip rate and state; and the slip rate of
-the equilibrium for the linearisation.
+The module contains the third-order and the quasi-dynamic plant with slopes and stability conditions; the error dynamics
+about slow sliding, in slip and the logarithms of slip rate and state; and the slip rate of the equilibrium for the
+linearisation.
 """
 
 from dataclasses import dataclass
@@ -118,8 +118,8 @@ def _tidy(expression: sp.Expr) -> sp.Expr:
 def characteristic(names: tuple[str, ...] = (), *, inertia: bool = True) -> tuple[sp.Expr, ...]:
     """Coefficients of det(λE − J), highest power first, in the slopes and `effective_stress`.
 
-    E is the identity; without inertia its entry for the acceleration is 0: the force balance is then a constraint
-    that gives the slip rate, and the degree is one lower.
+    E is the identity; without inertia its entry for the acceleration is 0: the force balance is then a constraint that
+    gives the slip rate, and the degree is one lower.
     """
     J = jacobian(names).subs(sigma, p + effective_stress)
     E = sp.eye(len(names) + 2)
@@ -211,8 +211,8 @@ def nucleation_length(law: FrictionLaw) -> sp.Expr:
     """Length L [m] whose stiffness per area G/L is critical without inertia and damping.
 
     A fault shorter than L slides stably (Dieterich 1992, Tectonophysics 211, 115, with the stiffness G/L of the
-    spring-slider in place of that of a crack). Infinite if no stability condition depends on the stiffness; negative
-    if no stiffness is unstable.
+    spring-slider in place of that of a crack). Infinite if no stability condition depends on the stiffness; negative if
+    no stiffness is unstable.
     """
     critical = critical_stiffness(law, inertia=False).subs(eta_hat, 0)
     return _tidy(shear_modulus * N_hat / critical) if critical != 0 else sp.oo

@@ -1,7 +1,6 @@
 """Signed powers ⌈x⌋^a = |x|^a sign(x) and absolute powers |x|^a as SymPy functions.
 
-The normal form of an expression in signed powers reduces the proof of an identity to a comparison with
-zero.
+The normal form of an expression in signed powers reduces the proof of an identity to a comparison with zero.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,7 @@
 """Stability of steady sliding, critical stiffness, and the derived model of a fault.
 
-Decisions use exact rationals where these suffice and ball arithmetic otherwise. `derive` returns the
-equations of one fault, its eigenvalues and the cause of its instability.
+Decisions use exact rationals where these suffice and ball arithmetic otherwise. `derive` returns the equations of one
+fault, its eigenvalues and the cause of its instability.
 """
 
 from collections.abc import Callable, Mapping
@@ -49,8 +49,8 @@ class Condition:
 
     expression: sp.Expr  # In the symbols of the plant and the slopes of friction (`state_plant.stability_conditions`)
     # Enclosure of the expression divided by the sum of the magnitudes of its parts [-], in [−1, 1]. The parts are the
-    # coefficients of the powers of the stiffness k, each times its power, so that k > k_c has the margin
-    # (k − k_c)/(k + |k_c|). The parts of a condition without stiffness are its terms.
+    # coefficients of the powers of the stiffness k, each times its power, so that k > k_c has the margin (k − k_c)/(k +
+    # |k_c|). The parts of a condition without stiffness are its terms.
     margin: Interval
     exact: bool  # Whether both ends are the same exact rational
 

@@ -55,8 +55,8 @@ class Design:
     controller : Controller or None
         None only when no gains with a proof were found.
     certificate : Certificate or None
-        Proof in continuous time for the base gains (λ = 1); None without a proof, and for a sampled linear law.
-        The verdict on a sampled law is that on its `guarantee`.
+        Proof in continuous time for the base gains (λ = 1); None without a proof, and for a sampled linear law. The
+        verdict on a sampled law is that on its `guarantee`.
     premises : tuple of Premise
         Premises of the guarantee of a sampled law (those named in `REACH`), and of the certificate.
     domain : Domain or None

@@ -114,9 +114,9 @@ def guarantee(
     Parameters
     ----------
     fault : Fault, BlockChain or UncertainPlant
-        For a `BlockChain` or an `UncertainPlant`, peaks of the outputs are proved for a law or gains; law, gains,
-        step, delay and lag apply. For several blocks (`UncertainPlant.from_blocks`, `load_chain`) the law is designed
-        unless given; with rate-and-state friction they slide slowly, and lag and stress are required.
+        For a `BlockChain` or an `UncertainPlant`, peaks of the outputs are proved for a law or gains; law, gains, step,
+        delay and lag apply. For several blocks (`UncertainPlant.from_blocks`, `load_chain`) the law is designed unless
+        given; with rate-and-state friction they slide slowly, and lag and stress are required.
     controller : str, type of Controller, or SampledLaw
         ``elqr``; a sliding mode, ``cta`` or ``dia``; or a user-defined law. Of several blocks ``centralised``
         (default), or ``decentralised``: the pressure of each well depends on its own measurements alone.

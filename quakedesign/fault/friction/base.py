@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 class FrictionLaw(ABC):
     """A friction law μ(slip, slip rate, state …), written once, whose parameters are its attributes.
 
-    A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (for pint), ``symbol``
-    (LaTeX) and ``example`` (for templates); a field without a symbol is an option, not a quantity. The same methods
-    serve numbers, exact rationals and symbols: `exact` and `symbolic` return copies of the law with such parameters.
+    A subclass is a frozen dataclass. Each quantity carries ``metadata`` with ``unit`` (for pint), ``symbol`` (LaTeX)
+    and ``example`` (for templates); a field without a symbol is an option, not a quantity. The same methods serve
+    numbers, exact rationals and symbols: `exact` and `symbolic` return copies of the law with such parameters.
 
     A law without state defines `name`, `source`, `domain`, `coefficient`, `extended`, `bounds`, `slip_slope` and
     `rate_slope`. A law with state also names its variables in `state_names` (with `state_units`), and defines

@@ -26,8 +26,8 @@ class RateAndState(FrictionLaw):
     """μ depends on the slip rate v and on one state θ [s], the age of the contacts.
 
     Friction increases with v and θ, so on the working range v_s ≤ v ≤ v_f, d_c/v_f ≤ θ ≤ d_c/v_s its extremes are at
-    two corners. As long as v stays between v_s and v_f, θ cannot leave its interval: both evolution laws point
-    inward at its ends. Outside the range the bounds do not apply to `coefficient` (ERRATA 13).
+    two corners. As long as v stays between v_s and v_f, θ cannot leave its interval: both evolution laws point inward
+    at its ends. Outside the range the bounds do not apply to `coefficient` (ERRATA 13).
 
     Attributes
     ----------
@@ -46,8 +46,8 @@ class RateAndState(FrictionLaw):
     fastest_rate : float
         Upper end v_f [m/s] of the working range, at least v_0.
     stress_sensitivity : float
-        α [-], not negative: the effective normal stress σ adds −(αθ/(bσ))·dσ/dt to dθ/dt (Linker and Dieterich 1992,
-        J. Geophys. Res. 97(B4), 4923); 0 by default. The bounds of friction are for a constant σ.
+        α [-], not negative: the effective normal stress σ adds −(αθ/(bσ))·dσ/dt to dθ/dt (Linker and Dieterich 1992, J.
+        Geophys. Res. 97(B4), 4923); 0 by default. The bounds of friction are for a constant σ.
 
     Raises
     ------
@@ -262,8 +262,8 @@ EVOLUTIONS = {"aging": (aging_law_rate, aging_law_slope), "slip": (slip_rate, sl
 class RegularisedRateAndState(RateAndState):
     """μ = a arsinh(v/(2v_0) · exp((μ_0 + b log(v_0 θ/d_c))/a)): thermally activated contacts in both directions.
 
-    Odd in v, so μ(0) = 0, and a positive lower bound of friction exists only on a working range (ERRATA 13). The
-    slopes ∂μ/∂v and ∂μ/∂θ are everywhere below those of the logarithmic law.
+    Odd in v, so μ(0) = 0, and a positive lower bound of friction exists only on a working range (ERRATA 13). The slopes
+    ∂μ/∂v and ∂μ/∂θ are everywhere below those of the logarithmic law.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
 """Objects shared by several kinds of guarantee files: fault, reference, disturbance, step.
 
-Each class declares the keys of one object, with numbers in SI units. Methods and functions convert objects to values
-of the package, and back.
+Each class declares the keys of one object, with numbers in SI units. Methods and functions convert objects to values of
+the package, and back.
 """
 
 from fractions import Fraction

@@ -16,11 +16,11 @@ solution of this loop obeys all bounds of the inputs for all t, hence |y| ≤ Y_
 this is the unique solution of the original loop. ∎
 
 **What is verified.** Let ξ have r entries, L name r independent facets, H_L have the rows h_l, l ∈ L, and 1 be a column
-of ones. Then |gξ| ≤ |gH_L⁻¹|·1 on X for every row g. A file names r facets for every row g at
-every end of a piece. For c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) = |ce^{Aθ}(Cξ + Σ j·n)| + Σ
-W_i∫₀^θ|ce^{Aσ}b_i|dσ. On a piece [α, β] the first term exceeds the linear interpolation of its two end values by at
-most (β − α)²/8·max|cA²e^{Aσ}||x(0)|, and the second by at most (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i|: f is at most the
-larger of its two end values plus both of these bounds. Integrals are trapezoidal sums, as in `norms`.
+of ones. Then |gξ| ≤ |gH_L⁻¹|·1 on X for every row g. A file names r facets for every row g at every end of a piece. For
+c = h_l·B on [T_s, T_m], and for an output c on [0, T_m], let f(θ) = |ce^{Aθ}(Cξ + Σ j·n)| + Σ W_i∫₀^θ|ce^{Aσ}b_i|dσ. On
+a piece [α, β] the first term exceeds the linear interpolation of its two end values by at most (β −
+α)²/8·max|cA²e^{Aσ}||x(0)|, and the second by at most (β − α)²/8·Σ W_i·max|cAe^{Aσ}b_i|: f is at most the larger of its
+two end values plus both of these bounds. Integrals are trapezoidal sums, as in `norms`.
 """
 
 from collections.abc import Iterator, Sequence

@@ -1,9 +1,8 @@
 """Performance limits of every controller: theorems, evaluated in ball arithmetic.
 
-Theorem 1 bounds the smallest peak error at a given sampling period. Theorem 2 gives the longest reaction
-and diffusion times, and the smallest withdrawal, with which a controller may stabilise the fault. The first
-chapter treats the linearised rate-and-state fault in slow sliding, the second a fault with slip or
-slip-rate dependent friction.
+Theorem 1 bounds the smallest peak error at a given sampling period. Theorem 2 gives the longest reaction and diffusion
+times, and the smallest withdrawal, with which a controller may stabilise the fault. The first chapter treats the
+linearised rate-and-state fault in slow sliding, the second a fault with slip or slip-rate dependent friction.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -113,8 +112,7 @@ class DisturbedSliding:
 # either may be missing (n = ∞). X and P below are the largest slip-rate error and the largest withdrawal.
 #
 # **Theorem 1 (surprise).** Let the pressure be decided at samples T apart, act θ later and stay for T. On the plant
-# without stick no controller keeps the slip error within E and the slip-rate error below X for
-# all t if
+# without stick no controller keeps the slip error within E and the slip-rate error below X for all t if
 #
 #     X ≤ 2H·h(T + θ + τ),   h: impulse response of h″ = σh − wh′ from acceleration to slip,
 #
@@ -150,9 +148,9 @@ class DisturbedSliding:
 # φ and the plant from the onset; also on the stick–slip plant. *Proof.* For 0 ≤ x1 ≤ E: x2′ ≥ s·x1 − w·x2 + N̂(μ* −
 # m·x1)p_f + H, an equality unless the fault is at rest. The third term is at least c·min(p_f, 0), c = N̂μ*, and
 # min(p_f, 0) is at least v, the path's response to u = min(p, 0). So z = (λ + w)x1 + x2 ≥ z0, z0′ = λz0 + cv + H, z0(0)
-# = 0. Let ζ be z0 plus the future effect of u up to now, which is not positive: z ≥ ζ, and ζ′ = λζ + cG(λ)u + H.
-# Until T ζ grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 at all later t: ζ grows exponentially. x1′ = z −
-# (λ + w)x1 with z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 remains true, and x1 exceeds E. ∎
+# = 0. Let ζ be z0 plus the future effect of u up to now, which is not positive: z ≥ ζ, and ζ′ = λζ + cG(λ)u + H. Until
+# T ζ grows to H(e^{λT} − 1)/λ, and then ζ′ ≥ λζ + H − cG(λ)P > 0 at all later t: ζ grows exponentially. x1′ = z − (λ +
+# w)x1 with z ≥ ζ > 0 keeps x1 positive, so the premise x1 ≥ 0 remains true, and x1 exceeds E. ∎
 #
 # **Theorem 3 (stick–slip plant).** Let a fault rest at slip 0 and p = 0, held by friction, and never slip backward. Let
 # the pressure be decided at samples T apart and stay for T. With constant friction and κT² ≤ 1, no controller that

@@ -703,8 +703,8 @@ def _but(column: arb_mat, place: int) -> arb_mat:
 # y|/2: two columns that enter with the jump. Before the jump |c·b| + `early`·max|cAe^{A·}b|, times `before`, is added
 # to the outputs of the pieces within `early`.
 #
-# **Direct feedthrough.** The direct effect of an input of size 1 on an output is added to its gain in every part of
-# the period.
+# **Direct feedthrough.** The direct effect of an input of size 1 on an output is added to its gain in every part of the
+# period.
 
 _MOST_SUMS = 5 * 10**7  # products for one input: half the limit of the standalone checker
 _ROOM = Fraction((1 << 32) + 1, 1 << 32)  # enlargement of a solution of y + Dx = x

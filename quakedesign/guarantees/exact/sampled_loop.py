@@ -1,7 +1,7 @@
 """Sampled loop of a guarantee: law, loop setup, pump limits, and inputs with their bounds.
 
-The inputs are acceleration, drift, implicit step, noise, initial condition and truncation error of the
-diffusion modes. The derivation of their bounds is in `quakedesign.guarantees.exact.small_gain`.
+The inputs are acceleration, drift, implicit step, noise, initial condition and truncation error of the diffusion modes.
+The derivation of their bounds is in `quakedesign.guarantees.exact.small_gain`.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence

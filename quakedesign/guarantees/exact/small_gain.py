@@ -96,10 +96,10 @@ from quakedesign.plant.fault_plant import FaultPlant
 #
 # An input at t may thus be bounded by outputs up to t + T_s. The theorem still holds: fix t, and let the nominal loop
 # continue after t without inputs, except those that stand for the timing error of a measurement or a pressure from
-# before t. They obey the same bounds and vanish after t + T_s. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is
-# not larger. An implicit step uses e at the time of the measurement, up to which the bounds hold. So E grows only by N1
-# + J·r′, R by N2 + J·|r″|, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a mean of e with non-negative weights
-# of sum 1 over times within J of kT_s: it obeys every bound that all these values obey. ∎
+# before t. They obey the same bounds and vanish after t + T_s. So W(t + T_s) ≤ F + M·W(t + T_s), and W(t) is not
+# larger. An implicit step uses e at the time of the measurement, up to which the bounds hold. So E grows only by N1 +
+# J·r′, R by N2 + J·|r″|, and ε by δγ(N1 + J·r′)/T_s. A measurement may also be a mean of e with non-negative weights of
+# sum 1 over times within J of kT_s: it obeys every bound that all these values obey. ∎
 #
 # **Slowly varying input gain.** For friction that depends on the slip alone β = μ(x1)N̂/b, so |β(τ) − β(t)| ≤ κ|x1(τ) −
 # x1(t)| ≤ κ(2E + r′σ), σ = t − τ, κ = μ′·N̂/b, while |e1| ≤ E. Divide the range of β into parts with midpoints β_i and
@@ -156,8 +156,8 @@ class Bounds:
     stepped : Fraction, optional
         b times the change of the commanded pressure between samples [m/s²]; None where it is not needed.
     small_gain : Fraction
-        Upper bound of the spectral radius of M [-], below 1; for aperiodic sampling the
-        largest Σ c·Y/W over the inputs, at most 1, with bounds Y of the outputs and W of the input.
+        Upper bound of the spectral radius of M [-], below 1; for aperiodic sampling the largest Σ c·Y/W over the
+        inputs, at most 1, with bounds Y of the outputs and W of the input.
     """
 
     available: ClassVar[Literal[True]] = True
@@ -407,8 +407,8 @@ def grown(loop: PeriodicLoop, growth: Fraction) -> PeriodicLoop:
 # ----------------------------------------------------------------------
 # Sector bounds of the solution of an implicit step for bounded errors, in ball arithmetic.
 #
-# **Statement.** Let w solve 0 ∈ w − e2 + q(e1 + T_s·w, w). For |e1| ≤ E, |e2| ≤ R and u = e1/T_s ≥ 0:
-# −γ1·u − ε ≤ w ≤ −γ0·u + ε. The mirrored bounds hold where e1 ≤ 0.
+# **Statement.** Let w solve 0 ∈ w − e2 + q(e1 + T_s·w, w). For |e1| ≤ E, |e2| ≤ R and u = e1/T_s ≥ 0: −γ1·u − ε ≤ w ≤
+# −γ0·u + ε. The mirrored bounds hold where e1 ≤ 0.
 #
 # **Proof.** F(w) = w − e2 + q is strongly monotone, so w ≤ ω wherever F(ω) contains a non-negative number. For e2 ≤ R
 # and 0 ≤ u ≤ E/T_s take ω = ε − γ0·u, where e1 + T_s·ω = T_s(ε + (1 − γ0)u). As q is odd, the lower bound for e1 is

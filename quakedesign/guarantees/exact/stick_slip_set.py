@@ -17,8 +17,8 @@ before the next sample, and the period ends with y = 0. So each period follows e
 ξ ≥ 0 at its end, or the *rest* map with a slip δ until the last stop.
 
 **Sliding map.** With S = (G(ξ) − G(0))/ξ, S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and
-y at the end are linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤
-(t·y + t²/2·(H − bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
+y at the end are linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y
++ t²/2·(H − bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
 **Rest map.** Let τ = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(τ−t)})/w. As y
 = 0 at the stop, integration by parts gives, for the damping w, δ = f(0)y + ∫f·(G + φ)dt up to the stop. Before the stop
@@ -423,8 +423,8 @@ def ranges(task: FaultPlant, ahead: Fraction, feedback: Range, moved: Fraction) 
 
     The slip is at most `ahead` [m] beyond the target, and grows by at most `moved` [m] in a period.
 
-    β ≥ 1 changes within a period by at most N̂|μ′|/b·`moved`, so |σ| exceeds |S*|/(bβ), S* the chord slope of G for
-    p = p*, by at most this fraction.
+    β ≥ 1 changes within a period by at most N̂|μ′|/b·`moved`, so |σ| exceeds |S*|/(bβ), S* the chord slope of G for p =
+    p*, by at most this fraction.
 
     Raises
     ------
@@ -534,8 +534,8 @@ class Period:
     def integrals(self, of_slip: np.ndarray, of_rate: np.ndarray) -> list[np.ndarray]:
         """∫h(t)·t^j dt, j = 0 to 3, with h(t) ≥ |g(T − t)| for an impulse response g.
 
-        On a piece of length ℓ, h is the chord of |g| plus ℓ²/8·max|g″|. All integrals use this one function,
-        since a factor of a single integral may be negative.
+        On a piece of length ℓ, h is the chord of |g| plus ℓ²/8·max|g″|. All integrals use this one function, since a
+        factor of a single integral may be negative.
         """
         number, h = self.back.number, self.interval / NODES
         above = (abs(of_slip) * self.bent[0] + abs(of_rate) * self.bent[1]) * number(h**2 / 8)
@@ -675,8 +675,8 @@ def _carried(
     for place, combination in ends:
         feedback, feedback0, (q1, q0) = feedback_row(sampled_loop, fastest + noise, combination)
         p1, p0 = (q1 - law.return_rate, q0) if combination[1] else (_ZERO, _ZERO)
-        # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2.
-        # r' in the law contains noise, so the reference may move `noise`·T less.
+        # r(t + T) - r(t) is within max|r''|T²/2 of T·r', and never negative: it may be 0 for r' up to max|r''|T/2. r'
+        # in the law contains noise, so the reference may move `noise`·T less.
         moves = np.where(back.middle(n1) > 0, float(bool(q1 or q0)), 1.0)
         late = abs(n1) * number(bend * step**2 / 2) + (abs(n1) + n1) * number(noise * step / 2)
         late = back.array(moves.tolist()) * late

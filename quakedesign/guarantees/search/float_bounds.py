@@ -1,7 +1,6 @@
 """Floating-point estimates of guaranteed bounds and eigenvalues, and rounding of designs.
 
-Used by searches only; nothing is proved here. The last chapter rounds proposed numbers to short
-rationals.
+Used by searches only; nothing is proved here. The last chapter rounds proposed numbers to short rationals.
 """
 
 from collections.abc import Iterable

@@ -1,8 +1,7 @@
 """Search for linear sampled laws with the best guaranteed bounds.
 
-Chapters: guarantees with a slowly varying input gain; design of a law with a disturbance estimate;
-longest sampling period, delay and diffusion time that have a guarantee; certified peaks of an e-LQR in
-continuous time.
+Chapters: guarantees with a slowly varying input gain; design of a law with a disturbance estimate; longest sampling
+period, delay and diffusion time that have a guarantee; certified peaks of an e-LQR in continuous time.
 """
 
 from abc import ABC, abstractmethod

@@ -1,8 +1,7 @@
 """LQG designs of sampled laws, with or without a lag or a diffusion path.
 
-Chapters: regulator by a discrete Riccati equation on fault and path; parametrised families of laws for
-searches; e-LQR with Kalman observer for slow sliding, in scaled variables; linearised fault in slow
-sliding and its poles.
+Chapters: regulator by a discrete Riccati equation on fault and path; parametrised families of laws for searches; e-LQR
+with Kalman observer for slow sliding, in scaled variables; linearised fault in slow sliding and its poles.
 """
 
 from cmath import sqrt

@@ -1,7 +1,7 @@
 """Falsification of guaranteed loops: worst case found (lower bound).
 
-Chapters: sampled loop on a moving reference, with disturbance, friction slope, damping and input gain at
-their extremes; slow sliding, with adverse shear stress at the corners of the box of a, b and D_c.
+Chapters: sampled loop on a moving reference, with disturbance, friction slope, damping and input gain at their
+extremes; slow sliding, with adverse shear stress at the corners of the box of a, b and D_c.
 """
 
 from collections.abc import Iterator

@@ -32,8 +32,8 @@ class Option:
 class Stage(ABC):
     """One element of a chain that carries a pressure [Pa] from the controller to the fault.
 
-    Its numbers and its memory are entries of the state vector of the compiled loop, so that one compilation serves
-    all their values; the methods work on CasADi SX and on floats.
+    Its numbers and its memory are entries of the state vector of the compiled loop, so that one compilation serves all
+    their values; the methods work on CasADi SX and on floats.
 
     Attributes
     ----------

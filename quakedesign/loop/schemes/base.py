@@ -1,7 +1,7 @@
 """Base classes of discretisation schemes, the sampled control step, and aperiodic sampling.
 
-One step of a closed loop is a CasADi expression. A sampled scheme evaluates the law once per T_s with
-zero-order hold; with aperiodic sampling, the interval is a random whole number of steps.
+One step of a closed loop is a CasADi expression. A sampled scheme evaluates the law once per T_s with zero-order hold;
+with aperiodic sampling, the interval is a random whole number of steps.
 """
 
 import math

@@ -1,8 +1,8 @@
 """Implicit and semi-implicit schemes: backward Euler of the law on the double integrator.
 
-The implicit step is a scalar set-valued equation for the slip-rate error at the end of the step. It has
-exactly one solution if the pressure does not increase with the slip-rate error, and is solved without a
-tolerance. The semi-implicit scheme takes magnitudes at the start of the step and signs at its end.
+The implicit step is a scalar set-valued equation for the slip-rate error at the end of the step. It has exactly one
+solution if the pressure does not increase with the slip-rate error, and is solved without a tolerance. The
+semi-implicit scheme takes magnitudes at the start of the step and signs at its end.
 """
 
 from collections.abc import Callable
@@ -287,8 +287,8 @@ def backward_euler(law: DiscreteLaw) -> tuple[sp.Expr, ...]:
     """Pull [m/s], feed-forward [Pa] and ξ⁺ in `end_slip`, `end_rate` and the symbols of `discrete_law`.
 
     The pull is T_s·B0·(p − p_f). The feed-forward p_f, the pressure at zero errors and integral states, balances forces
-    of the plant that the double integrator lacks. Slip and slip rate themselves are taken at the end of the step if
-    the pressure then never increases with them, otherwise at its start. Each ξ' uses the preceding ξ at the end of the
+    of the plant that the double integrator lacks. Slip and slip rate themselves are taken at the end of the step if the
+    pressure then never increases with them, otherwise at its start. Each ξ' uses the preceding ξ at the end of the
     step, and the others at its start.
     """
     pressure, ends = _at_end(law, ERRORS | AHEAD)
@@ -316,10 +316,10 @@ def _at_end(law: DiscreteLaw, place: dict[sp.Symbol, sp.Expr]) -> tuple[sp.Expr,
 class Implicit(Sampled):
     """Evaluates the law at the end of the step, as the double integrator e1' = e2, e2' = B0·p predicts it.
 
-    The equation and its solution are those of `inclusion`. There is no chatter: once the solution lies at the jump
-    e1⁺ = 0 the pressure is −(e2 + e1/T_s)/(T_s·B0), and a disturbance d [m/s²], which the double integrator does not
-    model, leaves e1 ≈ T_s²d and e2 ≈ T_s²d'. Acary and Brogliato (2010), Syst. Control Lett. 59, 284; Brogliato,
-    Polyakov and Efimov (2020), IEEE Trans. Autom. Control 65, 3707.
+    The equation and its solution are those of `inclusion`. There is no chatter: once the solution lies at the jump e1⁺
+    = 0 the pressure is −(e2 + e1/T_s)/(T_s·B0), and a disturbance d [m/s²], which the double integrator does not model,
+    leaves e1 ≈ T_s²d and e2 ≈ T_s²d'. Acary and Brogliato (2010), Syst. Control Lett. 59, 284; Brogliato, Polyakov and
+    Efimov (2020), IEEE Trans. Autom. Control 65, 3707.
     """
 
     name: ClassVar[str] = "implicit"

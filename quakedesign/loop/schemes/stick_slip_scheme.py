@@ -26,11 +26,11 @@ _LEVEL = level_after(_STATES, _SEEN, discrete_law.step, _GAINS)
 class StickSlip(Sampled):
     """Implicit step for e2' = B0(p + d) with the estimate of `StickSlipLaw` in place of the integral states.
 
-    The target rate is r' + w, w the value of e2 at the end of the step of `Implicit` with ξ = 0, and p =
-    (w − e2)/(T_s·B0) − D plus the feed-forward. The disturbance estimate D [Pa] is corrected by the innovation of the
-    slip rate with the gain a/(T_s·B0), and by that of the slip with b/(T_s²·B0); the predicted slip rate is never
-    negative. Where the step ends at e1⁺ = 0 it is `StickSlipLaw` with return_rate = 1/T_s, for which there are
-    guarantees on the stick–slip plant.
+    The target rate is r' + w, w the value of e2 at the end of the step of `Implicit` with ξ = 0, and p = (w −
+    e2)/(T_s·B0) − D plus the feed-forward. The disturbance estimate D [Pa] is corrected by the innovation of the slip
+    rate with the gain a/(T_s·B0), and by that of the slip with b/(T_s²·B0); the predicted slip rate is never negative.
+    Where the step ends at e1⁺ = 0 it is `StickSlipLaw` with return_rate = 1/T_s, for which there are guarantees on the
+    stick–slip plant.
 
     Attributes
     ----------

@@ -1,8 +1,7 @@
 """Accuracy of the differentiator, and joint choice of its bound λ_d and the sampling period.
 
-The error constants are measured with adverse signals, not proved. The joint condition requires that λ_d
-[m/s²] exceeds the slip acceleration, including the effect of the estimation errors through the control
-law.
+The error constants are measured with adverse signals, not proved. The joint condition requires that λ_d [m/s²] exceeds
+the slip acceleration, including the effect of the estimation errors through the control law.
 """
 
 import math

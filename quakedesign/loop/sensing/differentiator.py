@@ -1,9 +1,9 @@
 """Robust exact filtering differentiator: coefficients, discretisations, output feedback.
 
-Discretisations: forward Euler, homogeneous (Livne and Levant 2014, Automatica 50, 2040) and implicit
-(Mojallizadeh, Brogliato and Acary 2021, Int. J. Robust Nonlinear Control 31, 7679). Coefficients: Levant
-and Livne (2020), European Journal of Control 55, 33. Last chapter: from rest and with a sufficiently
-large bound λ_d, the implicit differentiator is a filter of backward differences.
+Discretisations: forward Euler, homogeneous (Livne and Levant 2014, Automatica 50, 2040) and implicit (Mojallizadeh,
+Brogliato and Acary 2021, Int. J. Robust Nonlinear Control 31, 7679). Coefficients: Levant and Livne (2020), European
+Journal of Control 55, 33. Last chapter: from rest and with a sufficiently large bound λ_d, the implicit differentiator
+is a filter of backward differences.
 """
 
 import math
@@ -25,8 +25,7 @@ from quakedesign.loop.sensing.measurement import Entries, Sensor, SlipStage
 # ----------------------------------------------------------------------
 # One sample of the filtering differentiator, discretised in three ways.
 #
-# With y = (w_1 … w_nf, z_0 … z_nd), N = n_d + n_f + 1 entries, and a slip x the differentiator is, in continuous
-# time,
+# With y = (w_1 … w_nf, z_0 … z_nd), N = n_d + n_f + 1 entries, and a slip x the differentiator is, in continuous time,
 #
 #     y_j' = −λ̃_(N−j) λ_d^(j/N) ⌈s⌋^((N−j)/N) + y_(j+1) − [j = n_f]·x,    y_(N+1) = 0,
 #
@@ -44,9 +43,9 @@ from quakedesign.loop.sensing.measurement import Entries, Sensor, SlipStage
 #   the root. Mojallizadeh, Brogliato and Acary (2021), Int. J. Robust Nonlinear Control 31, 7679.
 #
 # In the implicit sliding mode z_i = ∇^i x/T^i, which lags: the i-th derivative is (−ln(1 − ∇))^i x/T^i, whose terms up
-# to ∇^nd x are a combination of z_i … z_nd. `lag_free` has its coefficients i!/j!·|S1(j, i)|; with them the
-# estimates have the accuracy T^(nd+1−i) of the continuous differentiator. For n_f = 0 this is the proper implicit
-# discretisation of Seeber (2024), arXiv:2404.02770.
+# to ∇^nd x are a combination of z_i … z_nd. `lag_free` has its coefficients i!/j!·|S1(j, i)|; with them the estimates
+# have the accuracy T^(nd+1−i) of the continuous differentiator. For n_f = 0 this is the proper implicit discretisation
+# of Seeber (2024), arXiv:2404.02770.
 
 NEWTON_STEPS = 8
 

@@ -107,8 +107,8 @@ class Witness:
     multiplier : mapping of exponents to Fraction
         Polynomial with positive coefficients.
     squares : tuple of Square
-        Sums of squares, each times a product of variables (their indices) and of sign conditions (indices after
-        those of the variables).
+        Sums of squares, each times a product of variables (their indices) and of sign conditions (indices after those
+        of the variables).
     cofactors : tuple of Polynomial
         Cofactor of every equality h_k = 0 of the cell.
     conditions : int

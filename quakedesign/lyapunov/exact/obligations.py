@@ -1,7 +1,7 @@
 """Proof obligations of a Lyapunov function, and the witnesses that prove them.
 
-A loop and a Lyapunov function define polynomials that must be non-negative on cells (FORMAT.md, 2 to 5). A
-witness is a polynomial identity with sums of squares on one cell.
+A loop and a Lyapunov function define polynomials that must be non-negative on cells (FORMAT.md, 2 to 5). A witness is a
+polynomial identity with sums of squares on one cell.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,8 +1,8 @@
 """Bounds of the matched perturbation, the input gain, sectors and equilibrium pressures of a fault.
 
-All bounds hold over the uncertainty box and are computed in ball arithmetic. Chapters: bounds of the
-matched perturbation h and its rate, with and without feed-forward; sectors and equilibrium pressures for
-any constant reference (ERRATA 6 to 12).
+All bounds hold over the uncertainty box and are computed in ball arithmetic. Chapters: bounds of the matched
+perturbation h and its rate, with and without feed-forward; sectors and equilibrium pressures for any constant reference
+(ERRATA 6 to 12).
 """
 
 from dataclasses import dataclass
@@ -84,8 +84,8 @@ def rate_expression(fault: Fault, divisor: Fraction, feedforward: FeedForward) -
 def sensitivity_expressions(fault: Fault, divisor: Fraction, feedforward: FeedForward) -> tuple[sp.Expr, sp.Expr]:
     """∂h/∂e1 [1/s²] and ∂h/∂e2 [1/s] at a fixed time; chord slopes where friction has no derivative.
 
-    They bound the error-dependent part of h: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest
-    absolute values g1, g2 between 0 and e.
+    They bound the error-dependent part of h: |h(t, e) − h(t, 0)| ≤ g1|e1| + g2|e2| with the largest absolute values g1,
+    g2 between 0 and e.
     """
     added = feedforward.acceleration(plant.e1, plant.e2, sp.Integer(0))
     slip, still, rate, calm = plant.sensitivities()

@@ -1,8 +1,8 @@
 """Premises under which a certificate applies to a given fault, reference and disturbance.
 
-Chapters: premise as a value; premises of sliding modes, in ball arithmetic; sector premises of linear
-feedback (ERRATA 6 to 12); recognition of the plant of a loop, independently of the names of its states;
-check that the constants and ranges of a certificate cover those of a fault.
+Chapters: premise as a value; premises of sliding modes, in ball arithmetic; sector premises of linear feedback (ERRATA
+6 to 12); recognition of the plant of a loop, independently of the names of its states; check that the constants and
+ranges of a certificate cover those of a fault.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Robustness of a proved decrease of V to perturbations of the acceleration, and level sets of V in SI units.
 
-The robustness constants depend only on the certificate. They bound the perturbations |w| ≤ g1|e1| + g2|e2|
-of the acceleration for which V' stays negative, for every fault and every gain scale λ.
+The robustness constants depend only on the certificate. They bound the perturbations |w| ≤ g1|e1| + g2|e2| of the
+acceleration for which V' stays negative, for every fault and every gain scale λ.
 """
 
 from collections.abc import Iterator

@@ -1,9 +1,8 @@
 """Joint improvement of gains and Lyapunov function by path-following.
 
-Bilinear inequalities are linearised about the current gains and V (Hassibi, How and Boyd, American
-Control Conference 1999). The module contains the linearised programme, the decay rate as a convex programme,
-the scaling exponents of the gains, state and objective of the search, and the trust region. All results are
-in floating point, without proof.
+Bilinear inequalities are linearised about the current gains and V (Hassibi, How and Boyd, American Control Conference
+1999). The module contains the linearised programme, the decay rate as a convex programme, the scaling exponents of the
+gains, state and objective of the search, and the trust region. All results are in floating point, without proof.
 """
 
 import math

@@ -1,7 +1,6 @@
 """Synthesis of gains with a proof: problem, objectives, and the search.
 
-Objectives: smallest scaled norm, largest decay rate, largest range of β. Gains without a proof are never
-returned.
+Objectives: smallest scaled norm, largest decay rate, largest range of β. Gains without a proof are never returned.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,6 @@
 """Map of certified gains over a grid of two gains.
 
-One compiled problem screens the grid in worker processes. The edges and a random sample of points are
-proved exactly.
+One compiled problem screens the grid in worker processes. The edges and a random sample of points are proved exactly.
 """
 
 import threading

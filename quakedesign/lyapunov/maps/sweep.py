@@ -1,8 +1,8 @@
 """Sweeps of one law over many gains: one compiled conic programme with parameters.
 
-The module contains the programme in cvxpy; V and −V̇ as functions of gains and ranges; and a central-path
-method that bounds the margin from both sides at successive points. A sweep screens in floating point; `prove` makes
-the result at a point exact.
+The module contains the programme in cvxpy; V and −V̇ as functions of gains and ranges; and a central-path method that
+bounds the margin from both sides at successive points. A sweep screens in floating point; `prove` makes the result at a
+point exact.
 """
 
 from collections.abc import Mapping, Sequence

@@ -38,8 +38,8 @@ def certify(
     Parameters
     ----------
     subject : str, type of Law or LoopField
-        Name of a law of the package, a user-defined class, or a bare closed loop; its uncertain parameters
-        are ``beta``, ``d`` = ḣ, or both. The certificate of a user-defined law is checked with ``check(subject)``.
+        Name of a law of the package, a user-defined class, or a bare closed loop; its uncertain parameters are
+        ``beta``, ``d`` = ḣ, or both. The certificate of a user-defined law is checked with ``check(subject)``.
     gains : tuple of number or text
         Exact numbers (decimal, scientific notation or p/q) in the order of the law.
     lipschitz : number or text

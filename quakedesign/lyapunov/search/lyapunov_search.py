@@ -1,8 +1,8 @@
 """Search for a Lyapunov function of given gains, completed by an exact certificate.
 
-One pipeline for every law: candidates, scaling by powers of two, conic programme, claims with a margin,
-and rounding to exact witnesses. The module also contains quadratic functions in floating point, and the
-stored results of the presets; a stored certificate is used only after its exact check.
+One pipeline for every law: candidates, scaling by powers of two, conic programme, claims with a margin, and rounding to
+exact witnesses. The module also contains quadratic functions in floating point, and the stored results of the presets;
+a stored certificate is used only after its exact check.
 """
 
 import math

@@ -1,7 +1,7 @@
 """Campaign problems: one closed loop, the variation of its samples, and the program that computes them.
 
-Chapters: interface; rate-and-state faults in slow sliding; compiled steps of many samples; seeds of the noise;
-loops with a fixed step.
+Chapters: interface; rate-and-state faults in slow sliding; compiled steps of many samples; seeds of the noise; loops
+with a fixed step.
 """
 
 import ctypes

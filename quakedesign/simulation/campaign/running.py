@@ -245,10 +245,10 @@ def run_campaign(
 ) -> Campaign:
     """Run many samples of a closed loop, and store every finished batch in a folder.
 
-    After an interruption at any moment the same call resumes from the files. Its result equals that of an
-    uninterrupted call bitwise, for any kind and number of workers. A call with more samples computes only the new ones.
-    Results do not depend on the processor, the C compiler or the C library, unless a load contains tan, an inverse
-    function, or a hyperbolic function other than tanh.
+    After an interruption at any moment the same call resumes from the files. Its result equals that of an uninterrupted
+    call bitwise, for any kind and number of workers. A call with more samples computes only the new ones. Results do
+    not depend on the processor, the C compiler or the C library, unless a load contains tan, an inverse function, or a
+    hyperbolic function other than tanh.
 
     Parameters
     ----------

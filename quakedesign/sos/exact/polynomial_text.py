@@ -189,8 +189,8 @@ class Expansion:
 #
 # A polynomial is built from numbers (12, 0.5, 1e-8), names, + - * / ^ ** and parentheses. A product needs a *, an
 # exponent is a whole number from 0 to 60, and a divisor is a number. A constraint is two polynomials joined by >=, <=
-# or ==. A name that commonly denotes a number (pi, nan, …) is a variable only if the variables are given. Text is
-# never passed to an interpreter, and every limit is checked before the operation that it limits.
+# or ==. A name that commonly denotes a number (pi, nan, …) is a variable only if the variables are given. Text is never
+# passed to an interpreter, and every limit is checked before the operation that it limits.
 
 LENGTH = 20_000
 """Largest number of characters of a text."""

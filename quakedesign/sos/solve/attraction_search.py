@@ -157,8 +157,8 @@ def other_equilibrium(claim: Attraction) -> Point | None:
 #
 #     −V̇ − s·(1 − V),  1 − V − t·(β − shape)  and  V  sums of squares
 #
-# are computed by `strict_proof` for a given V. With s and t fixed, a programme linear in V and β then maximises β
-# (W. Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). The caller proves the level of every new V.
+# are computed by `strict_proof` for a given V. With s and t fixed, a programme linear in V and β then maximises β (W.
+# Tan and A. Packard, IEEE Trans. Automat. Contr. 53, 2008). The caller proves the level of every new V.
 
 _ROUNDS = 30
 _GROWTH = Fraction(1002, 1000)  # smallest growth of β in a round for which the search continues
@@ -367,8 +367,8 @@ def region_of_attraction(
         Even degree up to which other V are tried (or that of `V`, if higher), starting from `V` or its default, so that
         the region contains {shape ≤ β} for a larger β.
     shape : str, SymPy expression or mapping, optional
-        A polynomial that is positive except at the origin. The result contains the largest β found for which
-        {shape ≤ β} is proved to lie in the region. By default Σ x_i² if a degree is given, otherwise none.
+        A polynomial that is positive except at the origin. The result contains the largest β found for which {shape ≤
+        β} is proved to lie in the region. By default Σ x_i² if a degree is given, otherwise none.
 
     Returns
     -------

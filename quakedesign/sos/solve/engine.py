@@ -1,8 +1,8 @@
 """Search for a proof of positivity: methods and multipliers.
 
-Methods: Gram matrices by conic programming with rounding, and factorisation into a square and a cofactor.
-Multipliers are powers of 1 + Σx_i² (or a similar sum), or sums of squares found in floating point. Exact arithmetic
-decides every proof.
+Methods: Gram matrices by conic programming with rounding, and factorisation into a square and a cofactor. Multipliers
+are powers of 1 + Σx_i² (or a similar sum), or sums of squares found in floating point. Exact arithmetic decides every
+proof.
 """
 
 from abc import ABC, abstractmethod
@@ -170,8 +170,8 @@ def prove(
     Raises
     ------
     PolynomialError
-        When the input is not readable, the multiplier is not proved to be positive, the margin is negative or given
-        for an odd degree, or the Gram matrices are too large for the solver.
+        When the input is not readable, the multiplier is not proved to be positive, the margin is negative or given for
+        an odd degree, or the Gram matrices are too large for the solver.
     """
     start = perf_counter()
     names, given, inequalities, equalities, factor = read(polynomial, on, multiplier, variables)

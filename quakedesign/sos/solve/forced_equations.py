@@ -1,11 +1,11 @@
 """Facial reduction with decisions: linear equations that membership in a cone forces on the decisions.
 
-If a polynomial p(d), affine in the decisions d, is in the cone, it is in the span of the products that the cone
-allows. A monomial that no product contains therefore has the coefficient zero, which is an equation on d. Its exact
-solution may cancel further coefficients; then diagonal Gram entries vanish (`reduced_bases`), and the products contain
-fewer monomials. This is repeated until nothing changes. If a Gram matrix has a numerical kernel for every d, the
-rounded kernel restricts the basis likewise. These equations are a guess, but the resulting decisions are proved like
-all others.
+If a polynomial p(d), affine in the decisions d, is in the cone, it is in the span of the products that the cone allows.
+A monomial that no product contains therefore has the coefficient zero, which is an equation on d. Its exact solution
+may cancel further coefficients; then diagonal Gram entries vanish (`reduced_bases`), and the products contain fewer
+monomials. This is repeated until nothing changes. If a Gram matrix has a numerical kernel for every d, the rounded
+kernel restricts the basis likewise. These equations are a guess, but the resulting decisions are proved like all
+others.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -49,8 +49,8 @@ def verify(
     ----------
     polynomial : str, SymPy expression or mapping of exponents to Fraction
     gram : array of float (n × n)
-        Only its symmetric part is used. With constraints, a list of such arrays: for σ_0, then for the σ_i of every
-        g_i ≥ 0 in polynomial = σ_0 + Σ g_i·σ_i.
+        Only its symmetric part is used. With constraints, a list of such arrays: for σ_0, then for the σ_i of every g_i
+        ≥ 0 in polynomial = σ_0 + Σ g_i·σ_i.
     basis : sequence of n str, SymPy expressions or tuples of exponents
         Monomials or any polynomials; with constraints, a list of such sequences.
     on : sequence of str or SymPy relation, optional
