@@ -64,10 +64,10 @@ class Background:
         """Queue a run: a callable that accepts the keyword ``progress``, a function of the completed fraction."""
         return self._executor.submit(run, *given, **named, progress=self._report)
 
-    def result(self, run: "Future[_Result]", tell: Callable[[float], None]) -> _Result:
+    def result(self, run: "Future[_Result]", progress: Callable[[float], None]) -> _Result:
         """Wait for a run, reporting its progress."""
         while not run.done():
-            tell(self._done)
+            progress(self._done)
             wait([run], timeout=_REPORT_INTERVAL)
         return run.result()
 

@@ -1,8 +1,8 @@
-"""Text for terminals: control characters written out, long text shortened, quantities with prefixes."""
+"""Text for terminals: control characters written out, long text shortened, quantities with prefixes, progress."""
 
 import re
 from bisect import bisect
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import SequenceMatcher, get_close_matches
 from itertools import takewhile
 from math import floor, log10
@@ -17,6 +17,14 @@ _LONGEST_LINE = 200
 _STRENGTH = ",:;."  # punctuation marks, in increasing strength
 _TIMES = (31_557_600.0, "years"), (86_400.0, "days"), (3600.0, "hours")
 _MARKS = re.compile(r"[(\[)\]]|[,:;.] ")
+
+
+Progress = Callable[[str, float], None]
+"""Report of progress: called with the current activity and the completed fraction [-]."""
+
+
+def silent(_what: str, _done: float) -> None:
+    """Report no progress."""
 
 
 def visible(text: str) -> str:

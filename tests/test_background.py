@@ -22,12 +22,12 @@ def test_runs_follow_one_another_beside_the_caller_and_report_their_progress():
         first, second = runs.submit(run, 1), runs.submit(run, 2)
         assert not first.done()
 
-        def tell(done):
+        def progress(done):
             told.append(done)
             if done:
                 begun.set()
 
-        assert [runs.result(first, tell), runs.result(second, tell)] == [1, 2]
+        assert [runs.result(first, progress), runs.result(second, progress)] == [1, 2]
     (one, thread), (other, same) = seen
     assert (one, other) == (1, 2)
     assert thread is same is not current_thread()

@@ -66,7 +66,7 @@ def test_any_executor_will_do():
 
 def test_progress_of_several_answers():
     told = []
-    found = guarantees_of([lambda i=i: i * i for i in range(3)], tell=lambda what, done: told.append((what, done)))
+    found = guarantees_of([lambda i=i: i * i for i in range(3)], progress=lambda what, done: told.append((what, done)))
     assert found == [0, 1, 4]
     assert told == [("1 of 3 computed", 1 / 3), ("2 of 3 computed", 2 / 3), ("3 of 3 computed", 1)]
 

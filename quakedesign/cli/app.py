@@ -5,7 +5,7 @@ import logging
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from itertools import combinations
@@ -20,7 +20,7 @@ from rich.text import Text
 from quakedesign.discovery import allow_code
 from quakedesign.errors import OutputError, ParameterError
 from quakedesign.files import Json, require_writable
-from quakedesign.text import in_lines, visible
+from quakedesign.text import Progress, in_lines, visible
 
 _quiet: ContextVar[bool] = ContextVar("quiet", default=False)
 _log = logging.getLogger("quakedesign")
@@ -148,20 +148,21 @@ def require_different(places: Mapping[str, Path | None]) -> None:
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str, float], None]]:
+def progress() -> Iterator[Progress]:
     """Progress bar on stderr; stdout is for the result only."""
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Display
 
     columns = TextColumn("{task.description:44}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn()
     console = Console(stderr=True)
     shown = console.is_terminal and not _quiet.get()
-    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+    with Display(*columns, console=console, transient=True, disable=not shown) as bar:
         task, last = bar.add_task("starting", total=1.0), ""
 
-        def tell(what: str, done: float) -> None:
+        def report(what: str, done: float) -> None:
             nonlocal last
             bar.update(task, description=what, completed=done)
             _log.log(logging.DEBUG if what == last else logging.INFO, "%s (%.0f %%)", visible(what), 100 * done)
             last = what
 
-        yield tell
+        yield report

@@ -213,8 +213,8 @@ def guarantee_chain(
     if sliding is None:
         result = guarantee(chain, law, step=step)
     else:
-        with progress() as tell:
-            tell("design and proof", 0.0)
+        with progress() as bar:
+            bar("design and proof", 0.0)
             result = guarantee(chain, law, step=step, **sliding)
     proof = result.proof
     if out is not None and proof.available:
@@ -240,9 +240,9 @@ def compare_chain(chain: "BlockChain", controller: str, sliding: dict[str, Any],
     require_loads(chain, sliding)
     laws = BLOCK_LAWS if controller == "all" else (block_law(controller, "all"),)
     runs: list[ChainRun | SlidingChainRun] = []
-    with progress() as tell:
+    with progress() as bar:
         for place, law in enumerate(laws):
-            tell(f"{law}: design, proof and run", place / len(laws))
+            bar(f"{law}: design, proof and run", place / len(laws))
             runs.append(run_sliding_chain(chain, law, sliding=sliding) if chain.has_state else run_of_chain(chain, law))
     rows = [list(_HEADS), ["", "slip rate", "slip", "slip rate", "slip", "from", "to"], *(one.row() for one in runs)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -301,8 +301,8 @@ def export_chain(
     controller = block_law(law.controller, "cta", law.certificate)
     folder = out or Path(f"quakedesign-{chain.name}-{controller}")
     require_free(folder, force)
-    with progress() as tell:
-        tell("design and proof", 0.0)
+    with progress() as bar:
+        bar("design and proof", 0.0)
         proof = chain_law(chain, controller, law.certificate)
     if not proof.available:
         output.show(_values(proof, chain), [*_lines(proof, chain), "nothing is exported, as no law is proved"])
@@ -326,10 +326,10 @@ def run_chain(
         prepare(out, force=force)
         require_writable(out)
         lock_folder(out)
-    with progress() as tell:
-        tell("design, proof and run", 0.0)
+    with progress() as bar:
+        bar("design, proof and run", 0.0)
         if chain.has_state:
-            entered |= {"tell": lambda done: tell("run", done)}
+            entered |= {"progress": lambda done: bar("run", done)}
         one = run_sliding_chain(chain, **entered) if chain.has_state else run_of_chain(chain, **entered)
     proof: Any = one.proof
     values = _run_values(one)

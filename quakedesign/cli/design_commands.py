@@ -195,9 +195,9 @@ def design(
     from quakedesign.report.comparison_table import designed_comparison
     from quakedesign.report.folder import write_folder
 
-    with progress() as tell:
-        comparison = designed_comparison(loaded, tell=tell, **arguments)
-        results = write_folder(comparison, folder, force=force, formats=format, command=command_line(), tell=tell)
+    with progress() as bar:
+        comparison = designed_comparison(loaded, progress=bar, **arguments)
+        results = write_folder(comparison, folder, force=force, formats=format, command=command_line(), progress=bar)
 
     def printed() -> None:
         from quakedesign.report.terminal import print_comparison
@@ -269,8 +269,8 @@ def compare(
     if (chain := several_blocks(fault, compare, entered, accepted, options.box)) is not None:
         return compare_chain(chain_at_step(chain, options.setup()), options.controller, options.sliding, output)
     loaded, arguments = options.problem(fault)
-    with progress() as tell:
-        comparison = designed_comparison(loaded, tell=tell, **arguments)
+    with progress() as bar:
+        comparison = designed_comparison(loaded, progress=bar, **arguments)
     if output.json:
         of_paper = {"numbers": table(comparison), "printed": printed(comparison)}
         print_json({**results(comparison, stored=False), **of_paper})
@@ -315,11 +315,11 @@ def figures(
     from quakedesign.report.sentences import run_sentences
     from quakedesign.report.terminal import printed_lines
 
-    with progress() as tell:
-        comparison = designed_comparison(loaded, tell=tell, **arguments)
-        study = paper_study(comparison, progress=tell)
+    with progress() as bar:
+        comparison = designed_comparison(loaded, progress=bar, **arguments)
+        study = paper_study(comparison, progress=bar)
         results = write_folder(
-            comparison, folder, force=force, study=study, formats=format, command=command_line(), tell=tell
+            comparison, folder, force=force, study=study, formats=format, command=command_line(), progress=bar
         )
     if output.json:
         print_json(results)

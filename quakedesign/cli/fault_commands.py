@@ -128,9 +128,9 @@ def errata(*rows: int, output: Output = PLAIN) -> int:
 
     numbers = list(rows) or [row.number for row in errata_rows()]
     checked = []
-    with progress() as tell:
+    with progress() as bar:
         for i, number in enumerate(numbers):
-            tell(f"row {number}", i / len(numbers))
+            bar(f"row {number}", i / len(numbers))
             checked += run_rows([number])
     output.show({"errata": checked}, (line for row in checked for line in _row_lines(row)))
     return 0

@@ -251,7 +251,7 @@ def gain_map(
     if range is not None and len(range) != 4:
         raise ParameterError(f"range needs four numbers, two for each gain. Received {len(range)}.")
     base = gains or tuple(str(v) for v in family(law)[0].law.gains.values())
-    with progress() as tell:
+    with progress() as bar:
         drawn = mapped(
             law,
             base,
@@ -265,7 +265,7 @@ def gain_map(
             seed=seed,
             workers=workers,
             scheduler=scheduler,
-            tell=tell,
+            progress=bar,
         )
     values = write_gain_map(drawn, folder, format)
     written = f"written: {folder}/ ({file_names('map', format)}, map.csv, results.json, certificates)"

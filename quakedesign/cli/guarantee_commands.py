@@ -136,10 +136,10 @@ def guarantee(
 
         arguments["law"] = SampledLaw.load(law)
     calls = [partial(guaranteed, one, controller, setup, **arguments) for one in faults]
-    with progress() as tell:
+    with progress() as bar:
         if not more and scheduler is None and workers == 1:
-            calls = [partial(calls[0], progress=tell)]
-        results: Any = guarantees_of(calls, workers=workers, scheduler=scheduler, tell=tell if more else None)
+            calls = [partial(calls[0], progress=bar)]
+        results: Any = guarantees_of(calls, workers=workers, scheduler=scheduler, progress=bar if more else None)
     entries = {"class": disturbance_class, "seconds": perf_counter() - began}
     if not more:
         if isinstance(results[0], QuakedesignError):

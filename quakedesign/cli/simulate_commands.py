@@ -133,12 +133,12 @@ def simulate(
         way, step, _ = run.way(chosen.controller if chosen else None, "continuous")
         period = loaded.sampling_time if step is None else step
         substeps, chain, sensor = loop_elements(chosen, period, run, actuator, sensors, seed)
-        with progress() as tell:
-            tell("compiling", 0.0)
+        with progress() as bar:
+            bar("compiling", 0.0)
             trajectory, premises = run_single(
                 loaded,
                 chosen,
-                tell=lambda done: tell("simulation", done),
+                progress=lambda done: bar("simulation", done),
                 duration=run.duration,
                 load=load if load != Load() else None,
                 step=step,
@@ -269,14 +269,14 @@ def sampling(
     folder = out or Path(f"quakedesign-{loaded.name}-sampling")
     prepare(folder, force=force)
     lock_folder(folder)
-    with progress() as tell:
-        tell("gains", 0.0)
+    with progress() as bar:
+        bar("gains", 0.0)
         law = (
             design(loaded, controller, continuous=True)
             if gains in (DESIGNED, CONTINUOUS)
             else choice(loaded, controller, gains).controller
         )
-        report = sampling_report(loaded, law, scales=scale, schemes=schemes, duration=duration, progress=tell)
+        report = sampling_report(loaded, law, scales=scale, schemes=schemes, duration=duration, progress=bar)
         results = write_sampling(report, folder, format)
 
     def printed() -> None:
@@ -444,8 +444,8 @@ def campaign(
     lock_folder(folder, make=True)
     options: dict[str, Any] = {"workers": workers, "scheduler": scheduler, "metric": search, "renew": force}
     remedy(f"run the same command again to continue from {folder}")
-    with progress() as tell:
-        done = run_campaign(problem, samples, folder, tell=tell, **options)
+    with progress() as bar:
+        done = run_campaign(problem, samples, folder, progress=bar, **options)
         drawn = done.plot()
         done.save(folder, {f"distribution.{kind}": figure_bytes(drawn, kind, "distribution") for kind in format})
         values = done.to_dict() | _rerun(done, rerun, folder)

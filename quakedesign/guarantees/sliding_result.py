@@ -1,6 +1,5 @@
 """Results of `quakedesign.guarantee` in slow sliding: search, proof, worst case, remedies."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -37,10 +36,8 @@ from quakedesign.guarantees.search.worst_case import WorstCase, worst_sliding
 from quakedesign.loop.loop_setup import Pump
 from quakedesign.plant.of_fault import slow_sliding_plant
 from quakedesign.plant.sliding_plant import SlidingPlant
-from quakedesign.text import quantity
+from quakedesign.text import Progress, quantity, silent
 
-Tell = Callable[[str, float], None]
-"""Called with the name of the current step and the fraction done [-]."""
 _TRIFLE = Fraction(1)  # stress [Pa] of the task if none is given, and tried where the estimate of the largest is 0
 _SEARCHED = 0.8  # fraction of the work at which the proof of a designed law begins
 _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # shares of an estimate that may be too large
@@ -88,7 +85,7 @@ def guarantee_sliding(
     step: Fraction | None = None,
     stress: Fraction | None = None,
     spread: Fraction = Fraction(0),
-    tell: Tell = lambda what, done: None,
+    progress: Progress = silent,
     setup: ExactSetup = PLAIN,
 ) -> SlidingGuarantee:
     """Design and prove a law for a rate-and-state fault at the mean rate of its task.
@@ -104,7 +101,7 @@ def guarantee_sliding(
         Bound of the shear stress disturbance [Pa]; by default the largest that is proved.
     spread : Fraction
         Relative uncertainty of a, b and D_c [-].
-    tell : callable, optional
+    progress : callable, optional
         Called with the name of the current step and the fraction done [-].
     setup : ExactSetup
         With a lag or a diffusion path. All proved pressures lie within the limits of its pump.
@@ -136,23 +133,23 @@ def guarantee_sliding(
             "slow sliding has no guarantee with the rate limit of a pump. Received the rate limit "
             f"{shortly(pump.rate)} Pa/s. Omit the rate limit."
         )
-    prove = _proof(pump, tell, with_stress=stress is not None)
-    tell(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
+    prove = _proof(pump, progress, with_stress=stress is not None)
+    progress(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
     result, well, remedy = _designed(task, period, LOG_RATES[0], setup, prove), FarthestWell(share=Fraction(1)), ""
     if result.sampled_loop is None:
-        tell("how far the well may be", 0.3)
+        progress("how far the well may be", 0.3)
         well = farthest(task, admissible_step(task, period), setup, stressed=stress is not None)
         remedy = _remedy(fault, task, period, well, setup, prove, spread)
     for log_rate in LOG_RATES[1:]:
         if (result.proved and (stress or result.task.stress > _TRIFLE)) or well.share < 1:
             break
-        tell(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
+        progress(f"a law for |ln(v/V)| up to {log_rate}", _SEARCHED)
         smaller = _designed(task, period, log_rate, setup, prove, well.numbers)
         more = smaller.proved and (not result.proved or smaller.task.stress > result.task.stress)
         result = smaller if more else result
     if not result.proof.available and not remedy and stress:
         pumped = replace(setup, pump=pump)
-        remedy = _under_less(guarantee_sliding(fault, step=step, spread=spread, tell=tell, setup=pumped))
+        remedy = _under_less(guarantee_sliding(fault, step=step, spread=spread, progress=progress, setup=pumped))
         if remedy and result.sampled_loop is None:
             none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
             result = replace(result, proof=NoProof(reason=none))
@@ -211,14 +208,14 @@ def _remedy(
     return "" if suits == step else near
 
 
-def _proof(pump: Pump | None, tell: Tell, *, with_stress: bool) -> Prove:
+def _proof(pump: Pump | None, progress: Progress, *, with_stress: bool) -> Prove:
     """Proof within the pump limits, under the task's stress or near the largest stress."""
 
     def tried(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
-        tell(f"{under}: proof", _SEARCHED)
+        progress(f"{under}: proof", _SEARCHED)
         proof = _within_pump(pump, proved_sliding(task, sampled_loop, log_rate=log_rate))
-        tell(f"{under}: {'proved' if proof.available else 'not proved'}", _SEARCHED)
+        progress(f"{under}: {'proved' if proof.available else 'not proved'}", _SEARCHED)
         return proof
 
     def about_the_largest(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:

@@ -1,6 +1,5 @@
 """Results of `quakedesign.guarantee` on the stick–slip plant: proof, worst case, limits."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -19,7 +18,7 @@ from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.laws import SlidingMode
 from quakedesign.loop.loop_setup import LoopSetup
 from quakedesign.plant.of_fault import uncertain_plant
-from quakedesign.text import quantity
+from quakedesign.text import Progress, quantity, silent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +103,7 @@ def guarantee_stick_slip(
     *,
     objective: str = "tracking",
     sliding: SlidingMode | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> StickSlipGuarantee:
     """Design a law for the stick–slip plant and prove its bounds.
 
@@ -133,9 +132,9 @@ def guarantee_stick_slip(
         )
     task = uncertain_plant(fault)
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)
-    tell = progress or (lambda what, done: None)
+    progress = progress or (silent)
     healing = rational(fault.friction.rest_excess)
-    options: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "tell": tell}
+    options: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "progress": progress}
     options["longest_step"] = setup.longest_step
     if sliding is None:
         return stick_slip_with_worst_case(fault, design_stick_slip(task, step, **options))

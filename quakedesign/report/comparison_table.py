@@ -1,6 +1,6 @@
 """Comparisons as JSON, as figures, and in notebooks."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from quakedesign.errors import ParameterError
@@ -13,6 +13,7 @@ from quakedesign.report.page import table_html
 from quakedesign.report.sentences import brief, headline, remarks
 from quakedesign.studies.comparison import AS_IN_THE_PAPER, Compared, compared, designs_of
 from quakedesign.synthesis import Design, assess
+from quakedesign.text import Progress, silent
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,7 +63,7 @@ def compare(
     published_scheme: str | None = None,
     whole_task: bool = False,
     plant: str | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     **entered: Quantity | None,
 ) -> Comparison:
     """Run all controllers of a fault at its T_s, for the whole task, or for 500 D_c/V if friction has a state.
@@ -104,7 +105,7 @@ def compare(
         raise ParameterError(
             f"a loop setup of a comparison needs given laws. Received {setup!r} without any. Give the setup to design."
         )
-    tell = progress or (lambda _what, _done: None)
+    progress = progress or (silent)
     how: dict[str, Any] = {
         "with_published": with_published and not any(getattr(one, "setup", setup).path for one in designs),
         "whole_task": whole_task,
@@ -112,13 +113,13 @@ def compare(
         "plant": plant,
     }
     made: Any = ((one, False) if isinstance(one, Design) else (assess(fault, one, setup), True) for one in designs)
-    return Comparison(**vars(compared(fault, made, tell, **how)))
+    return Comparison(**vars(compared(fault, made, progress, **how)))
 
 
 def designed_comparison(
     fault: Fault,
     names: Iterable[str],
-    tell: Callable[[str, float], None],
+    progress: Progress,
     *,
     options: Mapping[str, Any] | None = None,
     whole_task: bool = False,
@@ -132,7 +133,7 @@ def designed_comparison(
     fault : Fault
     names : iterable of str
         Names of control laws.
-    tell : callable
+    progress : callable
         Called with the current activity and the fraction done [-].
     options : mapping, optional
         Options of `quakedesign.design`, such as ``objective`` and ``continuous``.
@@ -142,10 +143,10 @@ def designed_comparison(
         ``scheme`` and ``published_scheme`` of `compare`.
     """
     options_of_all = {**(options or {}), "plant": plant}
-    made = ((one, False) for one in designs_of(fault, names, tell, options_of_all))
+    made = ((one, False) for one in designs_of(fault, names, progress, options_of_all))
     how: dict[str, Any] = {"whole_task": whole_task, "plant": plant, "schemes": _schemes(**schemes)}
     how["with_published"] = not options_of_all.get("setup", IDEAL).path
-    return Comparison(**vars(compared(fault, made, tell, **how)))
+    return Comparison(**vars(compared(fault, made, progress, **how)))
 
 
 def _schemes(scheme: str | None = None, published_scheme: str | None = None) -> dict[str, str]:

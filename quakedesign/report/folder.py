@@ -1,7 +1,7 @@
 """Result folders, written whole or not at all."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from quakedesign.report.paper_figures import PAPER
 from quakedesign.report.tables import csv_text
 from quakedesign.studies.fault_facts import fault_dict
 from quakedesign.studies.paper import printed, table
+from quakedesign.text import Progress, silent
 
 if TYPE_CHECKING:
     from quakedesign.report.paper_figures import PaperStudy
@@ -92,7 +93,7 @@ def write_folder(
     study: "PaperStudy | None" = None,
     formats: Sequence[str] = DEFAULT,
     command: str = "",
-    tell: Callable[[str, float], None] = lambda _what, _done: None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Write certificates, figures, results and the page into a folder, whole or not at all.
 
@@ -106,7 +107,7 @@ def write_folder(
         Formats of the figure files, see `quakedesign.report.drawing.FORMATS`.
     command : str
         Command that reproduces the report, as stated in it.
-    tell : callable
+    progress : callable
         Called with the current activity and the fraction done [-].
 
     Returns
@@ -119,7 +120,7 @@ def write_folder(
     shown = study or comparison
     with whole_folder(out) as partial:
         _write_certificates(partial, comparison)
-        inside = _write_figures(partial, shown, formats, tell)
+        inside = _write_figures(partial, shown, formats, progress)
         page = page_html(comparison, inside, reproduction(comparison.fault, command))
         (partial / "report.html").write_text(page, encoding="utf-8")
         (partial / "fault.toml").write_text(fault_toml(comparison.fault), encoding="utf-8")
@@ -144,12 +145,12 @@ def _write_certificates(folder: Path, comparison: Comparison) -> None:
 
 
 def _write_figures(
-    folder: Path, shown: "Comparison | PaperStudy", formats: Sequence[str], tell: Callable[[str, float], None]
+    folder: Path, shown: "Comparison | PaperStudy", formats: Sequence[str], progress: Progress
 ) -> dict[str, Markup]:
     """Write every figure in every format; return the SVG elements for the page, drawn together with the SVG files."""
     (folder / "figures").mkdir()
     draw = cache(shown.figures)
-    tell("figures", 0.0)
+    progress("figures", 0.0)
     inside = {}
     for name, (vector, inside[name]) in cached_figures(draw, CAPTIONS, shown).items():
         for kind in formats:

@@ -4,7 +4,6 @@ Source: Gutiérrez-Oribio, Tzortzopoulos, Stefanou and Plestan, Earthquake Contr
 figures of the laboratory fault show experiments; here this fault is simulated like any other.
 """
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +26,7 @@ from quakedesign.report.drawing import (
 )
 from quakedesign.report.figures import end, figures, pressure
 from quakedesign.studies.paper import BARS, PaperRuns, baseline, friction_curve, paper_runs, relative
+from quakedesign.text import Progress
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -225,6 +225,6 @@ class PaperStudy(PaperRuns):
         return paper_figures(self)
 
 
-def paper_study(comparison: Comparison, *, progress: Callable[[str, float], None] | None = None) -> PaperStudy:
+def paper_study(comparison: Comparison, *, progress: Progress | None = None) -> PaperStudy:
     """Simulate the additional runs for the figures of the paper; see `paper_runs`."""
     return PaperStudy(**vars(paper_runs(comparison, progress=progress)))

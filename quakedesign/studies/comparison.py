@@ -3,7 +3,7 @@
 The second chapter gives the equilibrium pressure [Pa] of a task and tests whether a run supplied it.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -34,11 +34,11 @@ from quakedesign.studies.certified import certified_bound, largest_sampling_time
 from quakedesign.studies.single_runs import designed_run, natural_run
 from quakedesign.synthesis import Design, assess, designable, left_out
 from quakedesign.synthesis import design as synthesise
+from quakedesign.text import Progress
 
 # ----------------------------------------------------------------------
 # Comparison of all controllers of one fault in closed loop.
 
-Tell = Callable[[str, float], None]
 
 AS_IN_THE_PAPER = "continuous"
 """Scheme of the paper's simulations."""
@@ -160,7 +160,7 @@ class Compared:
 def compared(
     fault: Fault,
     designs: Iterable[tuple[Design, bool]],
-    progress: Tell,
+    progress: Progress,
     *,
     with_published: bool = True,
     whole_task: bool = False,
@@ -221,7 +221,7 @@ def _guarantee_of(fault: Fault, design: Design, *, given: bool) -> Guarantee | N
     return result if proof.available or design.runs else replace(result, given=True)  # only T_s of the fault was tried
 
 
-def _compared_in_slow_sliding(fault: Fault, designs: Sequence[Design], progress: Tell, *, whole: bool) -> Compared:
+def _compared_in_slow_sliding(fault: Fault, designs: Sequence[Design], progress: Progress, *, whole: bool) -> Compared:
     """Comparison for friction with a state: seismic cycle, and designs with their runs."""
     natural = natural_run(fault)
     entries = []
@@ -235,7 +235,7 @@ def _compared_in_slow_sliding(fault: Fault, designs: Sequence[Design], progress:
 
 
 def designs_of(
-    fault: Fault, names: Iterable[str], progress: Tell, options: Mapping[str, Any] | None = None
+    fault: Fault, names: Iterable[str], progress: Progress, options: Mapping[str, Any] | None = None
 ) -> Iterator[Design]:
     """Designs of the named laws, one after the other, with options of `quakedesign.design`."""
     listed = list(names)
@@ -260,7 +260,7 @@ def _begun(
     return entry, runs.submit(simulate, design.fault, design.controller, **options)
 
 
-def _ended(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
+def _ended(entry: Entry, run: Trajectory, progress: Progress) -> Entry:
     """Entry with its run, and the results that depend on the run."""
     law = entry.design.controller
     assert law is not None
@@ -270,7 +270,7 @@ def _ended(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
     return entry if law.sampling else _linear(entry, run, progress)
 
 
-def _linear(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
+def _linear(entry: Entry, run: Trajectory, progress: Progress) -> Entry:
     """Entry of a linear law in continuous time, with its stability under zero-order hold and its peaks."""
     design = entry.design
     growth, sampled = None, design.sampled_stability()
@@ -285,7 +285,7 @@ def _linear(entry: Entry, run: Trajectory, progress: Tell) -> Entry:
     return replace(entry, growth_per_step=growth, zero_order_hold=sampled, peaks=proved)
 
 
-def _sliding_mode(entry: Entry, law: Controller, limit: float, run: Trajectory, progress: Tell) -> Entry:
+def _sliding_mode(entry: Entry, law: Controller, limit: float, run: Trajectory, progress: Progress) -> Entry:
     """Entry of a sliding mode, with |h'| of its run; in continuous time also largest T_s and feed-forward variants."""
     design, certified = entry.design, certified_bound(entry.design)
     bound = limit if certified is None else float(certified * (law.scale or 1))

@@ -4,7 +4,7 @@ The trade-off is between the certified slip-rate error and the tracking error.
 """
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from importlib.resources import files
@@ -21,6 +21,7 @@ from quakedesign.plant import uncertain_plant
 from quakedesign.simulation import Trajectory, natural_earthquake, simulate
 from quakedesign.simulation.closed_loop import ClosedLoop
 from quakedesign.studies.comparison import Compared, Entry
+from quakedesign.text import Progress, silent
 
 # ----------------------------------------------------------------------
 # Numbers of the bar charts: every metric of every run, and the five of the paper relative to the e-LQR.
@@ -176,7 +177,7 @@ class PaperRuns:
     front: tuple[FrontPoint, ...] = ()  # Trade-off between peak and tracking, if a sampled e-LQR was designed
 
 
-def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] | None = None) -> PaperRuns:
+def paper_runs(comparison: Compared, *, progress: Progress | None = None) -> PaperRuns:
     """Make the short runs that the figures of the paper need in addition to a comparison.
 
     Parameters
@@ -184,10 +185,10 @@ def paper_runs(comparison: Compared, *, progress: Callable[[str, float], None] |
     progress : callable, optional
         Called with the current activity and the fraction done [-].
     """
-    return _runs(comparison.fault, comparison, progress or (lambda _what, _done: None))
+    return _runs(comparison.fault, comparison, progress or (silent))
 
 
-def _short_runs(fault: Fault, comparison: Compared, progress: Callable[[str, float], None]) -> PaperRuns:
+def _short_runs(fault: Fault, comparison: Compared, progress: Progress) -> PaperRuns:
     progress("induced earthquake", 0.0)
     plant = comparison.uncontrolled.provenance["plant"]
     induced = natural_earthquake(fault, INDUCING_SHARE * fault.effective_normal_stress, plant=plant)

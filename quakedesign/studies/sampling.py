@@ -1,6 +1,6 @@
 """Effect of sampling on a law: all schemes, published controllers, orders, noise, input gain."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -16,13 +16,13 @@ from quakedesign.simulation.run_settings import PRINTED
 from quakedesign.simulation.sensitivity import SCHEMES
 from quakedesign.studies.certified import certified_bound, trajectory_premise
 from quakedesign.synthesis import Design
+from quakedesign.text import Progress, silent
 
 PUBLISHED_SCHEMES = ("continuous", "explicit", "compensated")
 DECADES = 3
 PERIODS = 650  # duration of the runs that measure the orders, as a multiple of the longest T_s
 SHARE = 1 / 16  # duration of a run for the sensitivity to noise, as a share of the task
 UNCERTAIN = "ten-percent"
-Tell = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +87,7 @@ def sampling_report(
     scales: Sequence[str] = (),
     schemes: Sequence[str] = SCHEMES,
     duration: float | None = None,
-    progress: Tell | None = None,
+    progress: Progress | None = None,
 ) -> SamplingReport:
     """Run a law under every scheme, and published laws, on the plant without stick; measure orders and sensitivities.
 
@@ -109,7 +109,7 @@ def sampling_report(
     ParameterError
         For a scale if the law has none.
     """
-    tell = progress or (lambda _what, _done: None)
+    progress = progress or (silent)
     design = law if isinstance(law, Design) else None
     controller = law.controller if isinstance(law, Design) else law
     if controller is None:
@@ -121,11 +121,13 @@ def sampling_report(
     ]
     entries += [("published", printed, PUBLISHED_SCHEMES) for printed in published(fault.name).values()]
     rows = [
-        _row(fault, origin, variant, scheme, bound if origin != "published" else None, duration, tell)
+        _row(fault, origin, variant, scheme, bound if origin != "published" else None, duration, progress)
         for origin, variant, chosen in entries
         for scheme in chosen
     ]
-    return SamplingReport(fault=fault, rows=tuple(rows), studies=_studies(fault, controller, schemes, duration, tell))
+    return SamplingReport(
+        fault=fault, rows=tuple(rows), studies=_studies(fault, controller, schemes, duration, progress)
+    )
 
 
 def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]:
@@ -134,33 +136,39 @@ def _variants(controller: Controller, scales: Sequence[str]) -> list[Controller]
 
 
 def _row(
-    fault: Fault, origin: str, law: Controller, scheme: str, bound: Fraction | None, duration: float | None, tell: Tell
+    fault: Fault,
+    origin: str,
+    law: Controller,
+    scheme: str,
+    bound: Fraction | None,
+    duration: float | None,
+    progress: Progress,
 ) -> SchemeRow:
     label = f"{law.title}{f', λ {float(law.scale):.3g}' if law.scale is not None else ''}"
     label = f"{law.title}, published" if origin == "published" else label
     text = f"{label}, {scheme}"
     options: dict[str, Any] = {"scheme": scheme, "duration": duration, "samples": 1000, "plant": PRINTED}
-    run = simulate(fault, law, progress=lambda done: tell(text, done), **options)
+    run = simulate(fault, law, progress=lambda done: progress(text, done), **options)
     premise = trajectory_premise(law, None if bound is None else float(bound * (law.scale or 1)), run)
     return SchemeRow(label=label, origin=origin, controller=law, scheme=scheme, run=run, premise=premise)
 
 
 def _studies(
-    fault: Fault, law: Controller, schemes: Sequence[str], duration: float | None, tell: Tell
+    fault: Fault, law: Controller, schemes: Sequence[str], duration: float | None, progress: Progress
 ) -> dict[str, Study]:
     task = fault.reference.operation_time
     window = (task if duration is None else duration) * SHARE
     studies = {}
     if law.scale is not None and not any(law.feedforward.coefficients.values()):
-        tell("orders of accuracy", 0.0)
+        progress("orders of accuracy", 0.0)
         studies["orders"] = orders(fault, law, schemes)
     for i, of in enumerate(("slip_noise", "rate_noise")):
-        tell(f"sensitivity to {of.replace('_', ' ')}", i / 3)
+        progress(f"sensitivity to {of.replace('_', ' ')}", i / 3)
         levels = noise_levels(fault, of)
         studies[of] = noise_sensitivity(
             fault, law, levels=levels, of=of, schemes=schemes, duration=window, plant=PRINTED
         )
-    tell("sensitivity to the input gain", 2 / 3)
+    progress("sensitivity to the input gain", 2 / 3)
     box = fault if fault.box.authority else fault.with_box(UNCERTAIN)
     gain = gain_sensitivity(box, law, points=3, schemes=schemes, duration=duration, plant=PRINTED)
     return studies | {"input_gain": gain}

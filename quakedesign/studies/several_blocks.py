@@ -478,7 +478,7 @@ def run_sliding_chain(
     loading_rate: float | None = None,
     duration: float | None = None,
     inertia: bool = False,
-    tell: Callable[[float], None] = lambda _: None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> SlidingChainRun:
     """Run blocks with rate-and-state friction without control, or under a proved law.
 
@@ -520,7 +520,7 @@ def run_sliding_chain(
         period=stress_period,
         duration=duration,
         inertia=inertia,
-        progress=tell,
+        progress=progress,
     )
     entries: dict[str, Any] = {"lag": lag, "covered": covered, "log_rate": rate, "stress": size}
     return SlidingChainRun(chain=chain, run=trajectory, inertia=inertia, proof=proof, controller=controller, **entries)

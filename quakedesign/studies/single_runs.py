@@ -643,7 +643,7 @@ def run_single(
     fault: Fault,
     law: Controller | Choice | None,
     *,
-    tell: Callable[[float], None],
+    progress: Callable[[float], None],
     duration: float | None = None,
     load: Load | None = None,
     noise: Sensor = EXACT,
@@ -659,7 +659,7 @@ def run_single(
     law : Controller, Choice or None
         A choice also supplies certified bounds. None with a duration: the fault under its own disturbance. None without
         a duration: the natural earthquake.
-    tell : callable
+    progress : callable
         Called with the progress.
     duration : float, optional
         Duration of the run [s]; by default the operation time, but see `law`.
@@ -693,7 +693,7 @@ def run_single(
     chosen = law if isinstance(law, Choice) or law is None else Choice(controller=law)
     own = chosen.controller if chosen else None
     given |= dict(initial or {})
-    run = run_loop(fault, own, duration=duration, load=load, progress=tell, **settings, **given)
+    run = run_loop(fault, own, duration=duration, load=load, progress=progress, **settings, **given)
     if chosen is None:
         return run, []
     return run, _premises(fault, chosen, run, noise, name)

@@ -3,7 +3,7 @@
 `design` finds gains with a proof; `assess` gives the verdict on given gains.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import field, replace
 from fractions import Fraction
 from html import escape
@@ -37,6 +37,7 @@ from quakedesign.lyapunov.exact.perturbation_bounds import least_authority
 from quakedesign.lyapunov.exact.premises import Premise, Variant
 from quakedesign.plant import uncertain_plant
 from quakedesign.synthesis.method import GainProblem, SlowSlidingDesign, method_of
+from quakedesign.text import Progress
 
 # ----------------------------------------------------------------------
 # A controller for one fault with its proof.
@@ -219,7 +220,7 @@ def design(
     stress: Quantity | None = None,
     spread: Quantity = 0,
     disturbance_class: str = CLASSES[0],
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     accept_poor_fit: bool = False,
     **entered: Quantity | None,
 ) -> Design:
@@ -320,7 +321,7 @@ def design(
         )
     entries: Any = {"objective": objective, "continuous": continuous, "disturbance_class": disturbance_class}
     entries |= {"plant": plant, "setup": setup}
-    entries |= {"tell": progress} if progress else {}
+    entries |= {"progress": progress} if progress else {}
     return law.design(GainProblem(fault=fault, result_type=Design, feedforward=added, sliding=sliding, **entries))
 
 

@@ -35,6 +35,7 @@ from quakedesign.plant import FaultPlant, UncertainPlant, uncertain_plant
 from quakedesign.synthesis.method import GuaranteeRequest, method_of
 from quakedesign.synthesis.plant_guarantees import guarantee_plant
 from quakedesign.synthesis.state_feedback import may_stick
+from quakedesign.text import Progress, silent
 
 Result = TypeVar("Result")
 
@@ -45,7 +46,7 @@ def guarantees_of(
     workers: int = 1,
     scheduler: str | None = None,
     executor: Executor | None = None,
-    tell: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
 ) -> list[Result | QuakedesignError]:
     """Results of several calls, in their order, computed in parallel; errors are results too.
 
@@ -59,7 +60,7 @@ def guarantees_of(
         Address of a dask.distributed scheduler that is used instead.
     executor : Executor, optional
         Any other executor of `concurrent.futures` that is used instead.
-    tell : callable, optional
+    progress : callable, optional
         Called with a progress text and the completed fraction [-].
 
     Raises
@@ -71,8 +72,8 @@ def guarantees_of(
     with crew_or_here(workers, scheduler, executor) as crew:
         for place, one in crew.results(_called, [(call,) for call in questions]):
             results[place] = one
-            if tell is not None:
-                tell(f"{len(results)} of {len(questions)} computed", len(results) / len(questions))
+            if progress is not None:
+                progress(f"{len(results)} of {len(questions)} computed", len(results) / len(questions))
     return [results[place] for place in range(len(questions))]
 
 
@@ -103,7 +104,7 @@ def guarantee(
     stress: Quantity | None = None,
     spread: Quantity = 0,
     plant: str | None = None,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     accept_poor_fit: bool = False,
     **entered: Quantity | None,
 ) -> Guarantee:
@@ -258,7 +259,6 @@ def guarantee(
                 "slow sliding has a guarantee for a designed law of the slip alone, from steady sliding, under a "
                 f"stress of bounded amplitude. Received {received}. Omit these options."
             )
-        tell: Any = {} if progress is None else {"tell": progress}
         return guarantee_sliding(
             fault,
             controller=control_law(controller).name,
@@ -266,7 +266,7 @@ def guarantee(
             stress=stress_bound,
             spread=uncertainty,
             setup=ExactSetup.of(setup),
-            **tell,
+            progress=progress or silent,
         )
     if stress is not None or uncertainty:
         raise ParameterError(

@@ -42,6 +42,7 @@ from quakedesign.lyapunov.exact.perturbation_bounds import sectors
 from quakedesign.lyapunov.exact.premises import Premise, Variant, linear_premises
 from quakedesign.lyapunov.search.lyapunov_search import find_certificate
 from quakedesign.plant import FaultPlant, uncertain_plant
+from quakedesign.text import Progress, silent
 
 # ----------------------------------------------------------------------
 # Interface of the families of laws, and its implementation for a law of no family.
@@ -89,7 +90,7 @@ class GainProblem(Generic[Designed]):
         Class of the disturbances of a guarantee, ``amplitude`` or ``rate``.
     plant : str or None
         ``printed`` for a guarantee on the plant without stick only.
-    tell : callable
+    progress : callable
         Called with the present task of a long search, and the completed fraction [-].
     """
 
@@ -102,7 +103,7 @@ class GainProblem(Generic[Designed]):
     sliding: SlowSlidingDesign | None = None
     disturbance_class: str = CLASSES[0]
     plant: str | None = None
-    tell: Callable[[str, float], None] = lambda what, done: None
+    progress: Progress = silent
 
     @property
     def task(self) -> FaultPlant:

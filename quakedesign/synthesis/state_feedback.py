@@ -152,7 +152,7 @@ def sticking_options(problem: GainProblem[Any]) -> dict[str, Any]:
     """Options of `design_stick_slip` for a problem."""
     healing, setup = rational(problem.fault.friction.rest_excess), problem.setup
     noise = {"slip_noise": setup.slip_noise, "longest_step": setup.longest_step}
-    return {"objective": problem.objective, **noise, "healing": healing, "tell": problem.tell}
+    return {"objective": problem.objective, **noise, "healing": healing, "progress": problem.progress}
 
 
 def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed:
@@ -204,7 +204,7 @@ def _sliding(problem: GainProblem[Designed], given: SlowSlidingDesign, law: type
     fault = problem.fault
     path = given.diffusion or near_path(sliding_model(fault))
     result = guarantee_sliding(
-        fault, stress=given.stress, spread=given.spread, tell=problem.tell, setup=ExactSetup(diffusion=path)
+        fault, stress=given.stress, spread=given.spread, progress=problem.progress, setup=ExactSetup(diffusion=path)
     )
     reason = result.proof.reason if not result.proof.available else None
     if result.sampled_loop is None:

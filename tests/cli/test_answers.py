@@ -163,7 +163,7 @@ def test_progress_is_told_by_the_one_computation_or_by_the_crew(prove, faults, m
     prove([proof(True)] * len(faults), *faults, *options)
     ((calls, told),) = prove.asked
     assert ["progress" in one.keywords for one in calls] == [within] * len(faults)
-    assert (told["tell"] is not None) == beside
+    assert (told["progress"] is not None) == beside
     assert (told["workers"], told["scheduler"]) == (more.get("workers", 1), more.get("scheduler"))
 
 

@@ -34,7 +34,7 @@ def asked(monkeypatch, capsys, tmp_path):
     def line(*arguments):
         told = []
 
-        def comparison(fault, names, tell, **more):
+        def comparison(fault, names, progress, **more):
             told.append((fault.name, names, more))
             raise AskedError("asked")
 
@@ -93,7 +93,7 @@ def test_every_option_reaches_the_design(asked):
 def test_a_step_is_the_sampling_time_of_the_fault(monkeypatch, command):
     seen = []
 
-    def comparison(fault, names, tell, **more):
+    def comparison(fault, names, progress, **more):
         seen.append((fault.sampling_time, more["options"]["setup"]))
         raise AskedError("asked")
 

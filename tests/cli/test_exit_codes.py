@@ -223,8 +223,8 @@ def test_progress_is_shown_on_a_terminal_unless_it_is_quiet(monkeypatch, termina
     monkeypatch.setattr(shared, "Console", console)
     shared.set_output(quiet=quiet, level="warning")
     try:
-        with shared.progress() as tell:
-            tell("integrating", 0.25)
+        with shared.progress() as progress:
+            progress("integrating", 0.25)
     finally:
         shared.set_output(quiet=False, level="warning")
     assert asked == [{"stderr": True}]
@@ -239,9 +239,9 @@ def test_progress_is_shown_on_a_terminal_unless_it_is_quiet(monkeypatch, termina
 def test_progress_is_logged_for_those_who_ask(capsys, level, heard):
     shared.set_output(quiet=True, level=level)
     try:
-        with shared.progress() as tell:
+        with shared.progress() as progress:
             for what, done in (("a", 0.0), ("a", 0.25), ("b", 0.5), ("b", 1.0)):
-                tell(what, done)
+                progress(what, done)
     finally:
         lines = capsys.readouterr().err.splitlines()
         shared.set_output(quiet=False, level="warning")

@@ -240,13 +240,15 @@ def test_the_stresses_that_are_tried_are_told_with_what_came_of_them(monkeypatch
     known = sliding_result.guarantee_sliding(
         load_fault("crustal-patch"),
         setup=ExactSetup(diffusion=Fraction(800)),
-        tell=lambda what, done: told.append(what),
+        progress=lambda what, done: told.append(what),
     )
     assert known.task.stress == 36_000
     tried = [what for what in told if "stress" in what]
     assert [what.partition(" Pa")[0] for what in tried] == ["a stress of 4.1e+04"] * 2 + ["a stress of 3.6e+04"] * 2
     assert [what.rpartition(": ")[2] for what in tried] == ["proof", "not proved", "proof", "proved"]
     missing = replace(known, proof=NONE, sampled_loop=None)
-    monkeypatch.setattr(state_feedback, "guarantee_sliding", lambda *_, tell, **__: tell("a law", 0.5) or missing)
+    monkeypatch.setattr(
+        state_feedback, "guarantee_sliding", lambda *_, progress, **__: progress("a law", 0.5) or missing
+    )
     synthesise(load_fault("crustal-patch"), "elqr", progress=lambda what, done: told.append(what))
     assert told[-1] == "a law"

@@ -62,9 +62,9 @@ def test_steps_are_logged_for_those_who_ask(capsys):
         with pytest.raises(SystemExit):
             main(["fault", "real-fault", "--quiet", "--log-level", level])
         capsys.readouterr()
-        with progress() as tell:
+        with progress() as report:
             for what in ("first", "first", "second\x1b"):
-                tell(what, 0.5)
+                report(what, 0.5)
         lines = capsys.readouterr().err.splitlines()
         assert len(lines) == count
         assert all(re.fullmatch(r"[\d-]+ [\d:,]+ (INFO|DEBUG) (first|second\\x1b) \(50 %\)", line) for line in lines)

@@ -213,7 +213,7 @@ def test_without_a_diffusion_the_well_is_near(monkeypatch):
     with pytest.raises(ParameterError, match="enough"):
         design(PATCH, "elqr", stress="25000")
     setup = ExactSetup(diffusion=Fraction(800))
-    assert asked | {"tell": None} == {"stress": Fraction(25000), "spread": 0, "tell": None, "setup": setup}
+    assert asked | {"progress": None} == {"stress": Fraction(25000), "spread": 0, "progress": None, "setup": setup}
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ BASE = ("7", "5", "2.3", "1.1")
 def told(law, **more):
     known = {"duration", "load", "noise", "actuator"}
     rest = {k: v for k, v in more.items() if k not in known}
-    return run_single(LAB, law, tell=lambda _: None, **{k: more[k] for k in known & set(more)}, **(USUAL | rest))
+    return run_single(LAB, law, progress=lambda _: None, **{k: more[k] for k in known & set(more)}, **(USUAL | rest))
 
 
 def test_scale_and_feed_forward_are_exact():
@@ -141,16 +141,16 @@ def test_a_scheme_is_tuned_as_its_guarantee_says():
     """Weight and B0 change the run as they do in a scheme that is set by hand."""
     law = published("lab-fault")["cta"]
     tuning, small = {"weight": 0.35, "authority": 0.0035}, {"duration": 0.5, "scheme": "compensated"}
-    run, _ = run_single(LAB, law, tell=lambda _: None, tuning=tuning, **(USUAL | small))
+    run, _ = run_single(LAB, law, progress=lambda _: None, tuning=tuning, **(USUAL | small))
     by_hand = simulate(LAB, law, duration=0.5, scheme=simulation_scheme("compensated", **tuning))
     assert run.pressure.tolist() == by_hand.pressure.tolist()
-    plain, _ = run_single(LAB, law, tell=lambda _: None, **(USUAL | small))
+    plain, _ = run_single(LAB, law, progress=lambda _: None, **(USUAL | small))
     assert run.pressure.tolist() != plain.pressure.tolist()
     for scheme in ("explicit", "continuous"):
         with pytest.raises(ParameterError, match="weight is a setting of compensated"):
-            run_single(LAB, law, tell=lambda _: None, tuning={"weight": 0.35}, **(USUAL | {"scheme": scheme}))
+            run_single(LAB, law, progress=lambda _: None, tuning={"weight": 0.35}, **(USUAL | {"scheme": scheme}))
     with pytest.raises(ParameterError, match="Received weight"):
-        run_single(LAB, None, tell=lambda _: None, tuning={"weight": 0.35}, **USUAL)
+        run_single(LAB, None, progress=lambda _: None, tuning={"weight": 0.35}, **USUAL)
 
 
 def designs_in_place_of_searches(monkeypatch, found):

@@ -88,7 +88,7 @@ def test_a_design_hands_down_what_the_theorem_takes(monkeypatch, sticking):
     monkeypatch.setattr(FEEDBACK, "design_stick_slip", lambda task, step, **given: seen.update(given) or sticking)
     healed = replace(REAL, friction=replace(REAL.friction, healing=1e-5))
     qd.design(healed, "elqr", objective="peak", slip_noise="1 um")
-    assert seen.pop("tell")
+    assert seen.pop("progress")
     assert seen == {"objective": "peak", "slip_noise": F(1, 10**6), "longest_step": 0, "healing": F(1, 10**5)}
 
 

@@ -1,6 +1,6 @@
 """Designs with a proof on the stick–slip plant: gains, then an invariant polytope."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -39,8 +39,8 @@ from quakedesign.guarantees.search.worst_case import WorstCase
 from quakedesign.laws.stick_slip_law import StickSlipLaw
 from quakedesign.plant.fault_plant import FaultPlant
 from quakedesign.sos.exact.strict import read_as, written
+from quakedesign.text import Progress, silent
 
-Tell = Callable[[str, float], None]
 TUNINGS = {
     "tracking": ((0.95, 0.85, 0.165, 1.27), (0.5, 0.5, 0.3, 1.3), (0.7, 0.5, 0.3, 1.3), (0.5, 0.5, 0.5, 1.3)),
     "peak": ((0.3, 0.5, 0.1, 1.3), (0.5, 0.5, 0.1, 1.3), (0.5, 0.5, 0.3, 1.3)),
@@ -288,7 +288,7 @@ class _ReachableStates:
             now = np.maximum(end, 0)
         return moved, now, now <= 0
 
-    def hull(self, tell: Tell) -> np.ndarray | None:
+    def hull(self, progress: Progress) -> np.ndarray | None:
         """Vertices of the hull of all states reachable from rest at t = 0; None if it grows without bound."""
         points = _at_first(self.sampled_loop)
         directions = np.random.default_rng(0).standard_normal((1500, 3))
@@ -312,7 +312,7 @@ class _ReachableStates:
             if np.all(np.abs(extent - before) <= _SETTLED * np.tile(size, 2)):
                 break
             before = extent
-            tell("reachable states", turn / _ROUNDS)
+            progress("reachable states", turn / _ROUNDS)
         return points
 
 
@@ -582,7 +582,7 @@ class _Growing:
         rest = (left[:, 1] <= 0) & (np.abs(left[:, 2]) * sizes[2] <= small) & (constants <= small)
         return np.asarray(of_error & rest)
 
-    def grown(self, tell: Tell) -> bool:
+    def grown(self, progress: Progress) -> bool:
         """Whether the polytope was enlarged until it contains its images."""
         first = self.size
         for turn in range(self.turn, _TURNS):
@@ -607,7 +607,7 @@ class _Growing:
             for _ in range(_PERIODS):  # periods with this policy
                 least = self.heights if late else self.least
                 self.heights = np.where(changed, np.maximum(least, after.moves @ self.heights + own), self.heights)
-            tell("an invariant polytope", turn / _TURNS)
+            progress("an invariant polytope", turn / _TURNS)
         return False
 
     def _shrink(self, after: _Images, margin: np.ndarray) -> None:
@@ -737,15 +737,13 @@ class _Growing:
 # Gains with a proof for a fault.
 
 
-def proved(
-    task: FaultPlant, sampled_loop: SampledStickSlip, tell: Tell = lambda what, done: None
-) -> StickSlipProof | NoProof:
+def proved(task: FaultPlant, sampled_loop: SampledStickSlip, progress: Progress = silent) -> StickSlipProof | NoProof:
     """Guarantee of a law with a polytope from a search, or the reason why there is none."""
     fresh = list[StickSlipProof | NoProof]()
 
     def search() -> dict[str, Any]:
         with np.errstate(all="ignore"):  # overflow gives no proposal
-            fresh.append(_searched(task, sampled_loop, tell))
+            fresh.append(_searched(task, sampled_loop, progress))
         return {"set": written(fresh[0].invariant_set)} if fresh[0].available else {"reason": fresh[0].reason}
 
     stored = search_once(search, "polytope of a stick-slip law", task, sampled_loop)
@@ -756,18 +754,18 @@ def proved(
     return stick_slip_guarantee(task, sampled_loop, read_as(StickSlipPolytope, stored["set"]))
 
 
-def _searched(task: FaultPlant, sampled_loop: SampledStickSlip, tell: Tell) -> StickSlipProof | NoProof:
+def _searched(task: FaultPlant, sampled_loop: SampledStickSlip, progress: Progress) -> StickSlipProof | NoProof:
     proof: StickSlipProof | NoProof
     proof = NoProof(reason="no invariant polytope was found")
     try:
-        points = _ReachableStates.of(task, sampled_loop).hull(tell)
+        points = _ReachableStates.of(task, sampled_loop).hull(progress)
         if points is None:
             return NoProof(reason="the reachable states grow without bound")
         normals = _normals(points, _FACETS)
         heights = (normals @ points.T).max(axis=1)
         growing = _Growing(task, sampled_loop, normals, heights, np.zeros((len(normals), 5)), heights, points)
         for growing.margin in _MARGINS:
-            if not growing.grown(tell) or (invariant_set := growing.exact()) is None:
+            if not growing.grown(progress) or (invariant_set := growing.exact()) is None:
                 return proof
             proof = stick_slip_guarantee(task, sampled_loop, invariant_set)
             if proof.available:
@@ -788,7 +786,7 @@ def design_stick_slip(
     longest_step: Fraction = Fraction(0),
     healing: Fraction = Fraction(0),
     implicit: bool = False,
-    tell: Tell = lambda what, done: None,
+    progress: Progress = silent,
 ) -> StickSlipProof | NoProof:
     """Gains with a guarantee on the stick–slip plant, from the first tuning with a proof.
 
@@ -807,7 +805,7 @@ def design_stick_slip(
         Healing Δμ_h [-], treated as an additional disturbance, see `StickSlipProof.covered_healing`.
     implicit : bool
         Whether the law is a deadbeat implicit step; it has the same tunings for both objectives.
-    tell : callable
+    progress : callable
         Called with the name of the current step and the fraction done [-].
     """
     if not task.amplitude and not healing:
@@ -823,7 +821,7 @@ def design_stick_slip(
             sampled_loop = replace(sampled_loop, longest_step=longest_step)
         except (ParameterError, ArithmeticError, ValueError):
             return NoProof(reason="the gains are outside the range of floats")
-        proof = _healed(task, sampled_loop, healing, tell)
+        proof = _healed(task, sampled_loop, healing, progress)
         if proof.available:
             return proof
         none.append(proof)
@@ -831,13 +829,13 @@ def design_stick_slip(
 
 
 def _healed(
-    task: FaultPlant, sampled_loop: SampledStickSlip, healing: Fraction, tell: Tell
+    task: FaultPlant, sampled_loop: SampledStickSlip, healing: Fraction, progress: Progress
 ) -> StickSlipProof | NoProof:
     """Proof with a disturbance enlarged by the effect of healing at a guessed least pressure, which is then checked."""
     least = task.rest_pressure[0] - _LOWER * task.normal_stress
     for _ in range(_GUESSES):
         more = task.area_per_mass[1] * healing * (task.normal_stress - least)
-        proof = proved(replace(task, amplitude=task.amplitude + more), sampled_loop, tell)
+        proof = proved(replace(task, amplitude=task.amplitude + more), sampled_loop, progress)
         if not proof.available or proof.covered_healing(task.amplitude) >= healing:
             return replace(proof, healing=healing) if proof.available else proof
         least = Fraction(proof.claims.least_pressure) - _LOWER * task.normal_stress

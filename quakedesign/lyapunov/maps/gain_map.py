@@ -4,7 +4,7 @@ One compiled problem screens the grid in worker processes. The edges and a rando
 """
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -26,6 +26,7 @@ from quakedesign.lyapunov.search.certify import Number, closed_loop, necessary_l
 from quakedesign.lyapunov.search.lyapunov_search import candidate_degrees
 from quakedesign.parallel import Crew, InProcess, crew_or_here
 from quakedesign.sos.solve.conic import collecting
+from quakedesign.text import Progress, silent
 
 # ----------------------------------------------------------------------
 # Computation of the points of a map, by workers that cache their compiled sweeps.
@@ -239,7 +240,7 @@ def gain_map(
     workers: int = 2,
     scheduler: str | None = None,
     executor: Executor | None = None,
-    tell: Callable[[str, float], None] = lambda _what, _done: None,
+    progress: Progress = silent,
 ) -> GainMap:
     """Certified region over two gains, at one or more levels of L̄.
 
@@ -275,7 +276,7 @@ def gain_map(
         Address of a dask.distributed scheduler, used instead of local processes.
     executor : Executor, optional
         Executor of `concurrent.futures`, used instead of local processes.
-    tell : callable
+    progress : callable
         Function that reports progress, called with a text and the completed fraction.
 
     Returns
@@ -293,9 +294,9 @@ def gain_map(
     sheet = _sheet(subject, gains, over, ranges, points, levels, gain_range, degree)
     with InProcess() if collecting() else crew_or_here(workers, scheduler, executor) as crew:
         began, screeners = perf_counter(), Screeners(sheet, crew)
-        limits, screened, solves = _screen(sheet, screeners, tell)
+        limits, screened, solves = _screen(sheet, screeners, progress)
         middle = perf_counter()
-        proved, texts, edges, more = _prove(sheet, screeners, dict(screened), interior, seed, tell)
+        proved, texts, edges, more = _prove(sheet, screeners, dict(screened), interior, seed, progress)
         ended = perf_counter()
     return GainMap(
         sheet=sheet,
@@ -390,18 +391,18 @@ def _lowest_degree(loop: Loop, bound: Fraction) -> int:
 
 
 def _screen(
-    sheet: MapDefinition, screeners: Screeners, tell: Callable[[str, float], None]
+    sheet: MapDefinition, screeners: Screeners, progress: Progress
 ) -> tuple[dict[Place, Fraction | None], dict[Place, int], int]:
     """Limit and screened level of every point, and number of solves."""
     limits: dict[Place, Fraction | None] = {}
     screened: dict[Place, int] = {}
     rows, solves = sheet.rows, 0
-    tell(f"screening 0 of {sum(map(len, rows))} points", 0.0)
+    progress(f"screening 0 of {sum(map(len, rows))} points", 0.0)
     for points, more in screeners.results("row", ((row,) for row in rows)):
         solves += more
         for place, limit, reached in points:
             limits[place], screened[place] = limit, reached
-        tell(f"screening {len(screened)} of {sum(map(len, rows))} points", len(screened) / sum(map(len, rows)))
+        progress(f"screening {len(screened)} of {sum(map(len, rows))} points", len(screened) / sum(map(len, rows)))
     return limits, screened, solves
 
 
@@ -411,7 +412,7 @@ def _prove(
     reached: dict[Place, int],
     interior: int,
     seed: int,
-    tell: Callable[[str, float], None],
+    progress: Progress,
 ) -> tuple[dict[Place, int], dict[Place, str], frozenset[Place], int]:
     """Proved level of edge points and random points, certificates, edges, and number of solves.
 
@@ -431,7 +432,7 @@ def _prove(
                 proved.setdefault(place, 0)
             else:
                 proved[place], texts[place] = level, text
-            tell(f"proving {what}: {done} of {len(open_places)}", done / len(open_places))
+            progress(f"proving {what}: {done} of {len(open_places)}", done / len(open_places))
 
     for level in range(len(sheet.levels), 0, -1):
         while True:

@@ -36,6 +36,7 @@ from quakedesign.simulation.integrators import DormandPrince, integrator
 from quakedesign.simulation.run_settings import STICK_SLIP, RunSetting, designed_path, sampled_scheme
 from quakedesign.simulation.slow_sliding import PLANTS
 from quakedesign.simulation.state_plant import TIDE
+from quakedesign.text import Progress, silent
 
 # ----------------------------------------------------------------------
 # Dispatch of batches to workers until each has a result or has failed a bounded number of times.
@@ -151,8 +152,6 @@ LARGEST_BATCH = 1024
 BATCHES_PER_WORKER = 8
 ROUNDS = 12
 
-Tell = Callable[[str, float], None]
-
 
 def campaign_problem(
     fault: Fault,
@@ -241,7 +240,7 @@ def run_campaign(
     executor: Executor | None = None,
     batch: int | None = None,
     renew: bool = False,
-    tell: Tell = lambda _what, _done: None,
+    progress: Progress = silent,
 ) -> Campaign:
     """Run many samples of a closed loop, and store every finished batch in a folder.
 
@@ -272,7 +271,7 @@ def run_campaign(
         Number of samples in a batch; by default such that a batch takes at most about half a minute.
     renew : bool
         Delete another campaign in the folder; the same campaign is resumed.
-    tell : callable
+    progress : callable
         Called with the current task and the fraction done [-].
 
     Returns
@@ -295,7 +294,7 @@ def run_campaign(
     place = Path(folder)
     with sole_writer(place, make=True), temporary_folder() as private, crew_of(workers, scheduler, executor) as crew:
         ledger = Ledger.open(place, problem.inputs, renew=renew)
-        runner = _Runner(problem, ledger, problem.program.compiled(private), crew, batch, tell)
+        runner = _Runner(problem, ledger, problem.program.compiled(private), crew, batch, progress)
         chosen = [problem.sample(i) for i in range(samples)]
         results = runner.results(chosen, list(map(str, range(samples))), "samples")
         worst = runner.search(results, metric, rounds) if metric else None
@@ -323,11 +322,11 @@ class _Runner:
         program: CampaignProgram,
         crew: Crew,
         batch: int | None,
-        tell: Tell,
+        progress: Progress,
     ) -> None:
         self._problem, self._ledger, self._program, self._crew = problem, ledger, program, crew
         self._sent = crew.shared(program)
-        self._batch, self._tell = batch, tell
+        self._batch, self._tell = batch, progress
         self._records = ledger.read()
         self._filed, self._used = frozenset(self._records), set[bytes]()
         self.failures = list[Failure]()

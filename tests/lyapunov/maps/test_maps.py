@@ -116,7 +116,7 @@ def test_an_interrupted_map_leaves_no_process_waiting(monkeypatch):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), tell=stop, **ASKED)
+        gain_map("super-twisting", ("1.5", "1.1"), ("k1", "k2"), progress=stop, **ASKED)
     assert not active_children()
 
 

@@ -42,8 +42,8 @@ TOLD = []  # of the first campaign, while it was computed
 
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory):
-    folder, tell = tmp_path_factory.mktemp("serial") / "campaign", lambda *told: TOLD.append(told)
-    return run_campaign(PROBLEM, COUNT, folder, executor=SerialExecutor(), batch=7, tell=tell, **SEARCH), folder
+    folder, progress = tmp_path_factory.mktemp("serial") / "campaign", lambda *told: TOLD.append(told)
+    return run_campaign(PROBLEM, COUNT, folder, executor=SerialExecutor(), batch=7, progress=progress, **SEARCH), folder
 
 
 def test_what_is_done_is_told_batch_by_batch(serial):
@@ -73,7 +73,7 @@ def test_processes_have_the_same_digits_and_a_death_loses_nothing(serial, tmp_pa
             killed.append(active_children()[0].pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    found = run_campaign(PROBLEM, COUNT, tmp_path, workers=2, batch=3, tell=kill_one, **SEARCH)
+    found = run_campaign(PROBLEM, COUNT, tmp_path, workers=2, batch=3, progress=kill_one, **SEARCH)
     assert killed
     assert answer(found) == answer(serial[0])
     assert not active_children()
@@ -146,7 +146,7 @@ def test_an_interruption_leaves_what_is_done(serial, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run_campaign(PROBLEM, COUNT, tmp_path, executor=SerialExecutor(), batch=3, tell=interrupt, **SEARCH)
+        run_campaign(PROBLEM, COUNT, tmp_path, executor=SerialExecutor(), batch=3, progress=interrupt, **SEARCH)
     found = run_campaign(PROBLEM, COUNT, tmp_path, executor=SerialExecutor(), batch=4, **SEARCH)
     assert 16 < found.resumed < COUNT
     assert answer(found) == answer(serial[0])
