@@ -63,7 +63,7 @@ class UserCodeError(QuakedesignError, RuntimeError):
 
 
 class UnsupportedError(QuakedesignError, NotImplementedError):
-    """An expression or model for which no method is known."""
+    """An expression, model, law or certificate that a method does not support, or a missing library of Rocq."""
 
 
 class KinkError(QuakedesignError, ArithmeticError):
@@ -75,7 +75,7 @@ class PolynomialError(QuakedesignError, ValueError):
 
 
 class CertificateError(QuakedesignError, ValueError):
-    """A file that is not a certificate, or a certificate whose proof is invalid."""
+    """A file that is not a certificate, one that is invalid or does not apply, or a loop without a certificate form."""
 
 
 class WorkError(QuakedesignError, ArithmeticError):

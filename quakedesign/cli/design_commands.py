@@ -46,8 +46,8 @@ class DesignOptions(WellOptions):
     Parameters
     ----------
     controller
-        Control law to design: cta, dia, elqr or all. For several blocks: centralised, or decentralised, which computes
-        the pressure of each well from its own measurements.
+        Control law to design: cta, dia, elqr or all. For several blocks (design and compare): centralised, or
+        decentralised, which computes the pressure of each well from its own measurements.
     objective
         peak: the smallest certified slip rate (plant without stick: slip-rate error). tracking: a smaller slip error
         under a drifting disturbance, with a somewhat larger slip rate.

@@ -205,9 +205,10 @@ def gain_map(
 ) -> int:
     """Map where two gains are certified, at one or more levels of |h'|, with certificates, figure and table.
 
-    Every grid point is screened in floating point. At every level, exact proofs are then sought for all points at the
-    edge of the screened region and for a random sample of its inner points; figure and table distinguish screened from
-    proved points. Exit code 0 if some point passes the screening and every edge point is proved.
+    Every grid point is screened in floating point. Exact proofs are then sought: at every level for all points at the
+    edge of the screened region, and for a random sample of inner points, each at its highest screened level. Figure and
+    table distinguish screened from proved points. Exit code 0 if some point passes the screening and every edge point
+    is proved.
 
     Parameters
     ----------

@@ -88,8 +88,8 @@ def guarantee(
     law
         File of a user-defined sampled linear law (.json or .npz, see SampledLaw.load) in place of controller and gains.
     scheme
-        Sliding modes: stick-slip on the stick-slip plant or compensated on the plant without stick, by default that of
-        the plant of the guarantee; no other scheme has one. The e-LQR uses the scheme explicit.
+        Sliding modes: stick-slip on the stick-slip plant or compensated on the plant without stick, by default the one
+        for the plant of the guarantee; no other scheme has a guarantee. The e-LQR uses the scheme explicit.
     measured
         Measurement of the e-LQR: slip-and-rate; slip, from which a designed law estimates the slip rate; or
         differentiator (implicit, n_d = 2, any n_f), for which the smallest λ_d is printed.
@@ -235,8 +235,9 @@ def limits(
     delay and diffusion time, the largest distance of a well and the smallest withdrawal. Beyond a limit every
     controller fails for some disturbance of at most the given amplitude and, for slip weakening, some friction law of
     the box. The distance of a well is for the diffusivity --diffusivity, 1 m^2/s by default. Delay, lag, diffusion,
-    timing errors and pump are those of the proved designs; with noise the limit on the slip-rate error is larger. Give
-    quantities with a unit, such as '20 ms', or as numbers in SI units.
+    timing errors and pump are those of the proved designs; with slip noise, and a slip rate that is noisy or not
+    measured, the limit on the slip-rate error is larger. Give quantities with a unit, such as '20 ms', or as numbers in
+    SI units.
 
     Parameters
     ----------

@@ -237,13 +237,15 @@ class LawOptions:
     Parameters
     ----------
     controller
-        cta, dia or elqr, or a user-defined law as module:Class; none (not for export): a run without control.
+        cta, dia or elqr, or a user-defined law as module:Class; none (not for export): a run without control. For
+        several blocks: centralised (used also for the default and for none, unless friction has a state) or
+        decentralised.
     gains
         published, designed (for the T_s, delay, lag and diffusion path of the command), continuous (designed in
         continuous time), or the numbers of the gains in SI units (of a sliding mode: with scale λ = 1 and control ν =
         p·μ_res·N̂_min, p the pressure, μ_res the residual friction coefficient, N̂_min the smallest A/m of the box).
-        Rate-and-state faults: always designed, in simulate for T_s and the diffusion path, in campaign for the fault's
-        T_s, the diffusion path, --spread and --stress.
+        Rate-and-state faults (not in export): always designed, in simulate for T_s and the diffusion path, in campaign
+        for the fault's T_s, the diffusion path, --spread and --stress.
     scale
         Scale λ of a sliding mode, decimal or p/q; replaces that of --gains.
     feedforward
@@ -336,7 +338,8 @@ class RunOptions:
     substeps
         Integrator steps per sample.
     drift
-        Loading velocity, such as '3 cm/year'; by default 0, for rate-and-state faults the reference rate.
+        Loading velocity, such as '3 cm/year'; 0 by default. Rate-and-state faults: only in simulate without control, by
+        default the reference rate; under control the far end is fixed.
     perturbation
         Additional disturbance in m/s^2: an expression in slip, slip_rate and time.
     """

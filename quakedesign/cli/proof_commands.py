@@ -200,7 +200,7 @@ def sos(
     force: Force = False,
     output: Output = PLAIN,
 ) -> int:
-    """Decide whether a polynomial is a sum of squares or, with --on or --multiplier, has such a proof of positivity.
+    """Decide whether a polynomial is a sum of squares or, with --on or --multiplier, proved non-negative by such sums.
 
     Exit code 0 only if this is proved.
 
@@ -211,8 +211,8 @@ def sos(
     on
         A constraint such as "x >= 0", "x^2 + y^2 <= 1" or "x + y == 1"; repeat the option for more. ℝⁿ by default.
     multiplier
-        Positive polynomial multiplier, or auto to search for one and to try powers of 1 + x² + y² + … (x² + y² + … for
-        forms).
+        Positive polynomial multiplier, or auto to search for one and to try powers of 1 + x² + y² + … (x² + y² + …, or
+        x + y + … if all constraints are signs of variables, for forms).
     margin
         Decide polynomial − margin·(1 + Σ x_i^d) instead (without the 1 for forms), d the degree of the polynomial.
     degree

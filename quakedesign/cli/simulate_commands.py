@@ -251,7 +251,7 @@ def sampling(
     scale
         Further values of λ for a sliding mode, decimal or p/q.
     schemes
-        Schemes of the runs.
+        Schemes of the runs of the law; published laws run in continuous, explicit and compensated.
     duration
         Duration of the runs, such as '1 hour' or in s; the operation time by default.
     out

@@ -65,7 +65,7 @@ def circle_limit(loop: FeedbackLoop, beta: Fraction, rate: Fraction, least: Frac
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrequencyFacts:
-    """Classical margins (python-control), and norms on a frequency grid, at one vertex of the box, in scaled time."""
+    """Classical margins (python-control), and norms on a frequency grid, at one vertex of the box."""
 
     # beta, slip, rate: The vertex: β [-], s [1/s²], w [1/s]
     beta: float

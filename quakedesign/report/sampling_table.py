@@ -67,7 +67,9 @@ def print_sampling(report: SamplingReport, console: Console) -> None:
     for name, study in report.studies.items():
         console.print()
         console.print(study.title, style="bold")
-        levels = f"largest errors at {study.label} {study.levels[0]:.3g} … {study.levels[-1]:.3g} {study.unit}".rstrip()
+        levels = (
+            f"largest errors for {study.label} = {study.levels[0]:.3g} … {study.levels[-1]:.3g} {study.unit}".rstrip()
+        )
         if name == "orders":
             levels = (
                 f"error ~ T_s^order for T_s = {study.levels[-1]:.3g} … {study.levels[0]:.3g} s, errors at the latter"

@@ -134,7 +134,7 @@ class Recorder:
         return ca.cse([self.moved(vector, moved, meter.works)])[0]
 
     def moved(self, vector: ca.SX, state: ca.SX, done: ca.SX) -> ca.SX:
-        """Vector (SX) at the next instant, given state and works there; those of `vector` are accumulated first."""
+        """Vector (SX) at the next instant, given state and works there; it first accumulates the present quantities."""
         now = self.parts(self.observe(vector))
         watched = now.watched | dict(zip(WORKS, (done[i] for i in range(len(WORKS))), strict=True))
         return replace(now, counter=now.counter + 1, state=state, watched=watched).joined()

@@ -204,7 +204,8 @@ def noise_sensitivity(
         return simulate(fault, controller, scheme=scheme, measurement=measurement, duration=duration, plant=plant)
 
     title = f"{fault.name}, {controller.title}: sensitivity to noise"
-    return _study(title, (of.replace("_", " "), units[of]), tuple(levels), schemes, run)
+    label = f"standard deviation of the {of.replace('_', ' ')}"
+    return _study(title, (label, units[of]), tuple(levels), schemes, run)
 
 
 def gain_sensitivity(
@@ -249,7 +250,7 @@ def gain_sensitivity(
         return simulate(fault, controller, scheme=scheme, variation=variation, duration=duration, plant=plant)
 
     title = f"{fault.name}, {controller.title}: sensitivity to the input gain"
-    return _study(title, ("beta at rest / geometric mean of its bounds", ""), tuple(levels), schemes, run)
+    return _study(title, ("β at rest divided by the geometric mean of its bounds", ""), tuple(levels), schemes, run)
 
 
 def _slope(levels: Sequence[float], values: Sequence[float]) -> float | None:

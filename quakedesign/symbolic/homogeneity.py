@@ -2,7 +2,7 @@
 
 Homogeneity is proved symbolically or refuted by an exact counterexample. Δ is the dilation x_i → ε^{r_i}x_i, Δ² that
 with ε² in place of ε, and m the degree. The weights r_i are computed from the terms of the field. The relative degree
-is the order of the first derivative of an output that depends on the control.
+is the lowest order at which a time derivative of the output depends on the control.
 """
 
 from collections.abc import Iterator, Mapping
@@ -331,7 +331,7 @@ def size_of(e: sp.Expr, sizes: Mapping[sp.Symbol, sp.Expr], equations: list[sp.E
 
 
 # ----------------------------------------------------------------------
-# Relative degree: order of the first derivative of an output that depends on the control.
+# Relative degree: lowest order at which a time derivative of the output depends on the control.
 
 
 def relative_degree(output: sp.Expr, field: Mapping[sp.Symbol, sp.Expr], control: sp.Symbol) -> int | None:

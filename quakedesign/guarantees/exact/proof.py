@@ -32,8 +32,8 @@ class Proof(ABC, Generic[B]):
     kind : str
         Kind of its certificate file (proofs/FORMAT.md).
     plant : str
-        Value of `plant` in `simulate` that the proof is about; empty where only one applies, and for laws in continuous
-        time and uncertain plants.
+        Value of `plant` in `simulate` that the proof is about; empty for slow sliding (proved with inertia), for laws
+        in continuous time and for uncertain plants.
     scope : str
         Idealisation of its plant, as text; empty without one, or if the sentence or the premises state it.
     motion : str

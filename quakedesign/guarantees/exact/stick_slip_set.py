@@ -16,9 +16,10 @@ one of the plant without stick under an admissible disturbance, with y ≥ 0. If
 before the next sample, and the period ends with y = 0. So each period follows either the *sliding* map, with y ≥ 0 and
 ξ ≥ 0 at its end, or the *rest* map with a slip δ until the last stop.
 
-**Sliding map.** With S = (G(ξ) − G(0))/ξ, S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, ξ and
-y at the end are linear in (y, bβU) and a = φ + λ + (S − S0)ξ − (w − w0)y, |a| ≤ H + δS·ξ + δw·y. Until then ξ(t) ≤ (t·y
-+ t²/2·(H − bβU))/(1 − S⁺T²/2) and y(t) ≤ y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
+**Sliding map.** Let S = (G(ξ) − G(0))/ξ, S0 the midpoint and δS half the width of [S⁻, S⁺], w0 and δw likewise, and y
+without argument the slip rate at the sample. ξ(T) and y(T) are linear in (y, bβU) and the input a(t) = φ + λ + (S −
+S0)ξ(t) − (w − w0)y(t), |a(t)| ≤ H + δS·ξ(t) + δw·y(t). Until then ξ(t) ≤ (t·y + t²/2·(H − bβU))/(1 − S⁺T²/2) and y(t) ≤
+y + t(H − bβU) + S⁺t·ξ(t), for w ≥ 0.
 
 **Rest map.** Let τ = θT be any time with 1/2 + wT/24 ≤ θ ≤ 1, w the least damping, and f(t) = (1 − e^{−w(τ−t)})/w. As y
 = 0 at the stop, integration by parts gives, for the damping w, δ = f(0)y + ∫f·(G + φ)dt up to the stop. Before the stop
@@ -67,13 +68,16 @@ polytope.
 facet after a slide is, for one state and one choice of ends, V(h) = l(h) + ∫|g(s)|A(h − s)ds over [0, h]. Here l is the
 part without a, g the response of the facet function to an impulse of a, and A(t) = H + δS·ξ̂ + δw·ŷ bounds |a|, with
 the bounds ξ̂, ŷ above as functions of t. A ≥ 0 is required up to T_m, also beyond the end of the actual interval, so
-that one formula of V is valid for all h. g is Lipschitz, so V″ ≥ −B almost everywhere, and V is below its chord over Δ
-plus Δ²B/8: bounds at five intervals suffice, with B from |l″|, |g′|A(0), |g|·|A′| and ∫|g|·|A″|. After the rest map the
-bound is convex in h, so both ends suffice. A shorter period that ends at rest can be extended to T_m, as nothing
-releases the block in the added time; so the bound for T_m of the slip until a stop covers it.
+that one formula of V is valid for all h. g is Lipschitz, so V″ ≥ −B almost everywhere, and V is below its chord over an
+interval of length Δ = (T_m − T)/4 plus Δ²B/8: bounds at the five values T, T + Δ, …, T_m of h suffice, with B from
+|l″|, |g′|A(0), |g|·|A′| and ∫|g|·|A″|. After the rest map the bound is convex in h, so both ends suffice. A shorter
+period that ends at rest can be extended to T_m, as nothing releases the block in the added time; so the bound for T_m
+of the slip until a stop covers it.
 
-**Peaks.** Between samples y is at most the larger of its initial value and its final value under the largest force, as
-y″ = −wy′ + Sy admits no interior maximum where S ≥ 0, and S⁺ ≥ 0; e1 lies within max r′·T of its values at the samples.
+**Peaks.** Between samples y is at most the slip rate of the motion under the largest force with the constant slope S⁺ ≥
+0 and the least damping w⁻ ≥ 0. For that motion y″ = −w⁻y′ + S⁺y, which excludes an interior maximum; so y is at most
+the larger of its initial value and the final value of that motion. e1 lies within max r′·T of its values at the
+samples.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -106,8 +110,8 @@ _FLAT = 1e-12  # volume below which the normals of a vertex count as dependent
 _NEAR = 1e-6  # relative distance of a proposed vertex from its polytope
 _ZERO = Fraction(0)
 
-# e1 is cut into slices at 0 and at max r′/c, c the return rate. A combination is (slice, whether the target rate v is
-# positive, q1, q0), with r′ = q1·c·e1 + q0·max r′.
+# e1 is cut into slices at 0 and at ρ/c, ρ = max r′ + 2cN, c the return rate. A combination is (slice, whether the
+# target rate v is positive, q1, q0), with r′ = q1·c·e1 + q0·ρ; this r′ includes the noise (*Noise*).
 SLICES = 3
 COMBINATIONS = (
     (0, True, 0, 0),
@@ -179,7 +183,7 @@ class StickSlipPolytope:
                 and len(self.resting) == len(COMBINATIONS)
                 and all((*self.sliding, *self.resting))
             ),
-            "have bases of 3 constraints for slices and of 4 for combinations, by numbers from 0": all(
+            "have bases of 3 constraints for slices and of 4 for combinations, by indices of 0 or more": all(
                 len(basis) == size and min(basis) >= 0 for basis, size in bases
             ),
             f"have at most {MOST_BASES} bases": len(bases) <= MOST_BASES,
@@ -472,7 +476,10 @@ def stop_bounds(
         tau, x = share * step, (1 - share) * step
         factor = 1 + plant.slope[0] * step**2 / 2 - (high - low) * x / (1 - low * x / 2)
         if least >= 1 or low * x >= 1 or factor <= 0:
-            raise ParameterError("T_s is too long, for this damping and friction slope, to bound the slip until a stop")
+            raise ParameterError(
+                "T_s, or the longest interval of aperiodic sampling, is too long, for this damping and friction slope, "
+                "to bound the slip until a stop"
+            )
         start = tau - low * tau**2 / 2 + low**2 * tau**3 / 6
         pairs.append((start / factor, amplitude * x**2 / (1 - low * x / 3) / factor))
     return tuple(pairs)
@@ -829,7 +836,7 @@ class Verifier:
         self.sizes, self.sign = _exact_array(list(sizes)), -1 if slice_number == 0 else 1  # of e1
         self.rows = _exact_array([list(row) for row, _ in constraints])
         self.ends = _exact_array([end for _, end in constraints])
-        self.last = facets + 2 if slice_number == 1 else None  # e1 <= max r'/c, after y >= 0 and e1 >= 0
+        self.last = facets + 2 if slice_number == 1 else None  # e1 <= (max r' + 2cN)/c, after y, e1 >= 0
         self.bases = np.array(bases)
         self.floats = _ball_middle(self.rows * self.sizes)
         self.lengths = lengths = np.linalg.norm(self.floats, axis=1)
@@ -858,11 +865,11 @@ class Verifier:
         return bases, shares
 
     def largest(self, factors: np.ndarray, constants: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
-        """Upper bounds of c·z + k; where `which` names facets n, or that of 1 + (c − n)·z + k if smaller, as n·z ≤ 1.
+        """Upper bounds of c·z + k. If `which` names facets n, that of 1 + (c − n)·z + k is taken where it is smaller.
 
-        The second bound is the smaller one if a period changes nothing, as at rest: there the entries of c − n have
-        signs opposite to those of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of its
-        slice.
+        It is valid as n·z ≤ 1, and the smaller one if a period changes nothing, as at rest: there the entries of c − n
+        have signs opposite to those of e1, y and δ; δ is at most g·y by the last constraint, and e1 at most the end of
+        its slice.
         """
         factors, off = _middles(factors)
         constants, above = _middles(constants)
@@ -934,7 +941,9 @@ def _bounds(task: FaultPlant, sampled_loop: SampledStickSlip, invariant_set: Sti
     feedback = feedback_range(task, sampled_loop, invariant_set)
     plant = ranges(task, ahead + moved, feedback, rate * sampled_loop.longest)
     if plant.slope[1] * sampled_loop.longest**2 >= 1:
-        raise ParameterError("T_s is too long for this weakening of friction")
+        raise ParameterError(
+            "T_s, or the longest interval of aperiodic sampling, is too long for this weakening of friction"
+        )
     deciding = verifiers(task, sampled_loop, invariant_set, plant)
     periods = Period.deciding(BALLS, task, sampled_loop, plant, rate, feedback)
     for rows in chain(*facet_rows(periods, invariant_set)):
@@ -990,7 +999,7 @@ def verifiers(
 
 
 def facet_rows(periods: Sequence[Period], invariant_set: StickSlipPolytope) -> Iterator[Iterator[Rows]]:
-    """Images of the facets: per period of the sliding map in balls, then of the rest map."""
+    """Images of the facets: for each period under the sliding map, in balls; then under the rest map, in rationals."""
     stored = [[list(row) for row in rows] for rows in (invariant_set.facets, invariant_set.multipliers)]
     for period in periods:
         yield sliding_rows(period, *map(_ball_array, stored))

@@ -50,7 +50,8 @@ class Space:
     Attributes
     ----------
     ranges : mapping of str to tuple of float
-        Lowest and highest value by the names of `Sample.numbers`, in SI units.
+        Lowest and highest value by name: factors of nominal values [-], such as ``stiffness``, see `Variation` and
+        `sliding_space`; ``phase`` [rad]; ``initial_slip`` [m] and ``initial_slip_rate`` [m/s].
     """
 
     ranges: Mapping[str, tuple[float, float]]

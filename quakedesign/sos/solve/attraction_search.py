@@ -192,7 +192,7 @@ def with_shape(region: Region, shape: Polynomial) -> Region:
 
 
 def expanded(given: Region, shape: Polynomial, top: int, certify: Callable[[Attraction], Region]) -> Region:
-    """Enlarge the β for which {shape ≤ β} lies in a proved region, by a search for V of degree `top`.
+    """Enlarge the β for which {shape ≤ β} lies in a proved region, by a search for V of degree at most `top`.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def stability(field: Mapping[Any, Any], V: Any = None, *, degrees: Sequence[int]
     claim = _claim(field, V)
     if V is not None:
         refuted = _refuted(claim)
-        neither = "no proof that V and -dV/dt are positive was found, and no point refutes V"
+        neither = "neither a proof that V and -dV/dt are positive nor a point that refutes V was found"
         return _proved(claim) or (replace(refuted, level=None) if refuted else replace(claim, reason=neither))
     rest = other_equilibrium(claim)
     if rest is not None:
@@ -390,7 +390,9 @@ def region_of_attraction(
         own = _of_linearised(claim)
         if own is None:
             return Region(
-                proved=None, refuted=None, remark="the linearised field has no positive definite V = x'Px: pass V"
+                proved=None,
+                refuted=None,
+                remark="the linearised field has no positive definite V = x^T P x with A^T P + P A = -I: give a V",
             )
         claim = replace(claim, lyapunov=own)
     region = _region(claim, relative)

@@ -43,7 +43,8 @@ def verify(
     """Exact proof from a Gram matrix in floating point, or the verdict without the matrix.
 
     The matrix is rounded and corrected to satisfy polynomial = bᵀQb exactly; the kernel of a singular matrix is made
-    rational first. If no proof results, the polynomial is decided without the matrix, as by `quakedesign.sos.prove`.
+    rational first. If no proof results, the polynomial is decided without the matrix, as by `prove`
+    with ``products=False`` and the degree of polynomial and bases as ``degree_bound``.
 
     Parameters
     ----------
@@ -249,9 +250,11 @@ def read_gram(path: str | Path) -> GramFile:
             f"{path} must be JSON, or .mat as MATLAB's save -v7 writes. Received: {reason}."
         ) from None
     if not isinstance(raw, dict) or set(raw) != _KEYS:
-        received = ", ".join(sorted(map(str, raw))) if isinstance(raw, dict) else type(raw).__name__
+        names = {key: name if path.suffix == ".mat" else key for name, key in _IN_MATLAB.items()}
+        received = ", ".join(sorted(names.get(k, str(k)) for k in raw)) if isinstance(raw, dict) else type(raw).__name__
         raise PolynomialError(
-            f"{path} must have exactly the keys {', '.join(sorted(_KEYS))}. Received {shown(received or 'none')}."
+            f"{path} must have exactly the keys {', '.join(sorted(names.values()))}. "
+            f"Received {shown(received or 'none')}."
         )
     return _gram_file(raw)
 

@@ -98,7 +98,7 @@ def test_backward_slip_is_excluded_by_the_shear_stress(proof):
 
 
 def test_a_period_that_is_long_against_the_plant_is_refused(proof):
-    with pytest.raises(ParameterError, match="T_s is too long"):
+    with pytest.raises(ParameterError, match="T_s, or the longest interval of aperiodic sampling, is too long"):
         stick_slip_bounds(proof.task, replace(proof.sampled_loop, step=F(3)), proof.invariant_set)
 
 
@@ -188,7 +188,7 @@ HUGE = "1" + "0" * 399
         (lambda s: {"multipliers": s["multipliers"][1:]}, "5 multipliers for each facet"),
         (lambda s: {"sliding": s["sliding"][:2]}, "3"),
         (lambda s: {"sliding": [[[0, 1]], *s["sliding"][1:]]}, "3"),
-        (lambda s: {"sliding": [[[0, 1, -1]], *s["sliding"][1:]]}, "by numbers from 0"),
+        (lambda s: {"sliding": [[[0, 1, -1]], *s["sliding"][1:]]}, "by indices of 0 or more"),
         (lambda s: {"resting": [[], *s["resting"][1:]]}, "bases for 3 slices and 7 combinations"),
         (lambda s: {"resting": [[["0", "1", "2", "3"]], *s["resting"][1:]]}, "expected `int`"),
         (lambda s: {"resting": [s["resting"][0][:1] * 40_000, *s["resting"][1:]]}, "at most 40000 bases"),
