@@ -469,7 +469,7 @@ BUDGETS = {
     "plant": 1477,
     "guarantees": 13573,
     "lyapunov": 7064,
-    "linear": 2416,
+    "linear": 2417,
     "synthesis": 1983,
     "rocq": 849,
     "simulation": 9796,

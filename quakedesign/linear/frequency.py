@@ -1,6 +1,7 @@
 """Frequency-domain limits of the e-LQR: margins that no certificate can exceed.
 
-The loop and its symbols s [1/s²], w [1/s], β [-], b [m²/kg] and K = (k1, …, k4) are those of `FeedbackLoop`.
+The loop, in continuous time, and its symbols s [1/s²], w [1/s], β [-], b [m²/kg] and K = (k1, …, k4) are those of
+`FeedbackLoop`. As s is a slope here, z denotes the Laplace variable [1/s].
 """
 
 from collections.abc import Sequence
