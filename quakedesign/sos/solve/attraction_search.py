@@ -419,7 +419,12 @@ def _shape(field: Mapping[Any, Any], shape: Any, degree: int | None) -> Polynomi
     """Exact shape; by default Σ x_i² if other V are tried (`degree`), otherwise None."""
     if degree is not None and not (isinstance(degree, int) and degree >= 2 and degree % 2 == 0):
         raise PolynomialError(f"degree must be an even number from 2. Received {degree!r}. Give for example 4.")
-    return None if shape is None and degree is None else _claim(field, shape).lyapunov
+    if shape is None:
+        return None if degree is None else _claim(field, None).lyapunov
+    polynomial = read(shape, (), None, tuple(map(str, field)))[1]
+    if any(sum(exponents) == 0 for exponents in polynomial):
+        raise PolynomialError("a shape must vanish at the origin. Received a constant term. Omit the constant term.")
+    return polynomial
 
 
 def _claim(field: Mapping[Any, Any], V: Any) -> Attraction:

@@ -289,7 +289,10 @@ def _terms(raw: Any, size: int) -> dict[tuple[int, ...], Fraction]:
                 f"a term must be a coefficient and {size} exponents, such as [2.5, [1, 0]]. Received {term!s:.60}."
             )
         key = tuple(map(int, exponents))
-        total[key] = total.get(key, Fraction(0)) + rational(parts[0], "coefficient")
+        try:
+            total[key] = total.get(key, Fraction(0)) + rational(parts[0], "coefficient")
+        except ParameterError as error:
+            raise PolynomialError(str(error)) from None
     return total
 
 

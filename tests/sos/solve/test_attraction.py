@@ -207,6 +207,11 @@ def test_a_degree_must_be_even(degree):
         sos.region_of_attraction({"x": "-x + x^3"}, degree=degree)
 
 
+def test_a_shape_with_a_constant_term_is_rejected_as_a_shape():
+    with pytest.raises(PolynomialError, match="a shape must vanish at the origin"):
+        sos.region_of_attraction({"x": "-x + x^3"}, "x^2", shape="1 + x^2")
+
+
 def test_a_shape_without_a_part_in_the_region_is_left_out():
     """−x² is at most β everywhere; the region is not."""
     found = sos.region_of_attraction({"x": "-x + x^3"}, "x^2", shape="-x^2")
