@@ -21,7 +21,7 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 MPA = 1e6  # Pa, unit of the pressures of a law for blocks in slow sliding
 SUBSTEPS = 8
 """Default number of substeps per period; the error is proportional to the length of a substep."""
-_POINTS = 1000
+_POINTS = 1000  # recorded intervals of a run, approximately
 _MOST_PERIODS = 5 * 10**7
 
 
@@ -42,8 +42,8 @@ class BlockRun:
     rest : ndarray
         Fraction of the time that each block is at rest [-].
     reversed, opened : bool
-        Whether the load on a block, at rest or not, exceeded friction backward, or an effective normal stress fell to
-        0.
+        Whether the load on a block, at rest or not, exceeded friction in the backward direction; whether an effective
+        normal stress fell to 0.
     """
 
     times: np.ndarray
@@ -73,7 +73,7 @@ class BlockRun:
 
 
 def reference(chain: BlockChain, time: ca.SX | float) -> tuple[ca.SX, ca.SX]:
-    """r [m] and r' [m/s] at a time [s], in CasADi."""
+    """r [m] and r' [m/s] at a time [s], as CasADi expressions."""
     task = chain.fault.reference
     stage = ca.fmin(time / task.operation_time, 1)
     mean = task.target_slip / task.operation_time
@@ -90,7 +90,7 @@ def decided(chain: BlockChain, law: Any, count: ca.SX, x: ca.SX, v: ca.SX, z: ca
     chain : BlockChain
     law : MatrixLaw
         Its inputs are the errors of slip [m] and slip rate [m/s] of all blocks, or of their averages at each well; its
-        outputs are pressures [Pa]. In slow sliding: slip errors alone [m], and pressures [MPa].
+        outputs are pressures [Pa]. In slow sliding its inputs are slip errors alone [m], its outputs pressures [MPa].
     count : SX
         Number of earlier samples [-].
     x, v : SX
@@ -101,25 +101,25 @@ def decided(chain: BlockChain, law: Any, count: ca.SX, x: ca.SX, v: ca.SX, z: ca
     weights, time = ca.DM(np.array(measured_by(chain.shares), dtype=float)), count * float(law.step)
     if chain.has_state:
         r, unit = SlidingReference(task=chain.fault.reference).slip(time), MPA
-        seen = weights @ x - r
+        errors = weights @ x - r
     else:
-        (r, moved), unit = reference(chain, time), 1
-        seen = ca.vertcat(weights @ x - r, weights @ v - moved)
+        (r, r_rate), unit = reference(chain, time), 1
+        errors = ca.vertcat(weights @ x - r, weights @ v - r_rate)
     F, G, H, D = (np.array(part, dtype=float) for part in (law.update, law.measured, law.output, law.feedback))
-    p = (ca.mtimes(H, z) if len(F) else 0) + ca.mtimes(D, seen)
-    return unit * p, ca.mtimes(F, z) + ca.mtimes(G, seen) if len(F) else z
+    p = (ca.mtimes(H, z) if len(F) else 0) + ca.mtimes(D, errors)
+    return unit * p, ca.mtimes(F, z) + ca.mtimes(G, errors) if len(F) else z
 
 
 @checked_dataclass(frozen=True, kw_only=True)
 class _Period:
-    """One period of a chain under a law as a CasADi function of the state vector."""
+    """One sampling period of a chain under a law, as a CasADi function of the state vector."""
 
     chain: BlockChain
     law: Any
     substeps: int
 
     def function(self) -> ca.Function:
-        """CasADi Function that maps the state vector of `sizes` over one period."""
+        """CasADi Function from the state vector (see `sizes`) to that one period later."""
         slip, speed = sp.Symbol("slip", real=True), sp.Symbol("speed", real=True)
         chain, fault, law = self.chain, self.chain.fault, self.law
         N = len(chain.blocks)
@@ -128,11 +128,11 @@ class _Period:
         step, h = float(law.step), float(law.step) / self.substeps
         pressures, flow = np.array(chain.pressures, dtype=float), np.array(chain.flow, dtype=float)
         slow, columns = len(flow), pressures.shape[1]
-        through = expm(np.vstack([flow, np.zeros((columns - slow, columns))]) * h) if slow else np.eye(columns)
-        pulls = np.zeros((N, N))
-        add_springs(pulls, chain.springs, 1.0)
+        transition = expm(np.vstack([flow, np.zeros((columns - slow, columns))]) * h) if slow else np.eye(columns)
+        springs = np.zeros((N, N))
+        add_springs(springs, chain.springs, 1.0)
         stress = np.array([b.effective_normal_stress for b in chain.blocks])
-        kicked = fault.disturbance
+        external = fault.disturbance
         phases = 2 * np.pi * np.arange(N) / N
 
         def friction(slips: ca.SX, rates: ca.SX) -> ca.SX:
@@ -145,16 +145,16 @@ class _Period:
         static = friction(ca.SX.zeros(N), ca.SX.zeros(N))
         for k in range(self.substeps):
             time = began + k * h
-            disturbance = kicked.constant + kicked.amplitude * ca.sin(kicked.frequency * time + phases)
-            after = ca.mtimes(through[:slow], ca.vertcat(q, p))  # zero-order hold of p
+            disturbance = external.constant + external.amplitude * ca.sin(external.frequency * time + phases)
+            after = ca.mtimes(transition[:slow], ca.vertcat(q, p))  # zero-order hold of p
             acting, q = ca.mtimes(pressures, ca.vertcat((q + after) / 2, p)), after
             strength = fault.authority * friction(x, v) * (stress - acting)
-            drive = fault.authority * static * stress - fault.specific_stiffness * x + ca.mtimes(pulls, x)
-            drive += disturbance + kicked.slip_growth * x + (kicked.rate_growth - fault.specific_damping) * v
+            drive = fault.authority * static * stress - fault.specific_stiffness * x + ca.mtimes(springs, x)
+            drive += disturbance + external.slip_growth * x + (external.rate_growth - fault.specific_damping) * v
             v = ca.fmax(v + h * (drive - strength), 0)
             x = x + h * v
-            r, moved = reference(chain, time + h)
-            worst, rate = ca.fmax(worst, ca.fabs(x - r)), ca.fmax(rate, ca.fabs(v - moved))
+            r, r_rate = reference(chain, time + h)
+            worst, rate = ca.fmax(worst, ca.fabs(x - r)), ca.fmax(rate, ca.fabs(v - r_rate))
             peak, rest = ca.fmax(peak, v), rest + (v <= 0) / self.substeps
             margins = ca.fmin(margins, ca.vertcat(ca.mmin(drive + strength), ca.mmin(stress - acting)))
         last = [x, v, z, q, p, count + 1, worst, rate, peak, rest, margins]
@@ -178,7 +178,7 @@ class _Period:
 
 
 def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> int:
-    """Number of whole periods in a duration [s]; the duration is the operation time unless given."""
+    """Number of whole periods in a duration [s], 1 to 5e7; the duration is the operation time unless given."""
     whole = chain.fault.reference.operation_time if duration is None else duration
     if not step <= whole <= _MOST_PERIODS * step:
         raise ParameterError(
@@ -191,11 +191,12 @@ def whole_periods(chain: BlockChain, step: Fraction, duration: float | None) -> 
 def simulate_blocks(
     chain: BlockChain, law: Any, *, duration: float | None = None, substeps: int = SUBSTEPS
 ) -> BlockRun:
-    """Simulate blocks, initially at rest, under a sampled law; the disturbance of block i of N has the phase 2πi/N.
+    """Simulate blocks, initially at rest, under a sampled law.
 
     Parameters
     ----------
     chain : BlockChain
+        The disturbance of block i = 0 … N − 1 has the phase 2πi/N.
     law : MatrixLaw
         Law without delay. Its inputs are the errors of all blocks, or of the averages that each well measures.
     duration : float, optional
@@ -206,7 +207,7 @@ def simulate_blocks(
     Raises
     ------
     ParameterError
-        For friction with healing, duration outside 1 to 5e7 periods, substeps outside 1 to 1000, or an overflow.
+        For friction with healing, a duration outside 1 to 5e7 periods, substeps outside 1 to 1000, or infinite slip.
     """
     if any(block.friction.rest_excess for block in chain.blocks):
         raise ParameterError("the simulation of several blocks does not support healing: set healing to 0")
@@ -215,21 +216,21 @@ def simulate_blocks(
         raise ParameterError(f"substeps must be 1 to 1000. Received {substeps}.")
     period = _Period(chain=chain, law=law, substeps=substeps)
     once = period.function()
-    at_once = max(periods // _POINTS, 1)
-    sizes = [at_once] * (periods // at_once) + [periods % at_once] * (periods % at_once > 0)
+    chunk = max(periods // _POINTS, 1)
+    sizes = [chunk] * (periods // chunk) + [periods % chunk] * (periods % chunk > 0)
     many = {size: once.fold(size) for size in set(sizes)}
     ends = np.cumsum([0, *(size for _, size in period.sizes)])
     place = {name: slice(*ends[i : i + 2]) for i, (name, _) in enumerate(period.sizes)}
     now = np.zeros(ends[-1])
     now[place["margins"]] = np.inf
-    seen = []
+    recorded = []
     for size in sizes:
         now[place["peak"]] = 0
         now = np.array(many[size](now)).ravel()
-        seen.append(now.copy())
+        recorded.append(now.copy())
         if not np.isfinite(now[place["x"]]).all():
-            raise ParameterError("the slip is not finite at the end of the run: reduce the gains of the law")
-    stored = np.array(seen)
+            raise ParameterError("the slip of a block is not finite: reduce the gains of the law")
+    stored = np.array(recorded)
     times = stored[:, place["count"]].ravel() * step
     task = chain.fault.reference
     least = stored[-1, place["margins"]]

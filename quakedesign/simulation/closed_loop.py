@@ -53,7 +53,7 @@ class Load:
     Raises
     ------
     ParameterError
-        For a drift that is negative or not finite, or a perturbation in other symbols.
+        For a drift that is negative or not finite, or a perturbation that is not an expression of these symbols.
     """
 
     drift: float = 0.0
@@ -121,7 +121,7 @@ class Variation:
     phase: float = 0.0
 
     def require_within(self, fault: Fault) -> None:
-        """Reject factors outside the fault's uncertainty box."""
+        """Raise a ParameterError for factors outside the fault's uncertainty box."""
         box = fault.box
         for name in ("stiffness", "damping", "authority"):
             width = getattr(box, name)
@@ -205,7 +205,7 @@ class EnergyBudget:
     Attributes
     ----------
     kinetic, elastic : float
-        Change of ½m·x2² and of ½k·stretch² [J].
+        Change of ½m·x2², and of ½k times the square of the elongation of the spring [J].
     frictional : float
         Frictional heat under the applied pressure, ∫μA(σ' − p)·x2 dt [J].
     injection : float
@@ -289,7 +289,7 @@ class Meter:
 
 
 class Metered(Stepped):
-    """A loop whose forces' works are integrated along with the motion; all functions take and return CasADi SX.
+    """A loop that integrates the works of its forces along with its motion.
 
     Attributes
     ----------
@@ -318,7 +318,7 @@ class Metered(Stepped):
     def powers(self, time: ca.SX, x: ca.SX, pressure: ca.SX) -> ca.SX:
         """Integrands in the order of `WORKS` (SX): powers per unit mass [W/kg], and x1 [m] as the last one.
 
-        The first integrand is the frictional power minus that of static friction at p = 0, which `budget` adds exactly.
+        The first integrand is the frictional power at p = 0 minus that of static friction, which `budget` adds exactly.
         """
         _, normal, damping, stress = self.hats()
         relief = ca.fmin(pressure, stress) if self.sticks else pressure
@@ -332,7 +332,7 @@ class Metered(Stepped):
         )
 
     def budget(self, integrals: Mapping[str, float], time: float, slip: float, rate: float) -> EnergyBudget:
-        """Energy budget over `time` [s] from rest; `slip` [m] and `rate` [m/s] are the final values."""
+        """Energy budget of a run from rest; `integrals` as in `WORKS`, time [s], slip [m] and rate [m/s] at its end."""
         mass, drift = self.fault.mass, self.load.drift
         stiffness, normal, damping, stress = map(float, self.hats())
         static = normal * stress * float(self.static_friction)
@@ -388,7 +388,7 @@ def friction_expression(fault: Fault, varied: bool = False) -> sp.Expr:
 
 
 def matched_perturbation(fault: Fault, divisor: sp.Rational, varied: bool = False) -> sp.Expr:
-    """h [m/s²] of the paper's equation ``esystem3`` along a run, in x1, x2, φ, r, r' and r''."""
+    """h [m/s²] of eq. ``esystem3`` for a divisor μ0N̂0 [m²/kg], in x1, x2, φ, r, r' and r''."""
     moving, derived = plant.reference(plant.t), plant.error_dynamics()
     position = {plant.e1: plant.x1 - moving, plant.e2: plant.x2 - moving.diff(plant.t)}
     named = ((moving.diff(plant.t, 2), r_acceleration), (moving.diff(plant.t), r_rate), (moving, r))
@@ -435,7 +435,7 @@ class ClosedLoop(Metered):
     controller: Controller | None = None
     constant_pressure: float = 0.0  # p [Pa] without a controller
     load: Load = NO_LOAD  # In addition to the fault's own disturbance
-    # tuple of float or SX: Ratios of true to nominal parameters as in `Variation.values`; empty for the nominal fault
+    # Ratios of true to nominal parameters as in `Variation.values`; empty for the nominal fault
     factors: tuple[Number, ...] = ()
 
     def with_factors(self, factors: tuple[Number, ...]) -> Self:
@@ -505,7 +505,7 @@ class ClosedLoop(Metered):
 
     @property
     def integrals(self) -> tuple[sp.Symbol, ...]:
-        """Symbols of the law's own states."""
+        """Symbols of the states of the law."""
         return integral_symbols(self.controller)
 
     @property
@@ -576,7 +576,7 @@ class ClosedLoop(Metered):
         return self.function("shaken", {"t": [plant.t], "x": [plant.x1, plant.x2]}, {"phi": [self.disturbance]})
 
     def reversing(self, time: ca.SX, state: ca.SX, pressure: ca.SX) -> ca.SX:
-        """Whether the load on a fault at rest exceeds friction backward (SX); always 0 on a plant without stick."""
+        """Whether the load at rest exceeds friction in the backward direction (SX); 0 on a plant without stick."""
         return ca.SX(0)
 
     def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
@@ -616,9 +616,9 @@ def casadi_function(
     outputs: dict[str, list[sp.Expr]],
     named: dict[sp.Symbol, sp.Expr] | None = None,
 ) -> ca.Function:
-    """CasADi Function with named inputs and outputs. `named` gives other symbols in the outputs in terms of the inputs.
+    """CasADi Function with named inputs and outputs; derivatives at a kink are right-sided in x1 and x2.
 
-    Derivatives at a kink are right-sided in x1 and x2.
+    `named` maps further symbols of the outputs to expressions in the inputs.
     """
     vectors = {key: ca.SX.sym(key, len(symbols)) for key, symbols in inputs.items()}
     values = {symbol: vectors[key][i] for key, symbols in inputs.items() for i, symbol in enumerate(symbols)}

@@ -38,13 +38,13 @@ from quakedesign.loop.schemes.implicit import where_needed
 # uniquely, with exact powers of two (`two_to`) and exact parts of floats (`exponent_and_mantissa`, `near_cube_root`).
 # They are defined once, as CasADi expressions; this module inserts them into CasADi functions and translates them into
 # C. Errors are below 1 unit in the last place; for cube roots below 0.65, for other powers (exponents up to 2) below
-# 1.5, for the hyperbolic tangent below 2. The sign of a zero is unspecified. The power with the float next to ⅓ is the
-# cube root.
+# 1.5, for the hyperbolic tangent below 2. The sign of a zero is unspecified. The power with the float nearest to ⅓ is
+# the cube root.
 
 _ROUNDER = 1.5 * 2.0**52  # sums with it are rounded to whole numbers
 _SPLITTER = 2.0**27 + 1
 _LEAST = 2.0**-1022  # smallest normal float, with 53 bits
-THIRD = 1 / 3  # the float next to ⅓
+THIRD = 1 / 3  # the float nearest to ⅓
 _ROOT = float.fromhex("0x1.6a09e667f3bcdp+0")  # √2
 _LN2 = Fraction(0xB17217F7D1CF79ABC9E3B39803F2F6AF40F343267298B62D8A0D175B8BAAFA2B, 2**256)  # 77 decimal digits
 _HALF_PI = Fraction(0x1921FB54442D18469898CC51701B839A252049C1114CF98E804177D4C76273644, 2**256)
@@ -55,7 +55,7 @@ _in_bits = ContextVar("in_bits", default=False)
 
 @contextmanager
 def verbatim(*, bits: bool = False) -> Iterator[None]:
-    """Context in which CasADi does not simplify: (x + y) − x is kept, since it differs from y in floating point.
+    """Context in which CasADi does not simplify: (x + y) − x remains, as it differs from y in floating point.
 
     With `bits`, expressions are for C, where exponent, mantissa and approximate cube root are read from the bits of a
     float. CasADi's log, log1p and sinh then serve as placeholders for these three functions.
@@ -70,7 +70,7 @@ def verbatim(*, bits: bool = False) -> Iterator[None]:
 
 
 def _pieces(number: Fraction, bits: int, count: int) -> list[float]:
-    """Floats with a given number of leading bits each, and a rounded last one, whose sum is `number`."""
+    """Floats that sum to `number` up to rounding of the last; all others have a given number of leading bits."""
     leading = []
     for _ in range(count - 1):
         unit = Fraction(2) ** (math.frexp(float(number))[1] - bits)
@@ -106,12 +106,12 @@ _EXP = _economised([Fraction(1, math.factorial(n)) for n in range(2, 18)], -_R, 
 _SIN = _economised([Fraction((-1) ** n, math.factorial(2 * n + 1)) for n in range(1, 12)], Fraction(0), _Z, 7)
 _COS = _economised([Fraction((-1) ** n, math.factorial(2 * n)) for n in range(2, 12)], Fraction(0), _Z, 6)
 _ATANH = _economised([Fraction(2, 2 * n + 1) for n in range(1, 16)], Fraction(0), _S, 7)
-_LEFT = Fraction(955, 10000)  # bound of |x − y³|/x for y = near_cube_root(x)
-_ROOT_BITS = 44693264  # ⅔·1023·2¹⁶ minus a correction that minimises `_LEFT`
+_RESIDUAL = Fraction(955, 10000)  # bound of |x − y³|/x for y = near_cube_root(x)
+_ROOT_BITS = 44693264  # ⅔·1023·2¹⁶ minus a correction that minimises `_RESIDUAL`
 _CUBE_ROOT = _economised(
     [Fraction(math.prod(3 * k + 1 for k in range(n)), math.factorial(n) * 3**n) for n in range(1, 40)],
-    -_LEFT,
-    _LEFT,
+    -_RESIDUAL,
+    _RESIDUAL,
     12,
 )
 
@@ -132,7 +132,7 @@ def rounded(x: ca.SX) -> ca.SX:
 
 
 def _polynomial(x: ca.SX, coefficients: list[float]) -> ca.SX:
-    """Value of a polynomial, by pairs of terms joined by powers of x: short chains of operations (Estrin 1960)."""
+    """Value of a polynomial by Estrin's scheme (1960), whose chains of dependent operations are short."""
     powers, parts = x, [ca.SX(c) for c in coefficients]
     while len(parts) > 1:
         pairs = [parts[i] + parts[i + 1] * powers for i in range(0, len(parts) - 1, 2)]
@@ -233,7 +233,7 @@ def log(x: ca.SX) -> ca.SX:
 
 
 def power(x: ca.SX, a: ca.SX) -> ca.SX:
-    """x^a, the cube root where a is the float next to ⅓; NaN for negative x unless a is whole."""
+    """x^a, the cube root where a is the float nearest to ⅓; NaN for negative x unless a is whole."""
     if not a.is_constant():
         return choice(a == THIRD, cube_root(x), any_power(x, a))
     if float(a) == round(float(a)):
@@ -244,8 +244,8 @@ def power(x: ca.SX, a: ca.SX) -> ca.SX:
 def near_cube_root(x: ca.SX) -> ca.SX:
     """Number with 17 significant bits whose cube is within 10 % of x, for x ≥ 2⁻¹⁰²².
 
-    The leading bits of a float, its exponent and 16 bits of its fraction as one whole number, approximate its
-    logarithm: a third of this number approximates that of the cube root (Kahan 1991).
+    The leading bits of a float (exponent and 16 bits of the fraction), read as one integer, approximate its logarithm.
+    A third of this integer approximates the logarithm of the cube root (Kahan 1991).
     """
     if _in_bits.get():
         return ca.sinh(x)
@@ -266,9 +266,9 @@ def cube_root(x: ca.SX) -> ca.SX:
     small = x < _LEAST
     scaled = x * choice(small, ca.SX(2.0**54), ca.SX(1.0))
     near = near_cube_root(scaled)
-    left = (scaled - near * near * near) * (1 / scaled)
+    residual = (scaled - near * near * near) * (1 / scaled)
     near = near * choice(small, ca.SX(2.0**-18), ca.SX(1.0))
-    value = near + near * left * _polynomial(left, _CUBE_ROOT)
+    value = near + near * residual * _polynomial(residual, _CUBE_ROOT)
     return choice(ca.logic_and(x > 0, x < math.inf), value, choice(x < 0, ca.SX(math.nan), x))
 
 
@@ -374,7 +374,7 @@ FUNCTIONS: dict[int, Callable[..., ca.SX]] = {
 # Instructions of scalar CasADi Functions (SX), and the functions that these instructions call.
 
 _WRITTEN_OUT = 60
-"""Mean number of instructions per elementary function, once it is written out."""
+"""Mean number of instructions of an elementary function in expanded form."""
 
 
 class NotPortableError(ValueError):
@@ -386,8 +386,8 @@ class Instruction:
     """One instruction of a CasADi Function."""
 
     operation: int  # CasADi's operation code
-    taken: tuple[int, ...]  # Places of the arguments; for an input its number and the entry
-    given: tuple[int, ...]  # Places of the results, −1 where unused; for an output its number and the entry
+    taken: tuple[int, ...]  # Positions of the arguments in the work vector; for an input its number and the entry
+    given: tuple[int, ...]  # Positions of the results, −1 where unused; for an output its number and the entry
     constant: float
 
 
@@ -403,9 +403,9 @@ def instructions(function: ca.Function) -> Iterator[Instruction]:
 class Called:
     """Function that an instruction calls."""
 
-    function: ca.Function  # casadi.Function: Of scalar operations, one vector in and one out
-    # Number of calls, each on the last result. 0 means a branch: if the first argument is not zero, one call with the
-    # other arguments; else the result is 0
+    function: ca.Function  # Of scalar operations, with one input vector and one output vector
+    # Number of calls, each on the previous result. 0 means a branch: if the first argument is not zero, one call with
+    # the other arguments; else the result is 0
     times: int
 
     def __call__(self, function: ca.Function, arguments: list[ca.SX]) -> ca.SX:
@@ -429,9 +429,8 @@ def called(function: ca.Function, work: Instruction) -> Called:
     name = matching[0].name() if len(matching) == 1 else ""
     if name.startswith("fold_"):
         inner = name.removeprefix("fold_")
-        (all_of_them,) = map(
-            matching[0].get_function, matching[0].get_function()
-        )  # its name varies with the number of calls
+        # the name of the repeated function varies with the number of calls
+        (all_of_them,) = map(matching[0].get_function, matching[0].get_function())
         return Called(matching[0].find_function(inner), int(all_of_them.size2_out(0)))
     if name == "where_needed":
         return Called(matching[0].find_function("solved"), 0)
@@ -439,7 +438,7 @@ def called(function: ca.Function, work: Instruction) -> Called:
 
 
 def expanded(function: ca.Function) -> ca.Function:
-    """Function with the elementary functions written out, for CasADi's virtual machine."""
+    """Function with the elementary functions expanded into basic operations, for CasADi's virtual machine."""
     with verbatim():
         return _expanded(function)
 
@@ -560,11 +559,11 @@ def operation(code: int, arguments: Sequence[Value], named: Callable[[int], str 
         return Value(f"{arguments[0].condition} ? {numbers[1]} : 0.0")
     if code in _WRITTEN:
         return Value(_WRITTEN[code].format(*numbers))
-    raise NotPortableError(f"a CasADi operation must have portable C code. Received operation {code}.")
+    raise NotPortableError(f"operation {code} of CasADi has no portable C code: remove it from the loop")
 
 
 def constant(value: float) -> str:
-    """A float in C, exact."""
+    """C literal with the exact value of a float."""
     if math.isnan(value):
         return "NAN"
     return f"({'-' if value < 0 else ''}INFINITY)" if math.isinf(value) else f"({value.hex()})"
@@ -619,7 +618,7 @@ def declared(
 
 @cache
 def portable_library() -> str:
-    """C text that precedes CasADi's and replaces calls of the C library by the portable functions."""
+    """C code before CasADi's generated code; it replaces calls of the C library by the portable functions."""
     names = {FUNCTIONS[code].__name__: code for code in FUNCTIONS if code != ca.OP_POW}
     called = {"power": "pow"}
     replaced = "".join(f"#define {called.get(name, name)} portable_{name}\n" for name in names)
@@ -638,7 +637,7 @@ RADIX = 64
 LEVELS = 3
 _LONGEST_COMPILATION = 120  # s
 _WORTH = 100_000_000
-"""Least number of instructions of a run for which compilation, which takes 0.3 s, saves time."""
+"""Least number of instructions of a run for which compilation (about 0.3 s) saves time."""
 
 
 STEP = "quakedesign_step"
@@ -738,7 +737,7 @@ def compiler() -> tuple[str, ...]:
         path = shutil.which(command[0])
         if path:
             return path, *command[1:]
-    raise FileNotFoundError("no C compiler: neither CC nor cc, gcc or clang was found")
+    raise FileNotFoundError("no C compiler was found: install cc, gcc or clang, or set CC to a compiler")
 
 
 @lru_cache(maxsize=32)
@@ -815,7 +814,7 @@ LANES = 16
 LANE_FLAGS = ("-fno-tree-pre", "-fno-thread-jumps")
 """Compiler options that favour conditional moves over branches; results are bitwise unchanged."""
 _WIDE = {"__AVX512F__": ("-mavx512f", "-mprefer-vector-width=512"), "__AVX2__": ("-mavx2",)}
-_LONGEST_QUERY = 10
+_LONGEST_QUERY = 10  # s
 
 
 @lru_cache(maxsize=4)
@@ -838,7 +837,7 @@ def lanes_c(step: ca.Function, diverged: int) -> str:
     step : casadi.Function
         One vector in, the next one out.
     diverged : int
-        Index of the time of divergence.
+        Index of the time of divergence in the vector.
 
     Raises
     ------
@@ -862,7 +861,7 @@ def _add_body(parts: list[str], function: ca.Function, name: str) -> None:
 
 
 Place = tuple[int, int]
-"""Number of a task, and of its result."""
+"""Number of a task, and index of one of its results."""
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """Coupled blocks with rate-and-state friction: seismic cycles, controlled runs, pressure diffusion.
 
-Let ζ be the slip minus the displacement of the far end, N = σ' − p, and S the stiffness matrix; τ_0 is the initial
-shear stress, s a further shear stress that depends on time, H the damping. For each block
+Let ζ be the slip minus the displacement of the far end, which moves at v_∞; v the slip rate; N = σ' − p; S the
+stiffness matrix; τ_0 the initial shear stress; s(t) a further shear stress; m and H mass and damping. For each block
 
     ζ' = v − v_∞,    mv' = τ_0 − Sζ + s − Nμ(v, θ) − Hv,    θ' as given by the friction law.
 
-Without mass the right-hand side is 0, and its time derivative gives v' (quasi-dynamic). The logarithms of v and θ are
-integrated. Pressures h of cells or wells obey h' = Fh + Gu, and p is a linear combination of them.
+Without mass (quasi-dynamic) the right-hand side of the second equation is 0, and its time derivative gives v'. The
+logarithms of v and θ are integrated. Pressures h of cells or wells obey h' = Fh + Gu and act on the blocks by shares.
 """
 
 import math
@@ -40,7 +40,7 @@ _LONGEST_RUN = 1e5 * _LONGEST  # s
 _FARTHEST = 1e6  # largest displacement of the far end, in critical slips: some thousand cycles
 _MOST_PERIODS = 10**5  # of a controlled run
 _ONSET = 10.0  # times the loading rate
-_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # least events; first, largest load [aσ']
+_EVENTS, _FIRST_LOADS, _MOST_LOADS = 3, 10.0, 1000.0  # least number of events; first and largest load [aσ']
 _SMALL = 1e3  # Pa; the tolerance of pressures below this value is absolute
 _SHARES = (0.25, 0.5, 0.75, 1.0)  # fractions of a sampling period at which a controlled run is recorded
 _WIDEST = 50.0  # largest change of the logarithm of a rate by the initial stress
@@ -53,7 +53,7 @@ class CoupledSliders:
     Attributes
     ----------
     laws : tuple of FrictionLaw
-        Friction laws of the blocks, with one state each.
+        Friction laws of the blocks, with one state each; a ParameterError is raised for others.
     stiffness : ndarray
         S [Pa/m], blocks × blocks: decrease of the stress on a block per slip of every block.
     normal_stress : tuple of float
@@ -107,7 +107,7 @@ class CoupledSliders:
         return len(self.laws), len(self.flow)
 
     def start(self, rates: Sequence[float], states: Sequence[float]) -> "np.ndarray":
-        """Vector y of slips (0) [m], logarithms of rates [m/s] and of states [s], and pressures (0) [Pa]."""
+        """Initial y: ζ = 0 [m], logarithms of the positive rates [m/s] and states [s], and pressures h = 0 [Pa]."""
         require_positive("", slip_rate=min(rates), state=min(states))
         return np.concatenate([np.zeros(len(rates)), np.log(rates), np.log(states), np.zeros(len(self.flow))])
 
@@ -152,27 +152,27 @@ class CoupledSliders:
             s [Pa] of every block and its rate [Pa/s].
         """
         N, n = self.sizes
-        behind, log_rate, log_state, h = ca.vertsplit(y, [0, N, 2 * N, 3 * N, 3 * N + n])
-        v, pressure, change, moved = ca.exp(log_rate), load[1], load[2], y[:0]
+        zeta, log_rate, log_state, h = ca.vertsplit(y, [0, N, 2 * N, 3 * N, 3 * N + n])
+        v, pressure, change, h_rate = ca.exp(log_rate), load[1], load[2], y[:0]
         fixed_loads = 3 + N * (self.mass > 0)
         if n:
             flow = ca.DM(ca.sparsify(ca.DM(self.flow)))
-            moved = ca.mtimes(flow, h)
+            h_rate = ca.mtimes(flow, h)
             if np.size(self.source):
-                moved += ca.mtimes(ca.DM(self.source), load[fixed_loads:])
+                h_rate += ca.mtimes(ca.DM(self.source), load[fixed_loads:])
             shares = ca.DM(ca.sparsify(ca.DM(self.shares)))
-            pressure, change = pressure + ca.mtimes(shares, h), change + ca.mtimes(shares, moved)
+            pressure, change = pressure + ca.mtimes(shares, h), change + ca.mtimes(shares, h_rate)
         normal = ca.DM(self.normal_stress) - pressure
-        mu, by_rate, by_state, aged, exponent = self._of_friction(log_rate, log_state)
-        aged -= exponent * change / normal
+        mu, by_rate, by_state, log_state_change, exponent = self._of_friction(log_rate, log_state)
+        log_state_change -= exponent * change / normal
         S = ca.DM(self.stiffness)
         if self.mass:
-            driven = load[3:fixed_loads] - ca.mtimes(S, behind) + stress - normal * mu - self.damping * v
-            faster = driven / (self.mass * v)
+            driven = load[3:fixed_loads] - ca.mtimes(S, zeta) + stress - normal * mu - self.damping * v
+            log_rate_change = driven / (self.mass * v)
         else:
-            loaded = stress_rate - ca.mtimes(S, v - load[0]) + change * mu - normal * by_state * aged
-            faster = loaded / (normal * by_rate + self.damping * v)
-        return ca.vertcat(v - load[0], faster, aged, moved)
+            loaded = stress_rate - ca.mtimes(S, v - load[0]) + change * mu - normal * by_state * log_state_change
+            log_rate_change = loaded / (normal * by_rate + self.damping * v)
+        return ca.vertcat(v - load[0], log_rate_change, log_state_change, h_rate)
 
     def rates(self, inputs: int = 0) -> ca.Function:
         """CasADi Function (y, load) → y', with the Jacobian up to `MOST_EXPANDED` blocks."""
@@ -335,14 +335,14 @@ def simulate_sliders(
     onset_rate : float
         Slip rate [m/s] above which an event begins.
     times : sequence of float, optional
-        Ascending output times [s], in addition to both ends and the times of `inputs`; every step unless given.
+        Ascending output times [s], in addition to both ends and the times of `inputs`; by default every solver step.
     method, rtol
         As in `simulate_state`.
 
     Raises
     ------
     ParameterError
-        If the duration or the displacement of the far end is too large.
+        For a duration outside (0, 1e14] s, or if the far end moves by more than 1e6 critical slips.
     """
     require_positive(duration=duration)
     slips = [float(law.critical_slip) for law in sliders.laws]  # type: ignore[attr-defined]
@@ -386,15 +386,15 @@ def natural_cycles(
     method: str = "radau",
     rtol: float = RTOL,
 ) -> SlidersRun:
-    """Simulate blocks under remote loading; block i = 1 … N has the initial state 1 + i/N times its steady state.
+    """Simulate blocks under remote loading. Block i = 1 … N has initially 1 + i/N times its steady state.
 
     Parameters
     ----------
     chain : BlockChain
         With rate-and-state friction.
     duration : float, optional
-        [s]; by default the shortest for which three events have begun, of those with a load of 10, 20, 40 … 640 aσ' of
-        the first block; else the longest of these.
+        [s]. By default the duration is doubled until three events have begun: the far end loads the first block by 10,
+        20, 40 … 640 times its aσ'.
     loading_rate : float, optional
         v_∞ [m/s]; the reference rate of the friction of the first block unless given.
     inertia : bool
@@ -440,10 +440,11 @@ def simulate_sampled_blocks(
     inertia: bool = False,
     progress: Callable[[float], None] = lambda _: None,
 ) -> SlidersRun:
-    """Simulate blocks under a sampled law that tracks the slow-sliding reference, initially at its first rate.
+    """Simulate blocks under a sampled law that tracks the slow-sliding reference.
 
-    The planned pressure reaches the blocks directly; the feedback pressure passes the lag. The far end is fixed. A
-    sinusoidal stress acts on block i = 0 … N − 1 from t = 0, with the phase 2πi/N.
+    Initially all blocks slide steadily at its first rate. The planned pressure acts on them directly, the feedback
+    pressure through a first-order lag. The far end is fixed. From t = 0 a sinusoidal stress acts on block i = 0 … N − 1
+    with the phase 2πi/N. A SimulationError is raised if the solver stops.
 
     Parameters
     ----------
@@ -455,9 +456,9 @@ def simulate_sampled_blocks(
     stress, period : float
         Amplitude [Pa] and period [s] of the stress.
     duration : float, optional
-        [s]; the operation time unless given.
+        [s], at most 1e5 sampling periods; the operation time unless given.
     inertia : bool
-        Whether blocks have their mass.
+        Whether the inertia of the blocks is included.
 
     Returns
     -------

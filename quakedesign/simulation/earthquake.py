@@ -40,11 +40,11 @@ def natural_earthquake(
     compiled: bool | None = None,
     plant: str | None = None,
 ) -> LoopTrajectory:
-    """Simulate an uncontrolled fault under constant pressure; an unstable one also has a tiny constant acceleration.
+    """Simulate an uncontrolled fault under constant pressure.
 
-    Healing is set to zero, since the acceleration cannot release a healed fault. The acceleration is 1e-9 times that of
-    the largest drop of friction.
-    Acceleration and step are so small that the first six digits of the peak slip rate do not depend on them.
+    An unstable fault is set in motion by a constant acceleration, 1e-9 times that of the largest friction drop. Healing
+    is set to zero, since this acceleration cannot release a healed fault. Acceleration and step are so small that the
+    first six digits of the peak slip rate do not depend on them.
 
     Parameters
     ----------
@@ -58,15 +58,14 @@ def natural_earthquake(
     Returns
     -------
     LoopTrajectory
-        Over 90 e-foldings of the unstable eigenvalue, or 30 of them and 10 natural periods if that is longer, or 100
-        natural periods of a stable fault, which at pressure 0 stays at rest. The step is at most 2e-3/ω_n. Its metrics
-        are only
-        `peak_slip_rate`, `settled_from`, `steps`, `seconds` and, on the stick–slip plant, `time_at_rest_fraction`.
+        Over 90 e-foldings of the unstable eigenvalue, or 30 e-foldings and 10 natural periods if that is longer. For a
+        stable fault, which stays at rest at pressure 0, over 100 natural periods. The step is at most 2e-3/ω_n. The
+        only metrics are `peak_slip_rate`, `settled_from`, `steps`, `seconds` and `time_at_rest_fraction` (stick–slip).
 
     Raises
     ------
     ParameterError
-        If the absolute value of the pressure is not below the effective normal stress.
+        For friction with a state, or if |pressure| is not below the effective normal stress.
     SimulationError
         If the pressure is 0 and the fault is unstable but does not move.
     """
@@ -99,7 +98,7 @@ def natural_earthquake(
 
 
 def _with_peak(earthquake: LoopTrajectory, fault: Fault, growth: float) -> LoopTrajectory:
-    """Run with its peak as criterion. Raises if the peak is only that due to the small acceleration."""
+    """Run with its peak as criterion. Raises if only the small acceleration causes the peak."""
     peak = earthquake.metrics.peak_slip_rate  # None if the run diverges
     if peak is not None and peak <= STILL * event_nudge(fault) / growth:
         raise SimulationError(

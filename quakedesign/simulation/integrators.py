@@ -1,7 +1,7 @@
 """Integrators by name: fixed-step Runge–Kutta, and adaptive CVODES and IDAS.
 
 Fixed step: Dormand–Prince (order 5) and classic Runge–Kutta. Adaptive: backward differentiation formulas of SUNDIALS,
-called through CasADi. The last function tests whether a fixed step is short enough for a linear loop.
+called through CasADi. The last function gives the growth per step of a linear loop.
 """
 
 from collections.abc import Callable, Iterable, Sequence

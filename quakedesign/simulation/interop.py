@@ -32,7 +32,7 @@ from quakedesign.text import nearest_name, shown
 # ----------------------------------------------------------------------
 # The same plant and laws as CasADi Functions and as python-control systems.
 
-_SEEN = ("slip", "slip_rate", "r", "r_rate")
+_LAW_INPUTS = ("slip", "slip_rate", "r", "r_rate")
 
 
 def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters: Sequence[str] = ()) -> Any:
@@ -58,7 +58,7 @@ def to_casadi(fault: Fault, controller: Controller | None = None, *, parameters:
     UnsupportedError
         For a sampled law.
     ParameterError
-        For an unknown or repeated parameter, or for any parameter if a controller is given.
+        For an unknown or repeated parameter, or for any parameter if a controller is given or friction has a state.
     """
     if parameters:
         return _free_plant(fault, controller, tuple(parameters))
@@ -109,16 +109,15 @@ def to_iosystem(subject: Fault | Controller) -> Any:
     Returns
     -------
     control.NonlinearIOSystem
-        Nonlinear system. `linearize` of a fault uses exact derivatives; at rest, those for forward slip.
+        Nonlinear system, in discrete time with ``dt`` = T_s for a sampled law. `linearize` of a fault uses exact
+        derivatives; at rest, those for forward slip.
 
     Raises
     ------
     ParameterError
         If `subject` is neither a fault nor a controller.
-
-    Notes
-    -----
-    A sampled law gives a discrete-time system with ``dt`` = T_s.
+    UnsupportedError
+        For a sampled law whose scheme uses the input gain of the fault or future values of the reference.
     """
     if isinstance(subject, Fault):
         return _fault_system(subject)
@@ -160,7 +159,7 @@ def _controller_system(controller: Controller) -> Any:
         return _sampled_system(controller, controller.sampling)
     symbols = integral_symbols(controller)
     pressure, rates = law_expressions(controller)
-    inputs = dict(zip(_SEEN, (plant.x1, plant.x2, r, r_rate), strict=True))
+    inputs = dict(zip(_LAW_INPUTS, (plant.x1, plant.x2, r, r_rate), strict=True))
     if pressure.has(r_acceleration):
         inputs["r_acceleration"] = r_acceleration
 
@@ -180,14 +179,14 @@ def _controller_system(controller: Controller) -> Any:
 
 
 def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
-    """Discrete-time system of a sampled law; its states are those of the law and the memory of the scheme."""
+    """Discrete-time system of a sampled law; states: of the law, memory of the scheme, and previous pressure."""
     import control
 
     scheme: Any = simulation_scheme(sampling.scheme, **{name: float(value) for name, value in sampling.settings})
     stepped, unknown = control_step(scheme.__class__, DiscreteLaw.of(controller, 0.0)), ca.SX.sym("unknown")
     own = [symbol.name for symbol in integral_symbols(controller)]
     names = [*own, *(f"memory_{i}" for i in range(len(scheme.initial_memory))), "held"]
-    state, seen = ca.SX.sym("state", len(names)), ca.SX.sym("seen", len(_SEEN))
+    state, seen = ca.SX.sym("state", len(names)), ca.SX.sym("seen", len(_LAW_INPUTS))
     signals = [
         seen[:2],
         seen[:2] - seen[2:],
@@ -203,7 +202,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
     later = ca.vertcat(after, memory, pressure)
     if ca.depends_on(later, unknown):  # r'', future values of r and r', or B0
         raise UnsupportedError(
-            "a controller without its fault knows neither the input gain nor future references. Received a law whose "
+            "without the fault, the input gain and future values of the reference are unknown. Received a law whose "
             f"scheme, {sampling}, uses them. Use simulate, or export the law."
         )
     used = [i for i in range(len(names)) if ca.depends_on(later, state[i]) and not ca.is_equal(later[i], state[i])]
@@ -216,7 +215,7 @@ def _sampled_system(controller: Controller, sampling: Sampling) -> Any:
         lambda t, x, u, _: step(x, u)[1].full().ravel(),
         dt=float(sampling.step),
         name=controller.name,
-        inputs=list(_SEEN),
+        inputs=list(_LAW_INPUTS),
         outputs=["p"],
         states=[names[i] for i in used],
     )
@@ -281,7 +280,8 @@ def to_statespace(
     Raises
     ------
     ParameterError
-        For friction with a state, a slip that is not a number, or a delay without a step.
+        For friction with a state, a slip that is not finite, a delay without a step, other fields of the loop setup, or
+        a vertex that is not three ends of ranges.
     """
     import control
 
@@ -334,7 +334,7 @@ def _vertex(fault: Fault, ends: tuple[str, ...]) -> tuple[Any, Any]:
 
 
 def loop_transfer(fault: Fault, controller: Controller, at: float = 0.0, *, actuator: Actuator | None = None) -> Any:
-    """Return the transfer function of the loop, opened at the pressure, for Bode plots and margins.
+    """Return the transfer function of the loop, opened at the commanded pressure, for Bode plots and margins.
 
     Parameters
     ----------
@@ -445,12 +445,12 @@ def loop_margins(loop: Any) -> LoopMargins:
 
 def _edge(stable: Callable[[float], bool], factors: "np.ndarray") -> float | None:
     """First factor at which stability differs from that at factor 1, to 1e-12 relative; None if there is none."""
-    at_once, inside = stable(1.0), 1.0
+    nominal, inside = stable(1.0), 1.0
     for outside in factors:
-        if stable(outside) != at_once:
+        if stable(outside) != nominal:
             while abs(outside / inside - 1) > 1e-12:
                 middle = math.sqrt(inside * outside)
-                inside, outside = (middle, outside) if stable(middle) == at_once else (inside, middle)
+                inside, outside = (middle, outside) if stable(middle) == nominal else (inside, middle)
             return float(outside)
         inside = outside
     return None
@@ -461,35 +461,35 @@ class _FrequencyResponse:
     """L on the stability boundary s = jω or z = e^{jω}, ω ≤ π, on a grid of x = ln ω."""
 
     loop: Any
-    places: "np.ndarray"
+    grid: "np.ndarray"
 
     @classmethod
     def of(cls, loop: Any) -> "_FrequencyResponse":
         """Frequency response from far below the poles and zeros to far above them."""
         roots = np.concatenate([loop.poles(), loop.zeros()])
-        places = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
-        places = np.log(places[places > 1e-9 * np.max(places, initial=1.0)])
-        ends = (np.min(places, initial=0.0) - 7, math.log(math.pi) if loop.dt else np.max(places, initial=0.0) + 7)
+        sizes = np.abs(np.log(roots[np.abs(roots) > 1e-12]) if loop.dt else roots)
+        logs = np.log(sizes[sizes > 1e-9 * np.max(sizes, initial=1.0)])
+        ends = (np.min(logs, initial=0.0) - 7, math.log(math.pi) if loop.dt else np.max(logs, initial=0.0) + 7)
         return cls(loop, np.linspace(*ends, _FREQUENCIES))
 
-    def at(self, places: Any) -> Any:
+    def at(self, x: Any) -> Any:
         """L at given x = ln ω."""
-        return self.loop(np.exp(1j * np.exp(places)) if self.loop.dt else 1j * np.exp(places))
+        return self.loop(np.exp(1j * np.exp(x)) if self.loop.dt else 1j * np.exp(x))
 
     @property
     def modulus_margin(self) -> float:
         """min |1 + L| [-]."""
-        distances = np.abs(1 + self.at(self.places))
+        distances = np.abs(1 + self.at(self.grid))
         least = int(np.argmin(distances))
-        ends = self.places[max(least - 1, 0)], self.places[min(least + 1, len(distances) - 1)]
+        ends = self.grid[max(least - 1, 0)], self.grid[min(least + 1, len(distances) - 1)]
         inside = minimize_scalar(lambda x: abs(1 + self.at(x)), bounds=ends, method="bounded", options={"xatol": 1e-10})
         return float(min(distances[least], inside.fun))
 
     @property
     def phase_margin(self) -> float | None:
         """Least angle [deg] between L and −1 where |L| is 1."""
-        sizes = np.log(np.abs(self.at(self.places)))
-        spans = [(self.places[i], self.places[i + 1]) for i in np.flatnonzero(np.diff(np.sign(sizes))).tolist()]
+        sizes = np.log(np.abs(self.at(self.grid)))
+        spans = [(self.grid[i], self.grid[i + 1]) for i in np.flatnonzero(np.diff(np.sign(sizes))).tolist()]
         crossings = [brentq(lambda x: math.log(abs(self.at(x))), *span, xtol=1e-13) for span in spans]
         return min((abs(float(np.degrees(np.angle(-self.at(x))))) for x in crossings), default=None)
 
@@ -561,13 +561,15 @@ def _linear(system: Any, names: tuple[str, ...]) -> Any:
 
     n, seen = system.nstates, system.ninputs
 
-    def answer(z: Any) -> Any:
+    def dynamics_and_outputs(z: Any) -> Any:
         return np.concatenate([system.dynamics(0.0, z[:n], z[n:]), system.output(0.0, z[:n], z[n:])])
 
-    rest = answer(np.zeros(n + seen))
+    rest = dynamics_and_outputs(np.zeros(n + seen))
     units = np.eye(n + seen)
-    once, twice = (np.column_stack([answer(factor * unit) - rest for unit in units]) for factor in (1.0, 2.0))
-    mixed = answer(units.sum(axis=0)) - rest
+    once, twice = (
+        np.column_stack([dynamics_and_outputs(factor * unit) - rest for unit in units]) for factor in (1.0, 2.0)
+    )
+    mixed = dynamics_and_outputs(units.sum(axis=0)) - rest
     size = np.abs(once).sum()
     straight = (
         np.abs(twice - 2 * once).max() <= _LINEAR * size and np.abs(mixed - once.sum(axis=1)).max() <= _LINEAR * size

@@ -50,7 +50,7 @@ class RunSetting:
     def of(
         cls, fault: Fault, step: float | None, duration: float | None, samples: int, settled_from: float | None
     ) -> "RunSetting":
-        """Settings from the arguments of `simulate`; None selects the default."""
+        """Settings from the arguments of `simulate`, which lists the errors; None selects the default."""
         task = fault.reference.operation_time
         length = _positive("duration", task if duration is None else duration)
         pace = _positive("step", fault.sampling_time if step is None else step)
@@ -88,7 +88,7 @@ def trajectory(
 
     Parameters
     ----------
-    kept : ndarray
+    vectors : ndarray
         Vectors of the recorder, shape (length of a vector, number of instants).
     began : tuple of float
         Clock times [s] at the start of the preparation and of the stepping.
@@ -141,7 +141,7 @@ def trajectory(
 
 
 # ----------------------------------------------------------------------
-# A recorder's loop, run with a fixed step or to a tolerance.
+# Run of a recorder's loop with a fixed step, or with an adaptive step to a tolerance.
 
 
 def sampled_scheme(
@@ -187,7 +187,7 @@ def designed_path(
 def with_aperiodic_clock(
     controller: Controller | None, scheme: str | Scheme, step: float | None, numbers: dict[str, Any]
 ) -> tuple[float | None, dict[str, Any]]:
-    """Step [s] and scheme settings of a run; for aperiodic sampling, a divided step, and settings with the clock.
+    """Step [s] and scheme settings of a run, adapted to the clock of aperiodic sampling.
 
     For aperiodic sampling `step` [s] is the shortest interval; the run uses an integer fraction of it. A `Scheme` keeps
     its clock; without a clock it samples periodically.
@@ -237,8 +237,8 @@ def run(
     file = Checkpoint.of(checkpoint, step, start, stored) if checkpoint else None
     steps = setting.steps * recorder.scheme.settings.get("substeps", 1)
     key = stepping.run_key(step, start, stored, compiled, steps)
-    if file is None and (answer := stepping.recall_run(key)) is not None:
-        (vectors, reported), ready = answer, perf_counter()
+    if file is None and (cached := stepping.recall_run(key)) is not None:
+        (vectors, reported), ready = cached, perf_counter()
     else:
         backend = prepare(step, compiled, steps)
         ready = perf_counter()
@@ -258,7 +258,7 @@ def run_adaptive(
     progress: Callable[[float], None] | None = None,
     checkpoint: str | Path | None = None,
 ) -> LoopTrajectory:
-    """Trajectory of a recorder's loop to a tolerance; see `simulate`."""
+    """Trajectory of a recorder's loop with an adaptive step, without a checkpoint; see `simulate`."""
     if checkpoint:
         raise ParameterError(f"a checkpoint needs a fixed step. Received method {method.name}. Use dormand-prince.")
     require_smooth(recorder, method.name)

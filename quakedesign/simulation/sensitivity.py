@@ -83,8 +83,8 @@ class Study:
     def to_dict(self) -> Json:
         """Return the study in JSON types; null marks a run that diverged."""
         errors = {
-            scheme: {name: [v if math.isfinite(v) else None for v in values] for name, values in found.items()}
-            for scheme, found in self.errors.items()
+            scheme: {name: [v if math.isfinite(v) else None for v in values] for name, values in by_name.items()}
+            for scheme, by_name in self.errors.items()
         }
         return {k: getattr(self, k) for k in ("title", "label", "unit")} | {"levels": [*self.levels], "errors": errors}
 
@@ -124,7 +124,7 @@ def accuracy(
     duration: float,
     settled_from: float,
 ) -> Study:
-    """Errors of a sliding-mode law versus the sampling period, on the plant without stick, for which orders are known.
+    """Errors of a sliding-mode law versus the sampling period, on the plant without stick.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def accuracy(
     Returns
     -------
     Study
-        `orders` gives the exponents of e1, e2 and e3: 3, 2 and 1 for the explicit scheme.
+        `orders` gives the exponents of slip error e1, slip-rate error e2, and e3; 3, 2 and 1 for ``explicit``.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def noise_sensitivity(
     levels : sequence of float
         Standard deviations, in the unit of `of`.
     of : str
-        ``"slip_noise"`` [m] or ``"rate_noise"`` [m/s]; the other noise is 0.
+        ``"slip_noise"`` [m] or ``"rate_noise"`` [m/s], otherwise a ParameterError is raised; the other noise is 0.
     schemes : sequence of str
     seed : int
     duration : float, optional
@@ -225,7 +225,7 @@ def gain_sensitivity(
     Parameters
     ----------
     fault : Fault
-        With a box in which N̂ is uncertain, such as ``ten-percent``.
+        With a box in which N̂ is uncertain, such as ``ten-percent``; a ParameterError is raised for others.
     controller : Controller
     points : int
         Number of levels, at least 2.

@@ -83,10 +83,10 @@ def simulate(
         recorded. Friction with a state is stiff: under a controller ``"cvodes"`` (default) or ``"idas"``; without one
         ``"radau"`` is the default.
     duration : float, optional
-        [s]; the operation time unless given, rounded down to whole steps; for slow sliding under a controller, up.
+        [s]; the operation time unless given. Rounded down to whole steps, or up in controlled slow sliding.
     samples : int
-        Approximate number of stored instants; metrics are computed from every step. Without a controller and with a
-        friction state: exact number, equidistant, metrics from these alone; every step of the solver if 2000.
+        Approximate number of stored instants; metrics are computed from every step. For an uncontrolled fault with a
+        friction state: number of equidistant instants, from which metrics are computed; if 2000, every solver step.
     settled_from : float, optional
         Time [s] from which errors are evaluated; by default a quarter of the shorter of operation time and duration.
     progress : callable, optional
@@ -133,8 +133,8 @@ def simulate(
     ------
     ParameterError
         For a step, duration or number of samples that is not positive and finite, an unknown scheme, method or plant,
-        an initial state that is negative, a variation outside the box, a sensor made for another step, or a loop that
-        is not smooth with a method that needs a smooth one.
+        an initial state that is negative, a variation outside the box, a sensor made for another step, an adaptive step
+        with a checkpoint or a loop that is not smooth, or an argument that does not apply to the fault.
     SimulationError
         When `compiled` is True and no compiler works, when the loop has no finite value at the start, when the method
         fails, or when the checkpoint is that of another run.

@@ -24,13 +24,13 @@ from quakedesign.simulation.state_plant import Instruments, PressurePath, Slidin
 from quakedesign.simulation.stick_slip import dynamic_rate
 from quakedesign.simulation.trajectory import LoopTrajectory, OutcomeCriterion, signal
 
-_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a section of constant held pressure, at which a run is recorded
+_SHARES = (0.25, 0.5, 0.75, 1.0)  # of a section between changes of the zero-order hold, at which a run is recorded
 PLANTS = {"smooth": True, "quasi-dynamic": False}  # whether with inertia
 
 
 @checked_dataclass(frozen=True, eq=False, kw_only=True)
 class SlidingRun(LoopTrajectory):
-    """One controlled run in slow sliding, with four instants per section of constant held pressure, no energy budget.
+    """Controlled run in slow sliding: four instants between changes of the zero-order hold, no energy budget.
 
     Attributes
     ----------
@@ -67,21 +67,22 @@ def simulate_sliding(
     method: str = "cvodes",
     progress: Callable[[float], None] = lambda _: None,
 ) -> SlidingRun:
-    """Simulate a controlled fault that tracks r of `SlidingReference`; initially it slides steadily at first rate V.
+    """Simulate a controlled fault that tracks r of `SlidingReference`.
 
-    The far end is fixed. The planned pressure kr/(μ*A), at which the nominal fault slides steadily at V with slip r,
-    acts on the fault directly. At every sample the law measures the slip error and commands an additional feedback
-    pressure, which passes through a zero-order hold, the lag and the diffusion path.
+    Initially the fault slides steadily at the first rate V of r. The far end is fixed. The planned pressure kr/(μ*A),
+    at which the nominal fault slides steadily at V with slip r and friction μ*, acts on the fault directly. At every
+    sample the law measures the slip error and commands an additional feedback pressure, which passes through a
+    zero-order hold, the lag and the diffusion path.
 
     Parameters
     ----------
     fault : Fault
         Fault with one friction state. Its disturbance is ignored.
     law : LinearLaw
-        Linear law from the slip error [m] to the feedback pressure [Pa].
+        Linear law from the slip error [m] to the feedback pressure [Pa]; a ParameterError is raised for others.
     step : Fraction
         T_s [s].
-    lag, diffusion, stages : Fraction, Fraction, tuple of SampledStage
+    lag, diffusion, stages : Fraction, Fraction, sequence of SampledStage
         As in `PressurePath`.
     transducer : Transducer, optional
         Transducer of the slip; unless given, the measurement is exact.
@@ -236,7 +237,7 @@ class _Loop:
         return self.planned(time) + direct + layered
 
     def rates(self) -> ca.Function:
-        """CasADi Function (t, y, (held pressure, time of its change, modes)) → dy/dt."""
+        """CasADi Function (t, y, (pressure of the zero-order hold, time of its change, modes)) → dy/dt."""
         time, y, sample = ca.SX.sym("t"), ca.SX.sym("y", 4), ca.SX.sym("sample", 2 + len(self.decay))
         pressure = self.pressure(time, sample[0], time - sample[1], sample[2:], ca.exp)
         turn = 2 * math.pi / self.tide.period

@@ -32,16 +32,16 @@ from quakedesign.symbolic.signed_power import AbsolutePower
 # ----------------------------------------------------------------------
 # CVODES and IDAS of CasADi as a solver for SciPy's `solve_ivp`, with nearly linear steps.
 #
-# A solver that is evaluated only at given times misses an earthquake between two of them. Here intervals are so short
-# that the value in the middle of each of their pieces, the steps, is nearly the mean of the values at its ends. Slopes
-# are not used, since those of a stiff problem are lost in rounding.
+# A solver that is evaluated only at given times misses an earthquake between two of them. Here each interval is divided
+# into pieces, the steps of `solve_ivp`, so short that the value in the middle of a piece is nearly the mean of those at
+# its ends. Slopes are not used, since those of a stiff problem are lost in rounding.
 
 AGREEMENT = 0.02
-"""Largest error of linear interpolation, as a share of the size of a variable."""
+"""Largest error of linear interpolation, relative to the scale of a variable."""
 SHARES = np.arange(1, 65) / 64
-"""Middle and end of every piece of an interval."""
-_PIECES, _LONGER = len(SHARES) // 2, 4
-_SHORTEST = 1e-15
+"""Middle and end of every piece, as fractions of the interval."""
+_PIECES, _LONGER = len(SHARES) // 2, 4  # pieces of an interval; factor between the lengths of intervals
+_SHORTEST = 1e-15  # length of an interval, relative to the end of the run
 
 
 class Resolved(OdeSolver):  # type: ignore[misc]
@@ -50,7 +50,7 @@ class Resolved(OdeSolver):  # type: ignore[misc]
     Parameters
     ----------
     fun, t0, y0, t_bound, vectorized
-        As of SciPy's `OdeSolver`.
+        As in SciPy's `OdeSolver`.
     pieces, whole : Flow
         Solvers over one interval, with output at the fractions `SHARES`, and at the end alone.
     parameters : list of float
@@ -111,19 +111,17 @@ class Resolved(OdeSolver):  # type: ignore[misc]
 
 
 class _Between(DenseOutput):  # type: ignore[misc]
-    """Values within a step, computed by the solver; at its ends the known values."""
+    """Values within a step, computed by the solver; the values at its ends are stored."""
 
     def __init__(self, solver: Resolved, dense: dict[float, np.ndarray]) -> None:
         super().__init__(solver.t_old, solver.t)
-        self._solver, self._known = solver, dense
+        self._solver, self._ends = solver, dense
 
     def _call_impl(self, t: np.ndarray) -> np.ndarray:
         return np.array([self._at(float(time)) for time in t]).T if t.ndim else self._at(float(t))
 
     def _at(self, time: float) -> np.ndarray:
-        return (
-            self._known[time] if time in self._known else self._solver.follow(self.t_old, self._known[self.t_old], time)
-        )
+        return self._ends[time] if time in self._ends else self._solver.follow(self.t_old, self._ends[self.t_old], time)
 
 
 # ----------------------------------------------------------------------
@@ -136,7 +134,7 @@ METHODS = {"dop853": "DOP853", "radau": "Radau"}
 
 @dataclass(frozen=True)
 class Ramp:
-    """Load that is linear in time: its values at the time `start` [s], and their constant rates of change [1/s]."""
+    """Load that is linear in time: its values at the time `start` [s], and their constant rates per second."""
 
     start: float
     value: tuple[float, ...]
@@ -149,7 +147,7 @@ class Ramp:
 
 @dataclass(frozen=True)
 class SmoothSolution:
-    """Instants [s], shape (n,); values at these, shape (variables, n); instants of upward level crossings [s]."""
+    """Instants [s], shape (n,), values at these, shape (variables, n), and upward level crossings [s]."""
 
     time: "np.ndarray"
     values: "np.ndarray"
@@ -162,7 +160,7 @@ class SmoothProblem:
     """y' = f(y, load(t)) in the variables of a CasADi Function (y, load) → f, ∂f/∂y."""
 
     rates: ca.Function
-    scales: "np.ndarray"  # Size of each variable below which its tolerance is absolute
+    scales: "np.ndarray"  # Absolute value of each variable below which its tolerance is absolute
     # Index of the variable whose upward crossings of `level` are detected; for a slice, the largest of its variables
     watched: int | slice
     level: float
@@ -172,8 +170,8 @@ class SmoothProblem:
     ) -> SmoothSolution:
         """Integrate the equations from times[0] to times[-1], with times[0] as origin of time.
 
-        After years the steps of an earthquake are shorter than the resolution of the absolute time in floats. If radau
-        stops for this reason, it continues with a new origin of time.
+        After simulated years the steps of an earthquake are shorter than the resolution of the absolute time in floats.
+        If radau stops for this reason, it continues with a new origin of time.
 
         Parameters
         ----------
@@ -313,8 +311,8 @@ def _stopped(method: str, points: int, reason: str) -> SimulationError:
 # ----------------------------------------------------------------------
 # Adaptive runs of smooth loops, with metrics at every point of the grid.
 
-CHUNK = 4096
-_FEWER = 16
+CHUNK = 4096  # largest number of steps per call of the solver
+_FEWER = 16  # divisor of this number after the solver stops
 
 
 def require_smooth(recorder: Recorder, method: str) -> None:

@@ -151,12 +151,12 @@ class SpringSlider:
         ParameterError
             If the rate or a state is not positive, or the number of states is not that of the law.
         """
-        require_positive("Their logarithms are the variables of the simulation.", start_rate=at_rate)
+        require_positive("The simulation uses its logarithm.", start_rate=at_rate)
         initial = self.law.steady_state(at_rate) if states is None else states
         if len(initial) != len(self.law.state_names):
             raise ParameterError(f"start_state must have {len(self.law.state_names)} values. Received {len(initial)}.")
         require_positive(
-            "Rate and state enter by their logarithms.", **dict(zip(self.law.state_names, initial, strict=True))
+            "The simulation uses the logarithm of the state.", **dict(zip(self.law.state_names, initial, strict=True))
         )
         logs = [float(sp.log(rational_number(value)).evalf(30)) for value in (at_rate, *initial)]
         friction = float(sp.N(self.law.exact().coefficient(0, *map(rational_number, (at_rate, *initial))), 30))
@@ -181,7 +181,7 @@ class SpringSlider:
         return balanced
 
     def _balanced(self, y: "np.ndarray", pressure: float) -> float:
-        """Logarithm of the rate at which the forces balance, next to that of y in the direction of its acceleration."""
+        """Logarithm of a rate at which the forces balance, from that of y in the direction of the force excess."""
         from scipy.optimize import brentq
 
         def excess(logarithm: float) -> float:
@@ -289,9 +289,8 @@ class SlidingVariation:
 class PressurePath:
     """Pressure path between law and fault: a pump, then a lag of pump and pipe, then a diffusion path."""
 
-    # lag, diffusion: Time constant and L²/D [s], not negative; 0 for none
-    lag: Fraction = Fraction(0)
-    diffusion: Fraction = Fraction(0)
+    lag: Fraction = Fraction(0)  # Time constant [s], not negative; 0 for none
+    diffusion: Fraction = Fraction(0)  # L²/D [s], not negative; 0 for none
     # Stages that act once per sample, before the zero-order hold. A delay acts on the feedback pressure alone, since
     # the planned pressure is known in advance; all other stages act on the sum of both.
     stages: tuple[SampledStage, ...] = ()
@@ -364,7 +363,7 @@ class Instruments:
         return float(self._reading(slip))
 
     def pump(self, commanded: float, planned: float) -> float:
-        """Held feedback pressure [Pa], from the commanded feedback pressure and the planned pressure [Pa]."""
+        """Feedback pressure of the hold [Pa], from the commanded feedback pressure and the planned pressure [Pa]."""
         return float(self._pumped(float(self._late(commanded)) + planned)) - planned
 
     def sections(self, now: float, before: float, after: float) -> list[tuple[float, float, float]]:
@@ -383,7 +382,7 @@ def _read(transducer: Transducer | None, step: float) -> "tuple[ca.Function, tup
 
 
 def _actuator_function(stages: Sequence[SampledStage], step: float) -> "tuple[ca.Function, tuple[float, ...]] | None":
-    """CasADi Function (memory, commanded pressure) → held pressure, memory, and initial memory; None without stages."""
+    """CasADi Function (memory, commanded pressure) → output pressure, memory; initial memory; None without stages."""
     if not stages:
         return None
     chain, start = Actuator(stages=tuple(stages)), tuple(v for stage in stages for v in stage.start)
@@ -394,7 +393,7 @@ def _actuator_function(stages: Sequence[SampledStage], step: float) -> "tuple[ca
 
 
 def _remembering(element: tuple[ca.Function, tuple[float, ...]] | None) -> Callable[[float], Any]:
-    """Callable on numbers that keeps the memory of an element between calls; the identity if the element is None."""
+    """Callable on numbers that stores the memory of an element between calls; the identity if it is None."""
     if element is None:
         return float
     function, start = element

@@ -1,4 +1,4 @@
-"""Long runs in steps: checkpoints, retained samples, and cached results.
+"""Long runs in steps: checkpoints, stored samples, and cached results.
 
 The result of an interrupted and resumed run is bitwise equal to that of an uninterrupted one.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import casadi as ca
 
 # ----------------------------------------------------------------------
-# Checkpoints: long runs that are interrupted at any moment and resumed with bitwise equal results.
+# Checkpoints: long runs can be interrupted at any moment and resumed with bitwise equal results.
 
 SECONDS = 30.0  # least time between two writes of a checkpoint
 
@@ -49,7 +49,7 @@ class Checkpoint:
             One step of the run.
         start : sequence of float
             Vector at time zero.
-        kept : sequence of int
+        instants : sequence of int
             Numbers of the steps to store.
         """
         inputs = (step.serialize(), *(float(x).hex() for x in start), *map(str, instants), version("casadi"))
@@ -112,11 +112,11 @@ ProgressReport = Callable[[float], None]
 
 @dataclass(frozen=True)
 class Advancer:
-    """Moves one vector forward in place, by any number of steps."""
+    """Advances one vector in place, by any number of steps."""
 
     vector: "np.ndarray"
     calls: tuple[Callable[[], None], ...] = ()  # Advance the vector by 1, 64 and 4096 steps; empty with machine code
-    owners: tuple[object, ...] = ()  # tuple: CasADi's buffers, which must stay alive with the calls
+    owners: tuple[object, ...] = ()  # CasADi's buffers, which must stay alive with the calls
     machine_code: MachineCode | None = None  # See `Backend`
 
     @classmethod
@@ -212,7 +212,7 @@ LONG = 100_000_000
 def run_key(
     step: "ca.Function", start: Sequence[float], instants: Sequence[int], compiled: bool | None, steps: int
 ) -> tuple[bytes, ...]:
-    """Everything that determines the results of a run of a casadi.Function; empty for a run that is not cached."""
+    """Everything that determines the results of a run of a step function; empty for a run that is not cached."""
     if not cache.in_use() or compiled is False or steps * step.n_instructions() < LONG:
         return ()
     return step.serialize().encode(), np.array(start).tobytes(), np.array(instants).tobytes(), compilation().encode()

@@ -28,8 +28,8 @@ from quakedesign.symbolic import derive
 # ----------------------------------------------------------------------
 # Faults with rate-and-state friction under remote loading and pressure: velocity steps and stick-slip cycles.
 
-_ONSET = 10.0
-_SHARE_OF_STRETCH = 1e-3
+_ONSET = 10.0  # times the fastest loading rate
+_SHARE_OF_STRETCH = 1e-3  # of the initial stretch: scale of the slip for a law without a critical slip
 _FARTHEST = 1e7  # largest displacement of the load point, in critical slips; one earthquake may need a million
 _LONGEST = 1e9  # s, longest span of one time variable: the resolution of its floats is then 1.2e-7 s
 _LONGEST_RUN = 1e5 * _LONGEST  # s, three million years: limits the number of spans of a run
@@ -84,7 +84,8 @@ def simulate_state(
     Raises
     ------
     ParameterError
-        For a law without a state, a setting that is not positive and finite, or an unknown method.
+        For a law without a state, a setting that is not positive and finite, an unknown method, a pressure that opens
+        the fault, or a load point that moves by more than 1e7 critical slips.
     SimulationError
         If the integration fails, as when the slip rate grows without bound (no inertia and no damping).
     """
@@ -359,7 +360,7 @@ def dynamic_rate(fault: Fault) -> float:
 
 _CYCLES = 3  # the first cycle depends on the initial condition
 _FIRST_LOADS, _MOST_LOADS = 10.0, 1000.0  # loads of the first and of the longest run, in units of aσ'
-_OLDER = 1.5
+_OLDER = 1.5  # ratio of the initial to the steady friction state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -398,7 +399,7 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> I
     Raises
     ------
     ParameterError
-        For a share outside [0, 1), or a fault without repeated events.
+        For a loading rate that is not positive, a share outside [0, 1), or a fault without repeated events.
     SimulationError
         If the integration fails.
     """
@@ -415,8 +416,8 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> I
     cycle = cycles(fault, rate, **settings)
     if len(cycle.onsets) < _CYCLES:
         raise ParameterError(
-            f"a start late in the cycle needs repeated events. Received {fault.name}, with {len(cycle.onsets)} of "
-            f"them in {cycle.time[-1]:.3g} s at {rate:.3g} m/s. Start it in steady sliding."
+            f"an initial condition late in the cycle needs three events. Received {fault.name}, with "
+            f"{len(cycle.onsets)} in {cycle.time[-1]:.3g} s at {rate:.3g} m/s. Use steady sliding as initial condition."
         )
     before, after = cycle.onsets[-2:]
     time = float(before + share * (after - before))
@@ -426,9 +427,9 @@ def late_in_cycle(fault: Fault, rate: float, share: float, **settings: Any) -> I
 
 
 def cycles(fault: Fault, rate: float, **settings: Any) -> StateTrajectory:
-    """Run at a loading rate [m/s], initially near steady sliding, doubled in duration until three events have begun.
+    """Run at a loading rate [m/s], initially near steady sliding, with at least three events if they repeat.
 
-    Without repeated events the run ends at a load of at most 1000 aσ'; the run of a stable fault ends at 10 aσ'.
+    The load starts at 10 aσ' and is doubled until three events have begun, to at most 640 aσ' (stable fault: 10).
     `settings` as in `locked`.
     """
     unit = direct_strength(fault) * fault.area / (fault.stiffness * rate)

@@ -11,7 +11,7 @@ from quakedesign.simulation.integrators import Integrator
 
 _BISECTIONS = 4  # leave 1/16 of the step, from which Newton's method converges quadratically
 _NEWTON_STEPS = 3
-_TINY = 1e-300  # smallest slope, so that a flat root causes no division by zero
+_TINY = 1e-300  # smallest slope: avoids a division by zero at a multiple root
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class StickSlipLoop(ClosedLoop):
     While the fault slips it obeys eq. shift, and results equal those of `ClosedLoop` bitwise as long as p < σ'. It
     stops when the slip rate falls to zero. It rests as long as friction can carry the load, with a slip rate of exactly
     zero. In one step at most one release and one stop are located, with the integrator's order. Backward slip is not
-    modelled: `reversing` indicates that the load would overcome friction backward. With healing, the friction at rest
+    modelled: `reversing` indicates a load that exceeds friction in that direction. With healing, the friction at rest
     is larger by `rest_excess` of the law; this excess vanishes at the release.
 
     Attributes
@@ -57,14 +57,14 @@ class StickSlipLoop(ClosedLoop):
         return lambda time, x, p: plant(time, x, p) - ca.vertcat(0, normal * excess * ca.fmax(stress - p, 0))
 
     def resting_load(self, time: ca.SX, slip: ca.SX, pressure: ca.SX) -> tuple[ca.SX, ca.SX]:
-        """Load minus friction, load plus friction [m/s²] at rest (SX); rest persists while first ≤ 0 ≤ second."""
+        """Load minus and load plus friction at rest [m/s²] (SX); the fault stays at rest while 0 is between them."""
         forward = self.resting_plant(time, ca.vertcat(slip, 0), pressure)[1]
         _, normal, _, stress = self.hats()
         friction = self.friction(ca.vertcat(slip, 0)) + self.fault.friction.rest_excess
         return forward, forward + 2 * normal * friction * ca.fmax(stress - pressure, 0)
 
     def reversing(self, time: ca.SX, state: ca.SX, pressure: ca.SX) -> ca.SX:
-        """Whether the load on a fault at rest exceeds friction backward (SX)."""
+        """Whether the load on a fault at rest exceeds friction in the backward direction (SX)."""
         return ca.logic_and(state[1] == 0, self.resting_load(time, state[0], pressure)[1] < 0)
 
     def shear_stress(self, time: ca.SX, state: ca.SX, pressure: ca.SX, friction: ca.SX) -> ca.SX:
@@ -144,7 +144,7 @@ class _SplitStep:
 
 
 def _crossing(before: ca.SX, after: ca.SX) -> ca.SX:
-    """Share of a step at which a quantity becomes positive, by its secant; 1 if it does not."""
+    """Share of a step at which a quantity becomes positive, by linear interpolation; 1 if it does not."""
     crosses = ca.logic_and(before <= 0, after > 0)
     return ca.if_else(crosses, before / ca.if_else(crosses, before - after, 1), 1)
 
@@ -179,7 +179,7 @@ class _Quartic:
         return b + share * (2 * c + share * (3 * d + share * 4 * e))
 
     def root(self) -> ca.SX:
-        """A share at which it falls through zero, for values ≥ 0 at 0 and < 0 at 1."""
+        """A share at which the polynomial falls through zero, for values ≥ 0 at 0 and < 0 at 1."""
         low, high = ca.SX(0), ca.SX(1)
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2

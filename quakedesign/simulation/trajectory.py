@@ -55,7 +55,7 @@ class Trajectory(ABC):
     friction : ndarray
         Friction coefficient [-], shape (n,).
     metrics : Metrics
-        Metrics, computed from every step.
+        Metrics of the run.
     energy : EnergyBudget or None
         None for a run that diverged, and in slow sliding.
     events : mapping of str to float
@@ -200,7 +200,7 @@ class Outcome:
     kind : str
         One of `KINDS`; for an uncontrolled run with a friction state also ``creep`` or ``unknown``.
     peak_slip_rate : float or None
-        Largest |x2| of the run [m/s], until the law overflows if it does; None if the plant overflows.
+        Largest |x2| of the run [m/s], or until the law overflows; None if the motion of the plant overflows.
     share_of_natural : float or None
         Ratio of `peak_slip_rate` to the peak of the natural earthquake [-]; None if either does not exist.
     """
@@ -211,7 +211,7 @@ class Outcome:
 
     @property
     def harmless(self) -> bool:
-        """Whether the run neither is an earthquake nor diverges nor opens the fault."""
+        """Whether `kind` is ``tracked`` or ``slow slip``; ``creep`` and ``unknown`` are not counted as harmless."""
         return self.kind in HARMLESS
 
     def to_dict(self) -> Json:
@@ -282,7 +282,6 @@ class OutcomeCriterion:
         events : mapping of str to float
             Time of first occurrence [s].
         followed : bool
-
             Whether there was a controller, and therefore a reference.
         """
         if peak_slip_rate is None:
@@ -386,8 +385,8 @@ class LoopTrajectory(Trajectory):
         stored, ``injected_volume`` [m³] and ``flow_rate`` [m³/s]. With an actuator, `pressure` is that in the fault.
     events : mapping of str to float
         Time of first occurrence [s] of ``diverged``, ``opening`` (p ≥ σ'), ``reverse_slip`` (x2 < 0), ``stick`` (the
-        fault comes to rest after t = 0), ``load_reversed`` (the load on a fault at rest exceeds friction backward; the
-        stick–slip plant does not model the backward slip that would follow).
+        fault comes to rest after t = 0), ``load_reversed`` (at rest, the load exceeds friction in the backward
+        direction; the stick–slip plant does not model the backward slip that would follow).
     criterion : OutcomeCriterion
         Criterion of `outcome`.
     provenance : mapping

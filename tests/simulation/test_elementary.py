@@ -98,7 +98,7 @@ def test_what_is_near_a_cube_root_has_seventeen_bits_and_a_cube_within_a_tenth()
     near = evaluated(elementary.near_cube_root, x)
     mantissas = np.frexp(near)[0] * 2.0**17
     assert np.array_equal(mantissas, np.floor(mantissas))
-    assert np.max(np.abs(1 - near / x * near * near)) < float(elementary._LEFT)
+    assert np.max(np.abs(1 - near / x * near * near)) < float(elementary._RESIDUAL)
 
 
 def test_values_at_the_ends_are_those_of_the_definition():

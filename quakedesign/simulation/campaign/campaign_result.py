@@ -309,7 +309,7 @@ def metric_names(results: Sequence[SampleResult]) -> tuple[str, ...]:
 
 
 def require_metric(metric: str, available: Sequence[str]) -> None:
-    """Raise if a metric is unknown."""
+    """Raise a ParameterError if a metric is unknown, or if all runs diverged, so that no metric has a value."""
     if not available:
         raise ParameterError(f"metric {metric!r} has no value, since all runs diverged")
     require_known(metric, available, "metric")

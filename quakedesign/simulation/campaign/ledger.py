@@ -17,7 +17,7 @@ from quakedesign.files import FAMILY, sweep, write_whole
 
 MANIFEST, BATCHES = "campaign.json", "batches"
 _RESULTS = ("results.json", "samples.csv", "distribution.*", "sample-*.nc")
-_NAMED = 5
+_NAMED = 5  # entries listed in a message
 
 
 def plain(value: Any) -> Any:
@@ -40,8 +40,8 @@ def plain(value: Any) -> Any:
 def _text(value: Any) -> str:
     """Text of a value if its type defines one, else the name of the type: never an address in memory."""
     kind: Any = value if isinstance(value, type) else type(value)
-    speaks = kind.__str__ is not object.__str__ or kind.__repr__ is not object.__repr__
-    return str(value) if speaks and not isinstance(value, type) else kind.__name__
+    has_text = kind.__str__ is not object.__str__ or kind.__repr__ is not object.__repr__
+    return str(value) if has_text and not isinstance(value, type) else kind.__name__
 
 
 def differences(one: Any, other: Any, name: str = "") -> list[str]:
@@ -140,7 +140,7 @@ class Ledger:
         Raises
         ------
         SimulationError
-            If there is a file of another campaign.
+            If a file belongs to another campaign.
         """
         records: dict[bytes, np.ndarray] = {}
         for path in sorted((self.folder / BATCHES).glob("[!.]*.npz")):

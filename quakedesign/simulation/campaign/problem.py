@@ -224,9 +224,8 @@ class SlidingProgram:
     law: LinearLaw
     step: Fraction  # T_s [s]
     path: PressurePath
-    # stress, period: Largest amplitude [Pa], and period [s], of the stress; a sample scales it by `amplitude`
-    stress: float
-    period: float
+    stress: float  # Largest amplitude [Pa] of the sinusoidal stress; a sample scales it by `amplitude`
+    period: float  # Period [s] of this stress
     plant: str
     method: str
     settled_from: float  # [s]
@@ -274,7 +273,7 @@ def _sample_row(run: SlidingRun) -> list[float]:
 
 @checked_dataclass(frozen=True, kw_only=True, repr=False)
 class SlidingProblem(CampaignProblem):
-    """Friction with a state, controlled in slow sliding; see `CampaignProblem`. The actuator belongs to the scheme.
+    """Samples of a controlled fault in slow sliding; see `CampaignProblem`. The scheme contains the actuator.
 
     Attributes
     ----------
@@ -415,7 +414,7 @@ class CompiledProgram:
     batch_steps: ClassVar[int] = 80_000_000
 
     source: str  # C source with ``advance_samples``, which advances several samples simultaneously
-    # The step with all elementary functions written out, serialised by CasADi, for workers without a C compiler
+    # The step with all elementary functions expanded, serialised by CasADi, for workers without a C compiler
     function: str
     size: int  # Length of the vector of one sample
     diverged: int  # Index of the time of divergence in this vector
@@ -492,10 +491,10 @@ def _machine_code(content: bytes, folder: Path, size: int) -> Mover:
 def _virtual_machine(program: CompiledProgram) -> Mover:
     rungs = ladder(ca.Function.deserialize(program.function))
     advancer = Advancer.of(Backend(rungs, "virtual-machine", ""), [math.nan] * program.size)
-    alone = Lock()  # threads share the advancer
+    lock = Lock()  # threads share the advancer
 
     def move(vectors: "np.ndarray", steps: int) -> None:
-        with alone:
+        with lock:
             for row in vectors:
                 row[:] = _moved(advancer, row, steps, program.diverged)
 
@@ -556,7 +555,7 @@ _SLICE = 4096
 
 @checked_dataclass(frozen=True, kw_only=True, repr=False)
 class SteppedProblem(CampaignProblem):
-    """Friction that depends on slip and slip rate, with a fixed step; see `CampaignProblem`.
+    """Samples of a fault whose friction depends on slip and slip rate, with a fixed step; see `CampaignProblem`.
 
     Attributes
     ----------

@@ -15,6 +15,7 @@ from quakedesign.errors import ParameterError, require_whole
 from quakedesign.exact import rational
 from quakedesign.fault import Fault
 from quakedesign.fault.equilibrium import by_equilibrium
+from quakedesign.fault.model import require_count
 from quakedesign.files import sole_writer, temporary_folder
 from quakedesign.laws import Controller
 from quakedesign.loop import Scheme
@@ -30,7 +31,7 @@ from quakedesign.simulation.campaign.problem import (
     SteppedProblem,
     sliding_space,
 )
-from quakedesign.simulation.campaign.space import Sample, Space, WorstSample, require_count, search
+from quakedesign.simulation.campaign.space import MOST_SAMPLES, Sample, Space, WorstSample, search
 from quakedesign.simulation.closed_loop import Load
 from quakedesign.simulation.integrators import DormandPrince, integrator
 from quakedesign.simulation.run_settings import STICK_SLIP, RunSetting, designed_path, sampled_scheme
@@ -78,7 +79,7 @@ class _Dispatch:
         self._task, self._batches, self._crew, self._keep = task, batches, crew, keep
         self._waiting, self._suspects = deque(batches), deque[int]()
         self._running: dict[Future[Any], int] = {}
-        self._charges = Counter[int]()
+        self._failure_counts = Counter[int]()
         self._failed: dict[int, str] = {}
         self._deaths = 0
 
@@ -104,16 +105,16 @@ class _Dispatch:
         return []
 
     def _collect(self, key: int, future: "Future[Any]") -> list[int]:
-        """Store a result, or charge the batch with its error; return a batch whose worker died."""
+        """Store a result, or count its error as a failure of the batch; return a batch whose worker died."""
         try:
-            answer = future.result()
+            result = future.result()
         except BrokenExecutor:
             return [key]
         except (Exception, CancelledError) as error:
-            self._charge(key, " ".join(f"{type(error).__name__}: {error}".split()), self._waiting)
+            self._count_failure(key, " ".join(f"{type(error).__name__}: {error}".split()), self._waiting)
             return []
         self._deaths = 0
-        self._keep(key, answer)
+        self._keep(key, result)
         return []
 
     def _after_deaths(self, dead: list[int]) -> None:
@@ -127,7 +128,7 @@ class _Dispatch:
             return
         self._crew.renew()
         if len(dead) == 1:
-            self._charge(dead[0], _DEATH, self._suspects)
+            self._count_failure(dead[0], _DEATH, self._suspects)
         else:
             self._suspects.extend(dead)
 
@@ -137,9 +138,9 @@ class _Dispatch:
         lost = [key for future in done for key in self._collect(self._running[future], future)]
         return lost + [self._running[future] for future in pending]
 
-    def _charge(self, key: int, reason: str, queue: "deque[int]") -> None:
-        self._charges[key] += 1
-        if self._charges[key] < ATTEMPTS:
+    def _count_failure(self, key: int, reason: str, queue: "deque[int]") -> None:
+        self._failure_counts[key] += 1
+        if self._failure_counts[key] < ATTEMPTS:
             queue.append(key)
         else:
             self._failed[key] = reason
@@ -281,13 +282,13 @@ def run_campaign(
     Raises
     ------
     ParameterError
-        If the number of samples or the metric is not valid.
+        If `samples` or `batch` is outside 1 … 2^20, or the metric is unknown.
     OutputError
         If the folder contains other files, or cannot be written.
     SimulationError
         If the folder contains another campaign, or the workers cannot be reached.
     """
-    require_count(samples)
+    require_count(MOST_SAMPLES, samples=samples, **({} if batch is None else {"batch": batch}))
     if metric is not None:
         require_metric(metric, problem.metrics)
     began = perf_counter()
@@ -326,7 +327,7 @@ class _Runner:
     ) -> None:
         self._problem, self._ledger, self._program, self._crew = problem, ledger, program, crew
         self._sent = crew.shared(program)
-        self._batch, self._tell = batch, progress
+        self._batch, self._report_progress = batch, progress
         self._records = ledger.read()
         self._filed, self._used = frozenset(self._records), set[bytes]()
         self.failures = list[Failure]()
@@ -336,28 +337,28 @@ class _Runner:
         """Number of samples whose result was read from the folder."""
         return len(self._used & self._filed)
 
-    def results(self, samples: Sequence[Sample], names: Sequence[str], what: str) -> list[SampleResult | None]:
-        """Result of every sample, None where its batch failed."""
+    def results(self, samples: Sequence[Sample], names: Sequence[str], task: str) -> list[SampleResult | None]:
+        """Result of every sample, None where its batch failed; `task` names the progress."""
         starts = self._problem.starts(samples)
         missing = [i for i, start in enumerate(starts) if start.tobytes() not in self._records]
         self._used.update(start.tobytes() for start in starts)
-        self._compute([starts[i] for i in missing], [names[i] for i in missing], what, len(starts))
+        self._compute([starts[i] for i in missing], [names[i] for i in missing], task, len(starts))
         ends = [self._records.get(start.tobytes()) for start in starts]
         results = iter(self._problem.results([end for end in ends if end is not None]))
         return [None if end is None else next(results) for end in ends]
 
-    def _compute(self, starts: "list[np.ndarray]", names: list[str], what: str, total: int) -> None:
+    def _compute(self, starts: "list[np.ndarray]", names: list[str], task: str, total: int) -> None:
         size = self._batch_size(len(starts))
         batches = {first: np.array(starts[first : first + size]) for first in range(0, len(starts), size)}
         done = total - len(starts)
-        self._tell(what, done / total)
+        self._report_progress(task, done / total)
 
         def keep(first: int, ends: "np.ndarray") -> None:
             nonlocal done
             self._ledger.add(batches[first], ends)
             self._records |= {start.tobytes(): end for start, end in zip(batches[first], ends, strict=True)}
             done += len(ends)
-            self._tell(what, done / total)
+            self._report_progress(task, done / total)
 
         steps = self._problem.setting.steps
         tasks = {first: (self._sent, rows, steps) for first, rows in batches.items()}
@@ -366,7 +367,6 @@ class _Runner:
 
     def _batch_size(self, count: int) -> int:
         if self._batch is not None:
-            require_count(self._batch)
             return self._batch
         width, steps, lanes = self._crew.width, self._problem.setting.steps, self._program.lanes
         preferred = min(LARGEST_BATCH, -(-count // (BATCHES_PER_WORKER * width)), self._program.batch_steps // steps)

@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 
 from quakedesign.arguments import checked_dataclass
-from quakedesign.errors import ParameterError, is_whole
+from quakedesign.errors import ParameterError
 from quakedesign.fault import Fault
 from quakedesign.fault.model import require_nonnegative
 
@@ -117,12 +117,6 @@ def _points(seed: int, dimension: int, exponent: int) -> "np.ndarray":
 def noise_seed(seed: int, index: int) -> int:
     """Seed of the noise of sample number `index`."""
     return int(np.random.SeedSequence(seed, spawn_key=(index,)).generate_state(1)[0])
-
-
-def require_count(samples: int) -> None:
-    """Raise if the number of samples is not a whole number in 1 … 2^20."""
-    if not is_whole(samples, 1, MOST_SAMPLES):
-        raise ParameterError(f"samples must be a whole number, 1 to {MOST_SAMPLES}. Received {samples!r}.")
 
 
 # ----------------------------------------------------------------------

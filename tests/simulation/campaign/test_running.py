@@ -23,6 +23,7 @@ from quakedesign.loop.sensing.measurement import Measurement
 from quakedesign.parallel import SerialExecutor, UserExecutor
 from quakedesign.simulation.campaign import campaign_problem, run_campaign, running
 from quakedesign.simulation.campaign.ledger import Ledger
+from quakedesign.simulation.campaign.space import MOST_SAMPLES
 
 LAB = load_fault("lab-fault", box="ten-percent")
 LAW = published("lab-fault")["elqr"]
@@ -173,7 +174,7 @@ for _ in range(5):
     child = os.fork()
     if not child:
         slow = lambda what, done: time.sleep(0.02)
-        run_campaign(problem, 40, folder, executor=SerialExecutor(), batch=1, tell=slow)
+        run_campaign(problem, 40, folder, executor=SerialExecutor(), batch=1, progress=slow)
         os._exit(0)
     begun = time.monotonic()
     batches = os.path.join(folder, "batches")
@@ -208,7 +209,7 @@ def test_a_killed_parent_leaves_no_workers_and_resumes(serial, tmp_path):
     program = (
         "import sys\nfrom test_running import *\n"
         "if __name__ == '__main__':\n    run_campaign(PROBLEM, COUNT, sys.argv[1], workers=2, batch=1,"
-        " tell=lambda what, done: print(what, done, [c.pid for c in active_children()], flush=True), **SEARCH)\n"
+        " progress=lambda what, done: print(what, done, [c.pid for c in active_children()], flush=True), **SEARCH)\n"
     )
     (tmp_path / "main.py").write_text(program)
     folder, workers = tmp_path / "campaign", set()
@@ -340,8 +341,12 @@ def test_a_batch_fills_lanes_and_workers_and_is_lost_in_half_a_minute(tmp_path, 
 
 
 def test_what_makes_no_sense_is_refused(tmp_path):
-    with pytest.raises(ParameterError, match="samples must be a whole number"):
-        run_campaign(PROBLEM, 0, tmp_path)
+    for count in (0, -1, MOST_SAMPLES + 1):
+        with pytest.raises(ParameterError, match="samples must be a whole number from 1 to 1048576"):
+            run_campaign(PROBLEM, count, tmp_path)
+        with pytest.raises(ParameterError, match="batch must be a whole number from 1 to 1048576"):
+            run_campaign(PROBLEM, 1, tmp_path, batch=count)
+    assert not any(tmp_path.iterdir())
     with pytest.raises(ParameterError, match="scheduler or an executor"):
         run_campaign(PROBLEM, 1, tmp_path, scheduler="tcp://here:1", executor=SerialExecutor())
     with pytest.raises(ParameterError, match="metric must be one of"):

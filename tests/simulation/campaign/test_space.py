@@ -7,7 +7,7 @@ import pytest
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
-from quakedesign.simulation.campaign.space import MOST_SAMPLES, Space, noise_seed, point, require_count
+from quakedesign.simulation.campaign.space import Space, noise_seed, point
 
 BOX = Space.of(load_fault("lab-fault", box="ten-percent"), initial_slip=2e-3, initial_slip_rate=1e-2)
 SIZE = len(BOX.ranges)
@@ -77,14 +77,3 @@ def test_a_space_is_the_box_the_disturbance_and_the_start(box, width):
 def test_no_number_of_a_sample_lies_beyond_its_range(low, high):
     assert low + 1.0 * (high - low) > high, "in floats"
     assert Space({"a": (low, high)}).sample([1.0], 0).numbers["a"] == high
-
-
-@pytest.mark.parametrize("samples", [0, -1, MOST_SAMPLES + 1, True, 1.0, 1.5, "1", None])
-def test_a_number_of_samples_that_is_none(samples):
-    with pytest.raises(ParameterError, match="samples must be a whole number, 1 to 1048576"):
-        require_count(samples)
-
-
-@pytest.mark.parametrize("samples", [1, 2, MOST_SAMPLES])
-def test_a_number_of_samples(samples):
-    assert require_count(samples) is None
