@@ -79,7 +79,7 @@ def test_a_law_that_says_nothing_of_its_design_has_none():
     class Silent(own_parts.PID):
         design = classmethod(lambda cls, problem: problem.by_method(cls))
 
-    with pytest.raises(UnsupportedError, match=r"no way to design PID is known. Give its class a classmethod design"):
+    with pytest.raises(UnsupportedError, match=r"PID has no design method. Give its class a classmethod design"):
         qd.design(LAB, Silent)
 
 

@@ -5,8 +5,9 @@ Reading order: the plant with its ranges and symbols (`plant.fault_plant`); its 
 check and the printed statement (`exact.tracking_proof`), with an invariant set for aperiodic sampling
 (`exact.invariant_set`). The stick–slip plant has an invariant polytope, for laws of another structure
 (`exact.stick_slip_set`, `exact.stick_slip_proof`), slow sliding another theorem (`exact.sliding_small_gain`,
-`exact.sliding_proof`), a user's plant a vector small gain (`exact.plant_proof`). `synthesis.guarantee` chooses the
-theorem, `search` proposes laws and sets, `result` and `*_result` define the results of `quakedesign.guarantee`.
+`exact.sliding_proof`), a user-defined plant a vector small-gain theorem (`exact.plant_proof`). `synthesis.guarantee`
+chooses the theorem, `search` proposes laws and sets, `result` and `*_result` define the results of
+`quakedesign.guarantee`.
 """
 
 from quakedesign.arguments import attach

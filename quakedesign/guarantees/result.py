@@ -29,7 +29,7 @@ class Guarantee:
     compensation : Compensation or None
         Gains, scale and settings of a sliding mode in the guaranteed scheme.
     not_at_rest, stick_slip_gap : str
-        Why there is no proof on the stick–slip plant, and what is not searched there.
+        Why there is no proof on the stick–slip plant, and the quantities that are not searched there.
     least_slip_rate : LowerBound or None
         Slip rate, or its error [m/s], below which no controller can keep the fault at this T_s.
     """
@@ -63,8 +63,8 @@ class Guarantee:
     def bounds(self) -> Mapping[str, Bound]:
         """Proved bounds by name; empty without a guarantee.
 
-        Every fault has ``slip_error`` [m], ``peak_slip_rate`` [m/s], ``least_pressure`` and ``largest_pressure`` [Pa]
-        in the fault; except in slow sliding also ``slip_rate_error`` [m/s]. An uncertain plant has its outputs and
+        For a fault: ``slip_error`` [m], ``peak_slip_rate`` [m/s], ``least_pressure`` and ``largest_pressure`` [Pa] in
+        the fault; except in slow sliding also ``slip_rate_error`` [m/s]. For an uncertain plant: its outputs and
         controls, in its own units.
         """
         named: Mapping[str, Bound] = self.proof.bounds
@@ -103,7 +103,7 @@ class Guarantee:
         return []
 
     def task_lines(self) -> list[str]:
-        """Lines about the task alone, for every law."""
+        """Performance limits and other notes that do not depend on the law, as text."""
         return []
 
     def check(self) -> Verdict:
@@ -142,7 +142,7 @@ class Guarantee:
     def _proof(self) -> Any:
         if not self.proved:
             raise CertificateError(
-                f"a result must be proved, or it has no law and no certificate. Received {self.sentence()}."
+                f"a result must be proved to have a law and a certificate. Received {self.sentence()}."
             )
         return self.proof
 

@@ -38,7 +38,7 @@ from quakedesign.plant.of_fault import slow_sliding_plant
 from quakedesign.plant.sliding_plant import SlidingPlant
 from quakedesign.text import Progress, quantity, silent
 
-_TRIFLE = Fraction(1)  # stress [Pa] of the task if none is given, and tried where the estimate of the largest is 0
+_TRIFLE = Fraction(1)  # stress [Pa] of the plant if none is given; tried if the estimate of the largest is 0
 _SEARCHED = 0.8  # fraction of the work at which the proof of a designed law begins
 _SHARES = (Fraction(1), Fraction(9, 10), Fraction(3, 4), Fraction(1, 2))  # shares of an estimate that may be too large
 
@@ -88,7 +88,7 @@ def guarantee_sliding(
     progress: Progress = silent,
     setup: ExactSetup = PLAIN,
 ) -> SlidingGuarantee:
-    """Design and prove a law for a rate-and-state fault at the mean rate of its task.
+    """Design a law for a rate-and-state fault at the mean rate of its reference, and prove bounds.
 
     Parameters
     ----------
@@ -105,6 +105,13 @@ def guarantee_sliding(
         Called with the name of the current step and the fraction done [-].
     setup : ExactSetup
         With a lag or a diffusion path. All proved pressures lie within the limits of its pump.
+
+    Raises
+    ------
+    UnsupportedError
+        For another controller, a box with uncertain constants, or a fault that `slow_sliding_plant` rejects.
+    ParameterError
+        For a spread or stress out of its range, no lag or diffusion path, or a pump with a rate limit.
     """
     box = fault.box
     if controller != "elqr" or any((box.stiffness, box.damping, box.authority)):
@@ -137,7 +144,7 @@ def guarantee_sliding(
     progress(f"a law for |ln(v/V)| up to {LOG_RATES[0]}", 0.0)
     result, well, remedy = _designed(task, period, LOG_RATES[0], setup, prove), FarthestWell(share=Fraction(1)), ""
     if result.sampled_loop is None:
-        progress("how far the well may be", 0.3)
+        progress("largest distance of the well", 0.3)
         well = farthest(task, admissible_step(task, period), setup, stressed=stress is not None)
         remedy = _remedy(fault, task, period, well, setup, prove, spread)
     for log_rate in LOG_RATES[1:]:
@@ -151,7 +158,7 @@ def guarantee_sliding(
         pumped = replace(setup, pump=pump)
         remedy = _under_less(guarantee_sliding(fault, step=step, spread=spread, progress=progress, setup=pumped))
         if remedy and result.sampled_loop is None:
-            none = f"no law was found that holds the fault under {UpperBound(stress).quantity('Pa')}"
+            none = f"no law was found that controls the fault under {UpperBound(stress).quantity('Pa')}"
             result = replace(result, proof=NoProof(reason=none))
     if not result.proof.available and not remedy:
         remedy = _with_less_noise(task, period, setup, prove)
@@ -200,7 +207,7 @@ def _remedy(
     prove: Prove,
     spread: Fraction,
 ) -> str:
-    """Remedy: a proved V or diffusion path, else an admissible T_s (not proved); empty if none is known."""
+    """Remedy: a proved V or diffusion path, else an admissible T_s (not proved); empty if there is none."""
     if well.share < 1:
         return possible_remedy(fault, task, well, setup, prove, spread=spread)
     suits = admissible_step(task, step)
@@ -209,7 +216,7 @@ def _remedy(
 
 
 def _proof(pump: Pump | None, progress: Progress, *, with_stress: bool) -> Prove:
-    """Proof within the pump limits, under the task's stress or near the largest stress."""
+    """Function that proves a law within the pump limits, under the given or nearly the largest stress."""
 
     def tried(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
         under = f"a stress of {float(task.stress):.2g} Pa with |ln(v/V)| up to {log_rate}"
@@ -218,7 +225,7 @@ def _proof(pump: Pump | None, progress: Progress, *, with_stress: bool) -> Prove
         progress(f"{under}: {'proved' if proof.available else 'not proved'}", _SEARCHED)
         return proof
 
-    def about_the_largest(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
+    def near_the_largest(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingProof | NoProof:
         most = largest_stress(task, sampled_loop, log_rate=log_rate)
         proof: SlidingProof | NoProof
         for share in _SHARES if most else _SHARES[:1]:
@@ -227,7 +234,7 @@ def _proof(pump: Pump | None, progress: Progress, *, with_stress: bool) -> Prove
                 break
         return proof
 
-    return tried if with_stress else about_the_largest
+    return tried if with_stress else near_the_largest
 
 
 def _designed(
@@ -247,7 +254,7 @@ def _designed(
 
 
 def _within_pump(pump: Pump | None, proof: SlidingProof | NoProof) -> SlidingProof | NoProof:
-    """A guarantee if its valve pressures lie within the pump limits."""
+    """The given proof if its valve pressures lie within the pump limits, else the reason."""
     if pump is None or not proof.available:
         return proof
     too_much = pump.exceeded(*proof.valve_pressures)

@@ -94,7 +94,7 @@ class StickSlipGuarantee(Guarantee):
 
 
 TAKEN = frozenset({"step", "slip_noise", "longest_step"})
-"""Quantities of a loop setup that the theorem knows."""
+"""Quantities of a loop setup that the theorem covers."""
 
 
 def guarantee_stick_slip(
@@ -132,7 +132,7 @@ def guarantee_stick_slip(
         )
     task = uncertain_plant(fault)
     step = rational(fault.sampling_time) if setup.step is None else Fraction(setup.step)
-    progress = progress or (silent)
+    progress = progress or silent
     healing = rational(fault.friction.rest_excess)
     options: Any = {"objective": objective, "slip_noise": setup.slip_noise, "healing": healing, "progress": progress}
     options["longest_step"] = setup.longest_step

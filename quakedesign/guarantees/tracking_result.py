@@ -348,18 +348,18 @@ def with_worst_case(fault: Fault, proof: TrackingProof | NoProof) -> TrackingGua
     seen = TrackingGuarantee(
         fault=fault, proof=proof, worst=worst_tracking(proof), stick_search=worst_tracking(proof, sticks=True)
     )
-    return seen if proof.varying_gain is None or not seen.exceeded_on_stick_slip else _with_margin(seen, proof)
+    return seen if proof.varying_gain is None or not seen.exceeded_on_stick_slip else _with_arbitrary_gain(seen, proof)
 
 
 def given_law_with_worst_case(
     fault: Fault, proof: TrackingProof | NoProof, notes: tuple[str, ...] | None = None
 ) -> TrackingGuarantee:
-    """The guarantee of a given law; for a law of the errors alone also the worst case found."""
+    """The guarantee of a given law; for a law that uses the errors alone also the worst case found."""
     worst = worst_tracking(proof) if proof.available and not proof.sampled_loop.law.of_reference else None
     return TrackingGuarantee(fault=fault, proof=proof, worst=worst, notes=notes, given=True)
 
 
-def _with_margin(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
+def _with_arbitrary_gain(seen: TrackingGuarantee, proof: TrackingProof) -> TrackingGuarantee:
     arbitrary, worst = guarantee(proof.task, proof.sampled_loop), seen.worst_with_stick
     if not arbitrary.available or worst is None:
         return seen

@@ -1,27 +1,27 @@
 """Uncertain plants of a fault of several blocks with wells.
 
 With as many independent wells as blocks, errors are relative to the reference r(t). With fewer wells, only one average
-of the slips per well can follow r. Let C be the weights of these averages; each row sums to 1. Slip errors are then
-relative to the balance x*(t) under well pressures p* with Cx* = r. Block i has e1′ = e2 + (r′ − x*′) and e2′ = s·e1 +
-ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ − r″, where s, w and β are chord slopes of its friction within their
-ranges and S are the shares of the wells.
+of the slips per well can follow r. Let the rows of C be the weights of these averages; each row sums to 1. Slip errors
+are then relative to the equilibrium x*(t) under well pressures p* with Cx* = r. Block i has e1′ = e2 + (r′ − x*′) and
+e2′ = s·e1 + ΣK(e1_j − e1) − w·e2 + βb·S(p − p*) + φ − w·r′ − r″. The coefficients s, w and β lie in ranges, as in
+`fault_plant`, and S are the shares of the wells in the pressure of each block.
 
-**Balance.** Let N = σ′ − Sp* for each block. Its forces are n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, with n the area per
-mass. With μ = μ0 + δ and |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gc, where c = nδN and G is S times a
-block of the inverse of a constant matrix. Then |N − N0| ≤ |G|nh|N|, which bounds N, and with it s and w.
+**Balance.** Let N = σ′ − Sp* for each block. The force balance per mass is n(μ*σ′ − μN) − kx* + ΣK(x*_j − x*) = 0, with
+n the area per mass. With μ = μ0 + δ and |δ| ≤ h, these equations and Cx* = r give N = N0(r) + Gc, where c = nδN and G
+is S times a block of the inverse of a constant matrix. Then |N − N0| ≤ |G|nh|N|, which bounds N, and with it s and w.
 
 With x*′ = r′(1 + ξ) and p*′ = r′q the derivative of the forces is s(1 + ξ) + ΣK(ξ_j − ξ) + βb·Sq = 0, and Cξ = 0.
 With s = s0 + δs and β = β0 + δβ let F bound |δs(1 + ξ) + δβb·Sq|. The inverse of the matrix with s0 and β0 bounds
-|1 + ξ| and b|Sq| by A + B·F; with the half-widths F ≤ f + M·F. If M·F + f < F for a positive F, the spectral radius
-of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the balance is a Lipschitz function of r
-(Clarke), and |ξ| ≤ X and |q| ≤ Q follow from F.
+|1 + ξ| and b|Sq| by A + B·F. With the half-widths of s and β this gives F ≤ f + M·F. If M·F + f < F for a positive F,
+the spectral radius of M is below 1 (Collatz and Wielandt), no matrix of the ranges is singular, the balance is a
+Lipschitz function of r (Clarke), and |ξ| ≤ X and |q| ≤ Q follow from F.
 
 With one well, identical blocks and symmetric springs, the springs drop out of the mean force. The mean force is that on
 one block whose friction coefficient is the mean of μ(x*) over the blocks. N then lies in the range of one block whose
 friction weakens and strengthens 1 + X times as fast. If X > 1, blocks may move backward, at up to X − 1 times the rate
 of the reference; weakening friction then increases again.
 
-If no F with M·F + f < F is found, nothing is proved: the bound `within` of the slope sectors is then 1e-30 m.
+If no F with M·F + f < F is found, no guarantee can be proved: the bound `within` of the slope sectors is then 1e-30 m.
 """
 
 from collections.abc import Iterable, Sequence
@@ -44,8 +44,8 @@ from quakedesign.plant.plant_values import MOST, Matrix, Row, unit
 from quakedesign.text import counted
 
 _STEEP = Fraction(10**9)  # factor on friction slopes in the first pass: allows any coefficient at any slip
-_LOST = Fraction(10**9)  # X [-], Q [Pa/m] and |σ′ − Sp*| [Pa] where no balance is proved
-_NOWHERE = Fraction(1, 10**30)  # bound of the sectors in that case, so that nothing is proved
+_LOST = Fraction(10**9)  # X [-], Q [Pa/m] and |σ′ − Sp*| [Pa] without proved bounds of the balance
+_NOWHERE = Fraction(1, 10**30)  # bound [m] of the sectors in that case, with which no guarantee can be proved
 _TURNS = 6
 _GRID = 10**4
 _DIGITS = 6  # significant digits of the middle of a range
@@ -181,7 +181,7 @@ def require_independent(shares: Sequence[Row]) -> None:
     if inverse_of(through) is None:
         raise ParameterError(
             f"a guarantee of several blocks needs wells that act independently. Received {counted(m, 'well')} for "
-            f"{N} blocks, whose effects on the blocks are linearly dependent. Move or omit wells."
+            f"{N} blocks, whose effects on the measured slips are linearly dependent. Move or omit wells."
         )
 
 
@@ -189,7 +189,7 @@ def _averages(tasks: Sequence[FaultPlant], shares: Sequence[Row]) -> Matrix:
     require_independent(shares)
     if any(any(task.spreads) for task in tasks):
         raise ParameterError(
-            f"fewer wells than blocks need exact constants, box paper. Received {tasks[0].name} with "
+            f"a fault with fewer wells than blocks needs exact constants, box paper. Received {tasks[0].name} with "
             "uncertain constants. Use fault.with_box('paper'), or a well for each block."
         )
     return measured_by(shares)
@@ -208,8 +208,8 @@ class _Balance:
 def _balance(
     tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
 ) -> _Balance:
-    """Bounds of the balance with fewer wells than blocks."""
-    symmetric = {(j, i, K) for i, j, K in springs} == set(springs)  # others do not drop out of the mean force
+    """Bounds of slopes, rates and pressures at balance, with fewer wells than blocks."""
+    symmetric = {(j, i, K) for i, j, K in springs} == set(springs)  # other springs do not drop out of the mean force
     alike = len(weights) == 1 and symmetric and all(task == tasks[0] for task in tasks)
     best: _Balance | None = None
     for _ in range(_TURNS if alike else 1):
@@ -245,7 +245,7 @@ def _balancing(
 def _stresses(
     tasks: Sequence[FaultPlant], springs: Sequence[Spring], shares: Sequence[Row], weights: Matrix
 ) -> list[Range]:
-    """Ranges of σ′ − Sp* [Pa] of every block at balance; ±1e9 Pa if none is proved."""
+    """Ranges of σ′ − Sp* [Pa] of every block at balance; ±1e9 Pa if no range is proved."""
     N, m = len(tasks), len(weights)
     area = [task.area_per_mass[0] for task in tasks]
     middle = [(task.friction.least + task.friction.largest) / 2 for task in tasks]

@@ -1,9 +1,11 @@
-"""Plant of a fault on a moving reference: ranges and inputs of its error loop, by rational inequalities.
+"""Plant of a fault that follows a reference: ranges and inputs of its error loop, by rational inequalities.
 
-About p*(t), the pressure of equilibrium at rest at the reference r(t), the error e = x − (r, r′) satisfies
+Let p*(t) be the pressure at which the fault is in equilibrium at rest at the reference slip r(t). The error e = x − (r,
+r′) satisfies
 
     e1′ = e2,   e2′ = s·e1 − w·e2 + β·b·(p − p*) + φ − w·r′ − r″.
 
+k̂, η̂ and N̂ are stiffness, damping and area per mass; φ1 and φ2 are slopes of the disturbance in slip and slip rate.
 p* solves N̂(μ*σ′ − μ(r, 0)(σ′ − p*)) = (k̂ − φ1)r, and β·b = μ(x)N̂. s is −k̂ + φ1, and w is η̂ − φ2, each plus N̂(σ′ −
 p*) times a chord slope of friction between x and (r, 0): −Δμ/Δslip in s, Δμ/Δrate in w. So s, w and β lie in ranges for
 every friction μ(x) with the given bounds and slopes. As k̂, N̂ and φ1 are constant, b·|dp*/dt| = |s_r|r′/β_r with s_r,
@@ -63,7 +65,7 @@ class FaultPlant:
     shape : tuple of Fraction
         Coefficients of r/target as a polynomial in t/t_op, lowest power first.
     target_slip, operation_time : Fraction
-        [m], [s].
+        Final slip of the reference [m], and its duration t_op [s].
     amplitude : Fraction
         Bound of the disturbance φ(t) [m/s²].
     change : Fraction or None
@@ -127,27 +129,27 @@ class FaultPlant:
 
     @cached_property
     def stiffness(self) -> Range:
-        """k̂ = G/(ρL²) [1/s²]."""
+        """Range of k̂ = G/(ρL²) [1/s²]."""
         return self._spread(self.shear_modulus / (self.density * self.length**2), 0)
 
     @cached_property
     def specific_damping(self) -> Range:
-        """η̂ = η/(ρL³) [1/s]."""
+        """Range of η̂ = η/(ρL³) [1/s]."""
         return self._spread(self.damping / (self.density * self.length**3), 1)
 
     @cached_property
     def area_per_mass(self) -> Range:
-        """N̂ = 1/(ρL) [m²/kg]."""
+        """Range of N̂ = 1/(ρL) [m²/kg]."""
         return self._spread(1 / (self.density * self.length), 2)
 
     @cached_property
     def authority(self) -> Fraction:
-        """b = μ_res·N̂_min [m²/kg]."""
+        """b [m²/kg]: least friction coefficient times least N̂."""
         return self.friction.least * self.area_per_mass[0]
 
     @cached_property
     def beta(self) -> Range:
-        """β = μN̂/b [-]."""
+        """Range of β = μN̂/b [-]."""
         return Fraction(1), self.friction.largest * self.area_per_mass[1] / self.authority
 
     @cached_property
@@ -169,16 +171,16 @@ class FaultPlant:
 
     @cached_property
     def rest_pressure(self) -> Range:
-        """p* [Pa]."""
+        """Range of p* [Pa] along the reference."""
         return self.normal_stress - self.stress[1], self.normal_stress - self.stress[0]
 
     @cached_property
     def slip_chord(self) -> Range:
-        """s [1/s²]."""
+        """Range of s [1/s²] along the reference."""
         return self.slip_slopes(self.stress)
 
     def slip_slopes(self, stress: Range) -> Range:
-        """Range of force per slip and mass [1/s²] for any constant effective normal stress in a range [Pa]."""
+        """Range of s [1/s²] for any effective normal stress σ′ − p* in a range [Pa]."""
         law, k = self.friction, self.stiffness
         low, high = _hull(
             n * p * c for n in self.area_per_mass for p in stress for c in (law.weakening, -law.strengthening)
@@ -187,11 +189,11 @@ class FaultPlant:
 
     @cached_property
     def rate_chord(self) -> Range:
-        """w [1/s]."""
+        """Range of w [1/s] along the reference."""
         return self.rate_slopes(self.stress)
 
     def rate_slopes(self, stress: Range) -> Range:
-        """Range of damping per mass [1/s] for any effective normal stress in a range [Pa]."""
+        """Range of w [1/s] for any effective normal stress σ′ − p* in a range [Pa]."""
         most = self.area_per_mass[1] * max(map(abs, stress)) * self.friction.rate_slope
         low, high = self.specific_damping
         return low - most - self.growths[1], high + most - self.growths[1]
@@ -207,7 +209,7 @@ class FaultPlant:
 
     @cached_property
     def reference_jerk(self) -> Fraction:
-        """Bound of |r‴| [m/s³] within the task; at its start and end r″ may jump."""
+        """Bound of |r‴| [m/s³] for 0 < t < t_op; at t = 0 and t_op r″ may jump."""
         bound = max(map(abs, _range_of(_derived(self.shape, 3))))
         return bound * self.target_slip / self.operation_time**3
 
@@ -275,7 +277,7 @@ def _derived(shape: tuple[Fraction, ...], order: int) -> tuple[Fraction, ...]:
 
 
 def _halves(row: list[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
-    """Coefficients on both halves (de Casteljau); those of the right half are in reverse order."""
+    """Bernstein coefficients on both halves (de Casteljau); those of the right half are in reverse order."""
     left, right = [], []
     while row:
         left.append(row[0])

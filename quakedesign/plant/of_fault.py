@@ -1,4 +1,4 @@
-"""Uncertain plants of a fault: on a moving reference, and in slow sliding for rate-and-state friction."""
+"""Uncertain plants of a fault that follows a reference; in slow sliding for rate-and-state friction."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -24,13 +24,13 @@ _LARGEST_RAMP = Fraction(8, 23)
 
 
 def static_friction(fault: Fault) -> Fraction:
-    """Static friction coefficient μ* [-] at the initial slip, exact or rounded."""
+    """Static friction coefficient μ* [-] at the initial slip, exact or rounded to 50 digits."""
     start = sp.nsimplify(fault.friction.exact().coefficient(sp.Integer(0), sp.Integer(0)), rational=True)
     return fraction_of(start) if start.is_Rational else rational(str(sp.N(start, 50)))
 
 
 def slow_sliding_plant(fault: Fault, stress: Fraction, spread: Fraction = Fraction(0)) -> SlidingPlant:
-    """Slow-sliding plant at V, the first rate of the reference, under a stress of at most `stress` [Pa].
+    """Slow-sliding plant at V, the first rate of the reference, with a stress disturbance up to `stress` [Pa].
 
     The ranges of a, b and D extend to both sides by the fraction `spread` [-]; the range of μ* follows from those of a
     and b, as μ* depends on a − b if V is not the reference rate of friction.
@@ -107,11 +107,11 @@ def _near(expression: sp.Expr) -> Fraction:
 
 
 # ----------------------------------------------------------------------
-# Friction of slip and slip rate: the plant on a moving reference.
+# Friction of slip and slip rate: the plant that follows a reference.
 
 
 def uncertain_plant(fault: Fault, *, rate_limited: bool = False) -> FaultPlant:
-    """Plant of a fault with its reference and disturbance, exact.
+    """Plant of a fault with its reference and disturbance, in exact numbers.
 
     Parameters
     ----------

@@ -13,8 +13,6 @@ from quakedesign.exact import apart, shortly, six_digits
 from quakedesign.loop import StateLaw
 
 # ----------------------------------------------------------------------
-# Data of a rate-and-state fault for a guarantee of slow sliding, in rationals.
-#
 # Per unit of area: mass m = ρL, stiffness K = G/L, damping H = η/L². The friction coefficient is that of sliding at V,
 # μ*, plus a·ln(v/V) + b·ln(θV/D), or its regularised form, a·arsinh(sinh(μ*/a)·exp((a·ln(v/V) + b·ln(θV/D))/a)); the
 # state follows the ageing law, θ′ = 1 − vθ/D, or the slip law, θ′ = −(vθ/D)·ln(vθ/D). Initially the fault slides at V,
@@ -23,7 +21,7 @@ from quakedesign.loop import StateLaw
 
 Range = tuple[Fraction, Fraction]
 AXES = ("direct_effect", "evolution_effect", "critical_slip", "coefficient", "normal_stress")
-"""Constants that are only known to lie in ranges: a, b, D [m], μ* and σ′ [Pa]."""
+"""Uncertain constants, given by their ranges: a, b, D [m], μ* and σ′ [Pa]."""
 
 _SAME = {
     "density": "kg/m^3",
@@ -49,9 +47,9 @@ class SlidingPlant:
     density, shear_modulus, length, damping : Fraction
         ρ [kg/m³], G [Pa], L [m], η [kg/s].
     ranges : mapping of str to (Fraction, Fraction)
-        By the names of `AXES`.
+        Ranges of the uncertain constants, by the names in `AXES`.
     rate, distance, ramp : Fraction
-        V [m/s], distance of the reference [m], and rate of the planned pressure along Vt [Pa/s].
+        V [m/s], distance of the reference [m], and rate of the planned pressure at slip rate V [Pa/s].
     swing : Fraction
         Largest relative deviation of the reference rate from V [-], below 1; 0 for a constant rate.
     stress : Fraction
@@ -101,9 +99,9 @@ class SlidingPlant:
         return ""
 
     def differences(self, other: "SlidingPlant") -> list[str]:
-        """Differences of another task that a proof for this one does not cover, with both values, SI.
+        """Differences of another plant that a proof for this one does not cover, with both values, SI.
 
-        Constants of the fault, V, the plan and the law of friction must be the same; constants of friction, distance,
+        Constants of the fault, V, `ramp` and the form of friction must be the same; constants of friction, distance,
         swing and stress must lie within those of the proof. The name is not compared.
         """
 
@@ -182,12 +180,12 @@ WHOLE: Cuts = (None,)
 
 
 def cells(task: SlidingPlant, cuts: Cuts) -> tuple[SlidingPlant, ...]:
-    """The plants that `task` becomes on the cells into which `cuts` divide its box.
+    """Plants on the cells into which `cuts` divide the box of `task`.
 
     Raises
     ------
     ParameterError
-        For a cut outside its box, too few or too many entries of `cuts`, or more than 64 cells.
+        For an unknown axis, a cut outside its box, too few or too many entries of `cuts`, or more than 64 cells.
     """
     boxes, leaves = [task], []
     for cut in cuts[: 2 * MOST_CELLS]:  # 65 cells need 129 entries, one more than are read

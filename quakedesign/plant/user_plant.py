@@ -1,7 +1,7 @@
 """Uncertain plants, user-defined or of several blocks: linear part, sectors, loads and disturbances.
 
 x′ = Ax + B(u − v) + Σ entry·φ(row·(x, u − v), t) + Σ entry·d(t). A sector φ lies between two slopes, for all values of
-its argument or for those within a bound; a load v(t) changes slowly; a disturbance d is any bounded measurable
+its argument or for those within a bound; a load v(t) has a bounded rate; a disturbance d is any bounded measurable
 function. The law measures Cx plus noise at every sample.
 """
 
@@ -35,8 +35,8 @@ class Sector:
         Coefficients of the argument y: one for every state and, if y depends on the controls, one for every control.
     slopes : (number, number) or callable
         The slopes low and high, or a callable that returns them for a bound of |y|, such as
-        ``lambda y: (-5 * y**2 / 2, 0)``. A search then finds the bound, a `Fraction`; returned floats are read as the
-        decimals that Python prints for them.
+        ``lambda y: (-5 * y**2 / 2, 0)``. A search then chooses the bound, passed as a `Fraction`; returned floats are
+        read as the decimals that Python prints for them.
     within : number, optional
         Bound of |y| for which the slopes are valid; the proof shows that |y| stays within it. y then depends on states
         alone.
@@ -89,7 +89,7 @@ class UncertainPlant:
     A, B : matrices
         x′ = Ax + Bu + …; n × n and n × m.
     C : matrix, optional
-        What is measured; all states unless given.
+        The measurements are Cx; all states unless given.
     sectors : mapping of str to Sector
     gains : mapping of str to (number, number)
         Least and largest value of the factor that multiplies a control minus its loads, u − v, by the name of the
@@ -161,7 +161,7 @@ class UncertainPlant:
         for given, names, what in ((self.gains, self.controls, "gains"), (self.noise, self.measurements, "noise")):
             if unknown := set(given) - set(names):
                 raise ParameterError(
-                    f"{what} of a plant must be of {', '.join(names)}. Received {', '.join(sorted(unknown))}."
+                    f"{what} of a plant must be given for {', '.join(names)}. Received {', '.join(sorted(unknown))}."
                 )
         ends = {name: vector(pair, f"gains of {name}", 2) for name, pair in self.gains.items()}
         if any(low > high for low, high in ends.values()):
@@ -176,7 +176,7 @@ class UncertainPlant:
         put("sectors", _frozen(dict(self.sectors)))
         if unknown := set(self.units) - {*(self.outputs or ()), *self.controls, *self.disturbances}:
             raise ParameterError(
-                "units of a plant must be of outputs, controls and disturbances. Received "
+                "units of a plant must be given for outputs, controls or disturbances. Received "
                 f"{', '.join(sorted(unknown))}. Use their names."
             )
         put("units", _frozen(dict(self.units)))
@@ -212,7 +212,7 @@ class UncertainPlant:
     def from_blocks(
         cls, fault: Fault | BlockChain, blocks: int | None = None, *, wells: str = "each", coupling: Any = None
     ) -> Self:
-        """Plant of the blocks of a fault, coupled by springs, each with its own disturbance and friction.
+        """Plant of the blocks of a fault, coupled by springs, with independent disturbances and friction.
 
         States: slip errors [m], then slip-rate errors [m/s] of all blocks; controls: pressures of the wells [Pa]. With
         an independent well for each block, errors are relative to the reference, and all are measured. With fewer
@@ -234,8 +234,8 @@ class UncertainPlant:
         Raises
         ------
         ParameterError
-            For wells that do not act independently, a number of blocks out of range, a coupling that is not positive,
-            or a further argument with a `BlockChain`.
+            For wells that do not act independently, fewer wells than blocks with uncertain constants, unknown `wells`,
+            `blocks` out of range, a coupling that is not positive, or a further argument with a `BlockChain`.
         """
         parts = block_parts(fault, blocks, wells, coupling)
         return cls(**parts | {"sectors": {name: Sector(**one) for name, one in parts["sectors"].items()}})

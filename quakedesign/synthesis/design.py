@@ -59,7 +59,7 @@ class Design:
         Proof in continuous time for the base gains (λ = 1); None without a proof, and for a sampled linear law. The
         verdict on a sampled law is that on its `guarantee`.
     premises : tuple of Premise
-        Premises of the guarantee of a sampled law (those named in `REACH`), and of the certificate.
+        Premises of the guarantee of a sampled law (those named in `PREMISES_OF_TIMES`), and of the certificate.
     domain : Domain or None
         Certified set of initial errors for which the premise on |h'| holds along every trajectory.
     details : mapping
@@ -67,9 +67,9 @@ class Design:
     setup : LoopSetup
         Loop setup for which a sampled law is designed.
     runs : FaultProof or NoProof, optional
-        Proof of the sampled loop from the design; None if `guarantee` computes it on access.
+        Proof of the sampled loop from the design; None if `guarantee` computes the proof on access.
     sliding : SlidingGuarantee, optional
-        For friction with a state: the sampled law with its diffusion path, and the task of the design.
+        For friction with a state: the sampled law with its diffusion path, and the plant of the design.
     disturbance_class : str
         Class of the disturbances: ``amplitude``, or ``rate`` for those of bounded rate.
     """
@@ -91,8 +91,8 @@ class Design:
     def gains(self) -> dict[str, Fraction]:
         """Exact gains; of a sliding mode also ``scale`` λ and ``divisor`` μ0N̂0 [m²/kg].
 
-        Feed-forward coefficients follow. A sampled sliding mode also has the numbers of its scheme, ``weight`` [-] and
-        ``authority`` B0 [m²/kg].
+        Feed-forward coefficients follow. A sampled sliding mode also has the settings of its scheme, such as ``weight``
+        [-] and ``authority`` B0 [m²/kg].
         """
         return self.controller.numbers if self.controller else {}
 
@@ -104,7 +104,7 @@ class Design:
 
     @property
     def measurement(self) -> Measurement | None:
-        """Sensor of a simulation with the noise of the design; None without."""
+        """Sensor with the noise of the design, for a simulation; None without noise."""
         slip, rate = float(self.setup.slip_noise), float(self.setup.rate_noise)
         return Measurement(slip_noise=slip, rate_noise=rate, bounded=True) if slip or rate else None
 
@@ -128,14 +128,11 @@ class Design:
         return f"{own}; designed for T_s = {self.controller.sampling_time:.4g} s"
 
     def with_premise(self, premise: Premise) -> "Design":
-        """Return the design with one more premise, such as one evaluated on a run."""
+        """Return the design with one more premise, such as one evaluated on a simulated run."""
         return replace(self, premises=(*(p for p in self.premises if p.name != premise.name), premise))
 
     def feedforward_variants(self) -> tuple[Variant, ...]:
-        """Premises and domain of the same gains with every named feed-forward, the design's first.
-
-        Takes a few seconds.
-        """
+        """Premises and domain of the same gains with every named feed-forward, the design's first; takes seconds."""
         law = self.controller
         return method_of(type(law)).variants(self.fault, law, self.certificate) if law else ()
 
@@ -156,7 +153,7 @@ class Design:
         """
         law = self.controller
         if law is None:
-            return NoProof(reason=f"no gains of {self.title} are known")
+            return NoProof(reason=f"no gains of {self.title} are available")
         return method_of(type(law)).certified_peaks(self.fault, law, disturbance_class)
 
     @property
@@ -164,13 +161,13 @@ class Design:
         """Guarantee of the sampled law with zero-order hold, or the reason why there is none.
 
         A sampled law has its own T_s, a sampled sliding mode its own scheme; the integrals of an e-LQR in continuous
-        time become sums over the T_s of the fault. Computed on access unless the design has it.
+        time become sums over the T_s of the fault. The proof is computed on access unless `runs` contains one.
         """
         law = self.controller
         if self.runs is not None:
             return self.runs
         if law is None:
-            return NoProof(reason=f"no gains of {self.title} are known")
+            return NoProof(reason=f"no gains of {self.title} are available")
         task = uncertain_plant(self.fault, rate_limited=self.disturbance_class == "rate")
         return method_of(type(law)).guarantee(self.fault, task, law, self.setup)
 
@@ -235,12 +232,12 @@ def design(
     estimate.
 
     With `continuous`: the paper's designs, without a sampled guarantee. 2-CTA, 2-DIA: λ grows until the proved bound on
-    |h'| is 1.1 times what reference and disturbance require; also without `continuous` if no T_s is proved. e-LQR:
-    Riccati equation with the corrected bound on the uncertainty (errata, rows 7 and 10), then an exact proof about any
-    constant reference.
+    |h'| is 1.1 times the bound that reference and disturbance require. This is also the design if no T_s has a proof.
+    e-LQR: Riccati equation with the corrected bound on the uncertainty (errata, rows 7 and 10), then an exact proof
+    about any constant reference.
 
-    Rate-and-state friction: an e-LQR of the slip alone controls slow sliding along the task, through the diffusion path
-    (`Design.sliding`); sliding modes do not apply.
+    Rate-and-state friction: an e-LQR of the slip alone controls slow sliding along the reference, through the diffusion
+    path (`Design.sliding`); sliding modes do not apply.
 
     Parameters
     ----------
@@ -260,15 +257,15 @@ def design(
     continuous : bool
         The paper's design in continuous time.
     plant : str, optional
-        ``printed`` for a guarantee on the plant without stick; unless given it is on the stick–slip plant where it can
-        be proved.
+        ``printed`` for a guarantee on the plant without stick; by default the guarantee is on the stick–slip plant if
+        it can be proved there.
     stress : str, float or Fraction, optional
-        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; by default the largest that the design
+        For rate-and-state friction: bound of the shear stress disturbance [Pa]; by default the largest that the design
         withstands.
     spread : str, float or Fraction
-        Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
+        For rate-and-state friction: relative uncertainty of a, b and D_c [-].
     disturbance_class : str
-        Of the guarantee: ``"amplitude"``, any disturbance bounded by the fault's amplitude, or ``"rate"``, whose rate
+        For the guarantee: ``"amplitude"``, any disturbance bounded by the fault's amplitude, or ``"rate"``, whose rate
         is bounded too and which starts at 0, such as a tide.
     progress : callable, optional
         Called with the current task of a search (rate-and-state friction, stick–slip plant) and the completed fraction.
@@ -288,9 +285,9 @@ def design(
     UnknownNameError
         For an unknown controller or feed-forward.
     ParameterError
-        For a feed-forward with a law that takes none or is sampled; an unknown objective, or ``"peak"`` in continuous
-        time; quantities of the setup that a design does not take; stress or spread for friction without a state; a
-        delay or a lag for friction with a state.
+        For a feed-forward with a law that takes none or is sampled; an unknown objective, class or plant, or ``"peak"``
+        in continuous time; quantities of the setup that a design does not take; stress or spread for friction without a
+        state; a delay or a lag for friction with a state; a poor fit that is not accepted.
     UnsupportedError
         For a law that does not apply to friction with a state or has no design method, or a sliding mode with a path.
     """
@@ -375,9 +372,10 @@ def assess(fault: Fault, controller: Controller, setup: LoopSetup = IDEAL, **ent
     **entered : str, float or Fraction
         Fields of `LoopSetup` that replace those of `setup`, such as ``delay="20 ms"``.
 
-    Returns
-    -------
-    Design
+    Raises
+    ------
+    ParameterError
+        For friction with a state, or a loop setup with a law in continuous time.
     """
     setup = setup.with_given(**entered)
     fault.require_memoryless("a verdict on gains")

@@ -86,7 +86,7 @@ def _called(call: Callable[[], Result]) -> Result | QuakedesignError:
 
 STICK_SLIP, PRINTED = PLANTS = StickSlipProof.plant, TrackingProof.plant
 BLOCK_LAWS = ("centralised", "decentralised")
-"""Of several blocks: the pressure of each well depends on all measurements, or only on its own."""
+"""Laws of several blocks: the pressure of each well depends on all measurements, or only on its own."""
 _PUMP = ("saturation", "withdrawal", "rate_limit")
 _OF_SLOW_SLIDING = ("step", "measured", "delay", "lag", "diffusion", "slip_noise", *_PUMP)
 
@@ -115,35 +115,35 @@ def guarantee(
     Parameters
     ----------
     fault : Fault, BlockChain or UncertainPlant
-        For a `BlockChain` or an `UncertainPlant`, peaks of the outputs are proved for a law or gains; law, gains, step,
-        delay and lag apply. For several blocks (`UncertainPlant.from_blocks`, `load_chain`) the law is designed unless
-        given; with rate-and-state friction they slide slowly, and lag and stress are required.
+        For a `BlockChain` or an `UncertainPlant`, peaks of the outputs are proved for a law or gains; only law, gains,
+        step, delay and lag apply. For several blocks (`UncertainPlant.from_blocks`, `load_chain`) the law is designed
+        unless given; with rate-and-state friction they slide slowly, and lag and stress are required.
     controller : str, type of Controller, or SampledLaw
-        ``elqr``; a sliding mode, ``cta`` or ``dia``; or a user-defined law. Of several blocks ``centralised``
+        ``elqr``; a sliding mode, ``cta`` or ``dia``; or a user-defined law. For several blocks ``centralised``
         (default), or ``decentralised``: the pressure of each well depends on its own measurements alone.
     setup : LoopSetup
         Sampling, delay, lag, diffusion path, noise, jitter, pump, initial errors. A user-defined law has its own T_s.
     law : SampledLaw or control.StateSpace, optional
-        User-defined law, as with `controller`. A ``StateSpace`` in discrete time is for an `UncertainPlant`, from its
-        measurements to its controls.
+        User-defined law; alternative to `controller`. A ``StateSpace`` in discrete time is for an `UncertainPlant`,
+        from its measurements to its controls.
     objective : str
-        Of a design. ``peak``: nearly the smallest slip-rate error, as estimated in the search. ``tracking``: a smaller
+        For a design. ``peak``: nearly the smallest slip-rate error, as estimated in the search. ``tracking``: a smaller
         slip error under a drifting disturbance, with a somewhat larger slip-rate error.
     gains : sequence or array of str, float or Fraction, optional
         k1 to k4 [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)] of an e-LQR whose integrals are summed once per sample, run by the
-        scheme ``explicit``; base gains of a sliding mode.
-        A matrix of one row, as the K of ``control.dlqr``, is accepted.
+        scheme ``explicit``; or base gains of a sliding mode. A matrix of one row, as the K of ``control.dlqr``, is
+        accepted.
     scheme : str, optional
-        Of a sliding mode: ``stick-slip`` unless given, or ``compensated`` on the plant without stick; no other has a
-        guarantee. Of the e-LQR ``explicit``.
+        For a sliding mode: ``stick-slip`` unless given, or ``compensated`` on the plant without stick; no other has a
+        guarantee. For the e-LQR ``explicit``.
     disturbance_class : str
         ``amplitude``: any measurable disturbance bounded by the fault's amplitude; ``rate``: its rate is bounded too.
     stress : str, float or Fraction, optional
-        Of rate-and-state friction: bound of the shear stress disturbance [Pa]; by default the largest that the design
+        For rate-and-state friction: bound of the shear stress disturbance [Pa]; by default the largest that the design
         withstands.
     spread : str, float or Fraction
-        Of rate-and-state friction: relative uncertainty of a, b and D_c [-].
-    plant : str
+        For rate-and-state friction: relative uncertainty of a, b and D_c [-].
+    plant : str, optional
         ``stick-slip``: friction holds the fault at rest and it never slips backward. The design is an e-LQR or a
         sliding mode whose predicted slip rate is never negative (`StickSlipLaw`), for an exact slip rate and a pressure
         without delay.
@@ -167,7 +167,8 @@ def guarantee(
     Raises
     ------
     ParameterError
-        For a quantity out of its range, or one that does not apply to the friction or the controller.
+        For a quantity out of its range, one that does not apply to the friction or the controller, or a poor fit that
+        is not accepted.
     UnsupportedError
         For a controller that does not apply to the friction.
     """
@@ -218,7 +219,7 @@ def guarantee(
     if law is None and isinstance(controller, Controller):
         law = controller
     elif law is not None and controller != "elqr":
-        raise ParameterError("law and controller are the same argument. Received both. Omit controller.")
+        raise ParameterError("a controller must be given by law or by controller. Received both. Omit controller.")
     slides = fault.friction.equilibrium is STEADY_SLIDING
     if law is not None:
         wrong = chosen | {"class": None, "stress": stress, f"{fault.friction.name} friction": slides}
@@ -288,7 +289,7 @@ def guarantee(
 
 
 def _sampled(fault: Fault, task: FaultPlant, law: type[Controller], request: GuaranteeRequest) -> TrackingGuarantee:
-    """Guarantee for a moving reference; no design if no pressure up to σ′ makes it feasible."""
+    """Guarantee for a moving reference; without a design if this is infeasible for all pressures up to σ′."""
     setup, most = request.setup, rational(fault.effective_normal_stress)
     step = rational(fault.sampling_time) if setup.step is None else setup.step
     exact = ExactSetup.of(setup)
@@ -315,13 +316,7 @@ def _shown(value: object) -> str:
 
 
 def _exact_texts(gains: "Sequence[str | float | Fraction] | Sequence[Sequence[float]]") -> tuple[str, ...]:
-    """Gains as exact texts.
-
-    Raises
-    ------
-    ParameterError
-        For a gain that is not a finite number.
-    """
+    """Gains as exact texts; raises `ParameterError` for a gain that is not a finite number."""
     values: list[Any] = list(gains)
     if len(values) == 1 and not isinstance(values[0], str) and hasattr(values[0], "__len__"):
         values = list(values[0])

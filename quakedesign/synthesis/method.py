@@ -61,9 +61,9 @@ class SlowSlidingDesign:
     diffusion : Fraction or None
         L²/D [s]; None for a well near the fault.
     stress : Fraction or None
-        [Pa]; None for nearly the largest with a guarantee.
+        Bound of the shear stress disturbance [Pa]; None for nearly the largest with a guarantee.
     spread : Fraction
-        [-].
+        Relative uncertainty of a, b and D_c [-].
     """
 
     diffusion: Fraction | None = None
@@ -135,9 +135,9 @@ class GainProblem(Generic[Designed]):
         premises: tuple[Premise, ...] = (),
         **more: Any,
     ) -> Designed:
-        """Gains with their results; premises of the sampled loop come first.
+        """Result for given gains, with certificate and premises; premises of the sampled loop come first.
 
-        The default verdict is that on the certificate, or for a sampled law that on the sampled loop.
+        By default the verdict is that on the certificate, or for a sampled law that on the sampled loop.
         """
         own, domain = method_of(type(controller)).premises(self.fault, controller, certificate)
         verdict = cached_verdict(certificate, type(controller)) if certificate is not None else Verdict.UNDECIDED
@@ -175,7 +175,7 @@ class GuaranteeRequest:
         """Reject other measured signals than slip and slip rate, for a law that needs both."""
         if self.setup.measured != MEASURED[0]:
             raise ParameterError(
-                "measured is for the e-LQR (slip only if it is designed), all other laws need slip and slip rate. "
+                "measured is for the e-LQR (slip only for a design without gains); other laws need slip and slip rate. "
                 f"Received {self.setup.measured!r}. Omit measured, or omit gains and controller."
             )
 
@@ -205,7 +205,7 @@ class DesignMethod(Generic[L]):
     ----------
     name : str
     family : type of Controller
-        From which the laws of the family derive.
+        Base class of the laws of the family.
     designs : bool
         Whether the method computes gains for a fault.
     without_state : str
@@ -228,12 +228,12 @@ class DesignMethod(Generic[L]):
         UnsupportedError
             For a law without a design method.
         """
-        raise UnsupportedError(f"no way to design {law.title} is known. Give its class a classmethod design(problem).")
+        raise UnsupportedError(f"{law.title} has no design method. Give its class a classmethod design(problem).")
 
     def assess(self, problem: GainProblem[Designed], controller: L) -> Designed:
         """Verdict on given gains by a quadratic V, for a linear law about any constant reference."""
         if not linear_about_a_reference(controller):
-            return problem.judged(controller, details={"reason": f"no way to prove {controller.title} is known"})
+            return problem.judged(controller, details={"reason": f"{controller.title} has no form of certificate"})
         loop = sector_loop(controller, sectors(problem.fault))
         return problem.judged(controller, find_certificate(loop, 2, subject=type(controller)))
 
@@ -245,12 +245,12 @@ class DesignMethod(Generic[L]):
         return tuple(linear_premises(fault, controller, certificate)) if linear else (), None
 
     def guarantee(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> FaultProof | NoProof:
-        """Guarantee of the sampled law on a task of the fault, with the noise of a loop setup."""
-        return NoProof(reason=f"no analysis of {controller.title} under a held pressure is known here")
+        """Guarantee of the sampled law on a plant of the fault, with the noise of a loop setup."""
+        return NoProof(reason=f"no analysis of {controller.title} with zero-order hold is available")
 
     def certified_peaks(self, fault: Fault, controller: L, disturbance_class: str) -> ContinuousProof | NoProof:
         """Certified peaks of slip, slip rate and pressure in continuous time."""
-        return NoProof(reason=f"no bound of peaks of {controller.title} is known here")
+        return NoProof(reason=f"there are no certified peaks in continuous time for {controller.title}")
 
     def compensation(self, controller: L, proof: FaultProof | NoProof) -> Compensation | None:
         """Sampled sliding mode with its guarantee; None for other laws."""
@@ -271,8 +271,8 @@ class DesignMethod(Generic[L]):
     def sampled(
         self, fault: Fault, task: FaultPlant, law: type[L], step: Fraction, request: GuaranteeRequest
     ) -> TrackingGuarantee:
-        """Guarantee of given gains, or of a design, with sampling every T_s [s]."""
-        reason = f"no analysis of {law.title} under a held pressure is known here"
+        """Guarantee of given gains, or of a design, with T_s [s]."""
+        reason = f"no analysis of {law.title} with zero-order hold is available"
         return TrackingGuarantee(fault=fault, proof=NoProof(reason=reason))
 
     def given(self, fault: Fault, task: FaultPlant, controller: L, setup: LoopSetup) -> TrackingGuarantee:
@@ -284,7 +284,7 @@ class DesignMethod(Generic[L]):
             For a controller that is not a sampled linear law.
         """
         raise UnsupportedError(
-            "guarantee takes a sampled linear law as it is, and others by name with gains. Received "
+            "a given controller must be a sampled linear law; other laws are given by name and gains. Received "
             f"{controller!r:.80}. Give its name and gains, or a SampledLaw."
         )
 
@@ -340,7 +340,13 @@ class Samples(DesignMethod[SampledController]):
     def guarantee(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingProof | NoProof:
-        """Guarantee at the law's T_s; delay, lag and diffusion are those of the law unless the setup gives them."""
+        """Guarantee at the law's T_s; delay, lag and diffusion are those of the law unless the setup gives them.
+
+        Raises
+        ------
+        ParameterError
+            For another step than that of the law, or other measured signals than its inputs.
+        """
         law, step = controller.law, controller.step
         if setup.step is not None and setup.step != step:
             own, requested = apart(step, setup.step)
@@ -379,7 +385,7 @@ class Samples(DesignMethod[SampledController]):
     def given(
         self, fault: Fault, task: FaultPlant, controller: SampledController, setup: LoopSetup
     ) -> TrackingGuarantee:
-        """Guarantee; for a law of the errors alone also the worst case found."""
+        """Guarantee; for a law that uses the errors alone also the worst case found."""
         proof = self.guarantee(fault, task, controller, setup)
         result = given_law_with_worst_case(fault, proof, controller.notes)
         if proof.available or proof.only_pressure_fails or proof.reason == _STANDING or setup.longest_step:
@@ -399,8 +405,8 @@ def _times(factor: Fraction | int, law: LinearLaw) -> LinearLaw:
     """Law with its pressure multiplied by a factor."""
     output, feedback = (tuple(factor * v for v in row) for row in (law.output, law.feedback))
     *states, pressure = law.of_reference or ((),)
-    moved = (*states, tuple(factor * v for v in pressure)) if law.of_reference else ()
-    return replace(law, output=output, feedback=feedback, of_reference=moved)
+    of_reference = (*states, tuple(factor * v for v in pressure)) if law.of_reference else ()
+    return replace(law, output=output, feedback=feedback, of_reference=of_reference)
 
 
 _STABLE = 1 - 1e-6  # an eigenvalue of 1 may be computed below 1

@@ -38,8 +38,8 @@ def guarantee_plant(
     """
     if unknown := setup.given().keys() - _SUPPORTED:
         raise ParameterError(
-            f"a guarantee of an uncertain plant has step, delay and lag of the loop setup; noise and start are fields "
-            f"of the plant. Received {', '.join(sorted(unknown))}. Omit these."
+            f"a guarantee of an uncertain plant takes step, delay and lag of the loop setup; noise and start are "
+            f"fields of the plant. Received {', '.join(sorted(unknown))}. Omit these."
         )
     behind = plant.behind(setup.lag) if setup.lag else plant
     exact, notes = _law_of(behind, law, gains, setup, decentralised)
@@ -50,8 +50,8 @@ def guarantee_plant(
         shape = ", ".join(f"{v + 0.0:.2g}" for v in np.round(mode[:count], 9))
         seen = np.abs(np.array(behind.C, dtype=float) @ mode).max() > _UNSEEN
         return NoProof(
-            reason=f"a mode escapes{'' if seen else ', which is not measured'}: with every uncertain term at its "
-            f"steepest the states ({shape}) grow by a factor of {radius:.4g} a sample"
+            reason=f"a mode {'' if seen else 'that is not measured '}is unstable: with every uncertain term at its "
+            f"upper slope the states ({shape}) grow by a factor of {radius:.4g} per sample"
         )
     proof = plant_guarantee(behind, exact)
     return replace(proof, notes=notes) if proof.available else proof
@@ -65,7 +65,7 @@ def _shown(plant: UncertainPlant) -> int:
 def _law_of(
     plant: UncertainPlant, law: Any, gains: Any, setup: LoopSetup, decentralised: bool
 ) -> tuple[MatrixLaw, tuple[str, ...]]:
-    """Law in exact numbers, and notes of the changes by rounding."""
+    """Law in exact numbers, and notes on changes by rounding."""
     entries: Any = gains if hasattr(gains, "shape") else list(gains)
     empty = len(entries) == 0
     if (law is None) == empty and not (law is None and "slope of block 1" in plant.sectors and not setup.delay):
@@ -95,12 +95,12 @@ def _law_of(
         others = {
             "an implicit step": linear.implicit_step,
             "r or r' as an input": linear.of_reference,
-            "other first states": linear.first,
+            "nonzero initial states": linear.first,
         }
         if received := [feature for feature, part in others.items() if part]:
             raise ParameterError(
-                "a law of an uncertain plant must be linear in what is measured, and begin with z = 0. Received one "
-                f"with {' and '.join(received)}. Give law=control.ss(A, B, C, D, dt) of the measurements."
+                "a law of an uncertain plant must be linear in the measurements, with zero initial states. Received "
+                f"one with {' and '.join(received)}. Give law=control.ss(A, B, C, D, dt) of the measurements."
             )
         parts: tuple[Any, ...] = (linear.update, linear.measured, (linear.output,), (linear.feedback,))
     else:

@@ -1,4 +1,4 @@
-"""Gains with a proof and the least simulated error at a given sampling time."""
+"""Search for gains with a proof and the least simulated error at a given sampling time."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -45,7 +45,7 @@ class TrialSampling:
         λ and μ0N̂0 [m²/kg] of the controller; λ scales |h'| ≤ 1 of the base gains to the required bound.
     metric, scheme : str
     step, duration : float
-        [s].
+        T_s and simulated time [s].
     """
 
     fault: Fault
@@ -63,7 +63,7 @@ class TrialSampling:
         return self.law.for_authority(tuple(gains), self.divisor).scaled(self.scale)
 
     def error(self, gains: Sequence[Fraction]) -> float | None:
-        """Metric of a run from rest on the plant without stick, that of the certificates; None if it diverges."""
+        """Metric of a run from rest on the plant without stick, as in the certificates; None if the run diverges."""
         run = simulate(
             self.fault,
             self.controller(gains),
@@ -97,17 +97,17 @@ def sampling(
     law : str
         A sliding mode.
     lipschitz : number or text, optional
-        L̄ [m/s³]; by default 1.1 times the requirement of the fault's reference and disturbance.
+        Bound L̄ of |h'| [m/s³]; by default 1.1 times the bound that reference and disturbance require.
     gain_range : tuple of two, optional
         Smallest and largest β [-]; those of the fault's box unless given.
     metric : str
-        One of `Metrics`, to be minimised.
+        Field of `Metrics` to minimise.
     scheme : str
         One of `quakedesign.loop.schemes`.
     step : float, optional
         Sampling time T_s [s]; the fault's unless given.
     duration : float, optional
-        [s]; by default 4000 T_s, at most the operation time.
+        Simulated time [s]; by default 4000 T_s, at most the operation time.
 
     Raises
     ------

@@ -52,12 +52,12 @@ class SlidingModes(DesignMethod[SlidingMode]):
     designs: ClassVar[bool] = True
     takes_base_gains: ClassVar[bool] = True
     without_state: ClassVar[str] = (
-        "sliding modes of second order do not apply to friction with a state, where the slip rate follows the pressure "
-        "at once (it is algebraic without inertia)"
+        "sliding modes of second order do not apply to friction with a state, where the slip rate responds to the "
+        "pressure without delay (algebraically without inertia)"
     )
 
     def design(self, problem: GainProblem[Designed], law: type[SlidingMode]) -> Designed:
-        """λ for the scheme ``stick-slip`` or ``compensated``; in continuous time λ for the bound L̄ of |h'|."""
+        """Choose λ for the scheme ``stick-slip`` or ``compensated``; in continuous time, for the bound L̄ of |h'|."""
         if problem.setup.measured != MEASURED[0]:
             raise ParameterError(
                 f"a sliding mode needs slip and slip rate. Received {problem.setup.measured!r} for {law.name}. "
@@ -100,7 +100,7 @@ class SlidingModes(DesignMethod[SlidingMode]):
     def premises(
         self, fault: Fault, controller: SlidingMode, certificate: Certificate | None
     ) -> tuple[tuple[Premise, ...], Domain | None]:
-        """|h'| against its certified bound L̄, along the reference and on a level set."""
+        """Premises on |h'| and its certified bound L̄, along the reference and on a level set."""
         premises, domain = sliding_mode_premises(fault, controller, certificate)
         return tuple(premises), domain
 
@@ -218,7 +218,7 @@ def _origin(base: BaseGains[SlidingMode]) -> dict[str, str]:
 
 
 def required_lipschitz(fault: Fault, divisor: Fraction, added: FeedForward = NONE) -> Fraction:
-    """Bound on |h'| [m/s³] that reference, disturbance and uncertainty need at zero errors."""
+    """Bound on |h'| [m/s³] that reference, disturbance and uncertainty require at zero errors."""
     return largest_matched_rate(fault, divisor, Errors(), feedforward=added)
 
 

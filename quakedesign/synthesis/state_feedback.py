@@ -187,7 +187,7 @@ def _sampled(problem: GainProblem[Designed], law: type[ExtendedLQR]) -> Designed
 
 
 def _sliding(problem: GainProblem[Designed], given: SlowSlidingDesign, law: type[ExtendedLQR]) -> Designed:
-    """Design of a law of the slip alone for slow sliding along the task."""
+    """Design of a law of the slip alone for slow sliding along the reference."""
     wrong = {
         "continuous": problem.continuous,
         f"objective {problem.objective!r}": problem.objective != OBJECTIVES[0],
@@ -257,7 +257,7 @@ def quadratic_certificate(loop: Loop, *, theta: Matrix | None = None) -> Certifi
 def _judged(
     problem: GainProblem[Designed], controller: ExtendedLQR, certificate: Certificate | None, details: dict[str, Any]
 ) -> Designed:
-    """Refuted if a constant vertex of the box is not stable, undecided if no V was found."""
+    """Verdict on gains; without a certificate, refuted if a constant vertex of the box is unstable, else undecided."""
     details = {**details, "rate": str(certificate.claims["rate"]) if certificate else None}
     if certificate is not None:
         return problem.judged(controller, certificate, details=details)

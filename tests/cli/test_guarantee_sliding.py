@@ -133,7 +133,7 @@ def test_where_a_stress_has_no_proof_a_smaller_one_that_has_is_named(monkeypatch
         patched.setattr(sliding_result, "designed_sliding", found_below)
         patched.setattr(sliding_result, "farthest", lambda *_, **__: FarthestWell(share=Fraction(1)))
         found = sliding_result.guarantee_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof
-    assert found.reason.startswith("no law was found that holds the fault under 40 kPa; a proof was found for a stress")
+    assert found.reason.startswith("no law was found that controls the fault under 40 kPa; a proof was found")
     monkeypatch.setattr(sliding_result, "proved_sliding", lambda task, design, *, log_rate: NONE)
     assert sliding_result.guarantee_sliding(fault, stress=Fraction(40_000), setup=ExactSetup(**around)).proof == NONE
 

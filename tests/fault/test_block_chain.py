@@ -208,12 +208,12 @@ def test_what_takes_one_block_refuses_the_file_and_says_what_takes_it():
         (
             replace(CHAIN, wells=(100.0, 200.0, 300.0)),
             {},
-            "3 wells for 3 blocks, whose effects on the blocks are linearly dependent",
+            "3 wells for 3 blocks, whose effects on the measured slips are linearly dependent",
         ),
         (
             replace(CHAIN, wells=(2500.0,), fault=CHAIN.fault.with_box("ten-percent")),
             {},
-            "fewer wells than blocks need exact constants, box paper",
+            "fewer wells than blocks needs exact constants, box paper",
         ),
         (CHAIN, {"blocks": 3}, "has its own blocks, wells and coupling"),
         (CHAIN, {"wells": "one"}, "has its own blocks, wells and coupling"),

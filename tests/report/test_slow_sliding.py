@@ -157,7 +157,7 @@ def test_the_report_is_the_one_of_all_faults(folder):
     first = page[page.index('<div class="answer">') : page.index("<nav>")]
     assert first.index("Without control: the fault creeps") < first.index("With the e-LQR (designed) the slip rate")
     assert first.index("never exceeds") < first.index("Not designed, 2-CTA, 2-DIA")
-    assert "the slip rate follows the pressure at once" in first
+    assert "the slip rate responds to the pressure without delay" in first
     assert "guaranteed for the sampled loop" in page
     assert "Uncertainty box" not in page
     assert not re.search(r"for ever\b", page[: page.index("Glossary")])
@@ -180,7 +180,7 @@ def test_laws_that_do_not_apply_are_left_out_with_their_reason():
     assert designable(PATCH) == ("elqr",)
     assert left_out(load_fault("real-fault")) == {}
     assert set(left_out(PATCH)) == {"cta", "dia"}
-    with pytest.raises(UnsupportedError, match=r"the slip rate follows the pressure at once .* Received cta"):
+    with pytest.raises(UnsupportedError, match=r"the slip rate responds to the pressure without delay .* Received cta"):
         design(PATCH, "cta")
 
 

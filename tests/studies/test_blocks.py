@@ -42,14 +42,14 @@ def test_the_command_proves_two_blocks_and_its_files_are_checked(tmp_path, capsy
 
 def test_loose_springs_are_refused_with_the_mode_that_escapes(capsys):
     assert run("blocks", "real-fault", "--most", "2", "--coupling", "0.5") == 1
-    assert "a mode escapes, which is not measured" in capsys.readouterr().out
+    assert "a mode that is not measured is unstable" in capsys.readouterr().out
 
 
 def test_answers_are_told_in_lines_and_numbers():
     answer = one_block(REAL, [2], coupling="0.5")
     assert not answer.proved
     assert answer.peaks(2) is None
-    assert answer.lines()[2].startswith("  2 blocks: none: a mode escapes")
+    assert answer.lines()[2].startswith("  2 blocks: none: a mode that is not measured is unstable")
     assert answer.to_dict()["blocks"][0]["verdict"] == "undecided"
 
 

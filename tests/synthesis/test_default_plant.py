@@ -145,7 +145,7 @@ def test_a_sliding_mode_is_designed_on_the_stick_slip_plant_where_it_is_proved(m
     )
     without = replace(design.controller.sampling, settings=design.controller.sampling.settings[:2])
     bare = replace(design.controller, gains=dict(design.controller.gains), sampling=without)
-    assert "rest_slip, slip_weight given" in guarantee_of(uncertain_plant(REAL), bare).reason
+    assert "requires rest_slip, slip_weight in its settings" in guarantee_of(uncertain_plant(REAL), bare).reason
 
 
 def test_the_controller_of_a_result_is_the_sliding_mode_itself():

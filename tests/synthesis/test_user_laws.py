@@ -349,7 +349,7 @@ def test_a_law_of_the_slip_rate_alone_leaves_the_slip_to_itself(name):
         ({"gains": [1]}, "Received gains. Omit"),
         ({"plant": "stick-slip"}, "Received plant 'stick-slip'. Omit"),
         ({"objective": "peak"}, "Received objective 'peak'. Omit"),
-        ({"controller": "cta"}, "same argument"),
+        ({"controller": "cta"}, "by law or by controller. Received both"),
         ({"disturbance_class": "no"}, "class"),
         ({"law": ABSOLUTE, "diffusion": "0.02 s"}, "no guarantee with a diffusion"),
         ({"law": ABSOLUTE, "longest_step": "0.2 s"}, "no guarantee with a diffusion"),

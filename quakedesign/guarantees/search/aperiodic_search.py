@@ -160,7 +160,7 @@ class _Floats:
         """Invariant set with a number of facets for bounded inputs; None if the search fails."""
         points = self.reached(bounds, _DIRECTIONS * facets)
         try:
-            return points if points is None else _Sides.still(self, _facets(points, facets), bounds, raised)
+            return points if points is None else _Sides.invariant(self, _facets(points, facets), bounds, raised)
         except (LinAlgError, QhullError):
             return None
 
@@ -239,7 +239,7 @@ def _rounded_set(task: FaultPlant, sampled_loop: SampledLoop, raised: float) -> 
             return NoProof(reason=reason, small_gain=gain)
         bounds = np.maximum(more, loop.own) * raised
         again = loop.force and turn < _ANEW  # new normals in the first turns, while ratios of bounds change
-        following = loop.sides(bounds, _MANY, raised) if again else _Sides.still(loop, sides.facets, bounds, raised)
+        following = loop.sides(bounds, _MANY, raised) if again else _Sides.invariant(loop, sides.facets, bounds, raised)
         if following is None:
             break
         sides = following
@@ -267,7 +267,7 @@ class _Sides:
     facets: np.ndarray
 
     @classmethod
-    def still(cls, loop: _Floats, normals: np.ndarray, bounds: np.ndarray, raised: float) -> "_Sides | None":
+    def invariant(cls, loop: _Floats, normals: np.ndarray, bounds: np.ndarray, raised: float) -> "_Sides | None":
         """Smallest invariant set with these normals; None if the iteration diverges or does not converge."""
         sides, before = cls(normals), np.inf
         for _ in range(_POLICIES):

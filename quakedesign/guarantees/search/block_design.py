@@ -44,6 +44,11 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
         T_s [s].
     decentralised : bool
         Whether the pressure of each well depends on its own measurements alone.
+
+    Raises
+    ------
+    ParameterError
+        For a step for which the design fails in floating point.
     """
     part, scale = linear_part(plant, {}), np.array(_START)
 
@@ -66,7 +71,7 @@ def block_law(plant: UncertainPlant, step: Fraction, *, decentralised: bool = Fa
         return _law_of(part, step, scale * np.exp(best.x), decentralised)
     except ValueError:
         raise ParameterError(
-            "a law for several blocks is designed where floating point holds what grows within one step. Received a "
+            "the growth of the errors of several blocks within one step must be within the range of floats. Received a "
             f"step of {shortly(step)} s, for which this fails. Shorten the step, or check units of blocks and friction."
         ) from None
 
@@ -98,10 +103,10 @@ def _feedback(A: np.ndarray, G: np.ndarray, x: np.ndarray) -> np.ndarray:
     return gain
 
 
-def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> MatrixLaw:
+def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, decentralised: bool) -> MatrixLaw:
     """Feedback of the measurements: π⁺ = P(e, q), d⁺ = d + M(e2 − π), p = −g⁻¹(K(e, q) + d⁺).
 
-    Measurements are all errors e, or their means for each well; q is a model of diffusing pressures.
+    Measurements are all errors e, or their means for each well; q models diffusing pressures, g is the input gain.
     """
     blocks, count = len(part.outputs) // 2, len(part.C) // 2
     A, B = middle(part)
@@ -111,7 +116,7 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
     spread = acting @ np.linalg.inv(weights @ acting) if count < blocks else np.eye(blocks)
     own = np.kron(np.eye(2), weights) @ A[: 2 * blocks, : 2 * blocks] @ np.kron(np.eye(2), spread)
     gain, read = weights @ acting * x[3], weights @ read * x[3]
-    if alone:  # each well uses its own measurements and treats the others as a disturbance
+    if decentralised:  # each well uses its own measurements and treats the others as a disturbance
         own, gain = own * np.kron(np.ones((2, 2)), np.eye(count)), np.diag(np.diag(gain))
         flow, fed, read = block_diag(*[flow] * count), block_diag(*fed.T[:, :, None]), block_diag(*read[:, None])
     still, more, size = np.zeros((count, count)), len(flow), 2 * count
@@ -120,17 +125,17 @@ def _law_of(part: LinearPart, step: Fraction, x: np.ndarray, alone: bool) -> Mat
     wells = np.linalg.inv(gain) / largest
     at_once = np.eye(count) + read @ np.linalg.solve(flow, fed) @ wells * largest if more else np.eye(count)
     phi, input_map = _with_hold(whole, np.vstack([still, at_once, fed @ wells]), float(step))
-    K = _feedback(phi, input_map, x * (1, 1, 1, 1, not alone))
+    K = _feedback(phi, input_map, x * (1, 1, 1, 1, not decentralised))
     scale = np.r_[np.ones(size), np.full(more, 1 / largest)]  # scales of the states, for pressures in Pa
     feedback = rounded(K * scale)
     pushed = _with_hold(own, np.vstack([still, np.eye(count)]), float(step))[1]
-    learned = rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
+    corrections = rounded(float(x[2]) * np.linalg.inv(pushed[count:]))
     closed = (phi - input_map @ (np.array(feedback, dtype=float) / scale)) * scale / scale[:, None]
-    return _law(step, rounded(gain), feedback, learned, rounded(closed[count:]))
+    return _law(step, rounded(gain), feedback, corrections, rounded(closed[count:]))
 
 
 def _law(
-    step: Fraction, gains: Matrix, feedback: tuple[Row, ...], learned: tuple[Row, ...], expected: tuple[Row, ...]
+    step: Fraction, gains: Matrix, feedback: tuple[Row, ...], corrections: tuple[Row, ...], expected: tuple[Row, ...]
 ) -> MatrixLaw:
     """Law with states π [m/s], diffusing pressures [Pa], d [m/s²]; p = −g⁻¹d balances d."""
     size, zero, inverse = len(feedback), Fraction(0), inverse_of(gains)
@@ -141,15 +146,15 @@ def _law(
     def acting(rows: Sequence[Row]) -> Matrix:
         return tuple(tuple(-v for v in row) for row in product(inverse, rows, len(rows[0])))
 
-    learned_by = [(*(-v for v in row), *[zero] * more, *unit(size, i)) for i, row in enumerate(learned)]
+    estimated = [(*(-v for v in row), *[zero] * more, *unit(size, i)) for i, row in enumerate(corrections)]
     by_pressures = [(*still, *row[2 * size :], *still) for row in feedback]
     return MatrixLaw(
         step=step,
         delay=zero,
-        update=(*((*still, *row[2 * size :], *still) for row in expected), *learned_by),
-        measured=(*(row[: 2 * size] for row in expected), *((*still, *row) for row in learned)),
-        output=acting([_sum(*rows) for rows in zip(learned_by, by_pressures, strict=True)]),
-        feedback=acting([_sum(row[: 2 * size], (*still, *by)) for row, by in zip(feedback, learned, strict=True)]),
+        update=(*((*still, *row[2 * size :], *still) for row in expected), *estimated),
+        measured=(*(row[: 2 * size] for row in expected), *((*still, *row) for row in corrections)),
+        output=acting([_sum(*rows) for rows in zip(estimated, by_pressures, strict=True)]),
+        feedback=acting([_sum(row[: 2 * size], (*still, *by)) for row, by in zip(feedback, corrections, strict=True)]),
     )
 
 

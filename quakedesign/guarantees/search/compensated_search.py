@@ -491,7 +491,7 @@ def design_sticking(
         Gives the base gains.
     step : Fraction
         T_s [s].
-    **wanted
+    **options
         As in `design_stick_slip`.
     """
     proof = design_stick_slip(task, step, implicit=True, **options)
@@ -550,7 +550,7 @@ def _settings(law: SlidingMode) -> dict[str, Fraction]:
 def _deadbeat(
     task: FaultPlant, step: Fraction, objective: str, weights: tuple[Fraction, ...], setup: ExactSetup = PLAIN
 ) -> tuple[Fraction, Fraction, tuple[Fraction, Fraction] | None]:
-    """Weight, B0 [m²/kg] and bounds of the measured errors [m], [m/s] of a deadbeat step, as estimated; else None."""
+    """Weight, B0 [m²/kg] and estimated bounds of the measured errors [m], [m/s] of a deadbeat step; None without."""
     require_known(objective, OBJECTIVES, "objective")
     key = "deadbeat", task, step, objective, weights, setup
     search = partial(_deadbeat_search, task, step, objective, weights, setup)

@@ -173,7 +173,7 @@ def guarantee_of(
     own = law.sampling
     if own is not None and own.scheme == STICK_SLIP:
         if missing := {"authority", "weight", "slip_weight", "rest_slip"} - dict(own.settings).keys():
-            reason = f"the scheme {STICK_SLIP} has a guarantee with {', '.join(sorted(missing))} given in its settings"
+            reason = f"a guarantee in the scheme {STICK_SLIP} requires {', '.join(sorted(missing))} in its settings"
             return NoProof(reason=reason)
         if setup.rate_noise:
             reason = "guarantees on the stick-slip plant do not cover rate_noise: set it to 0"
@@ -257,8 +257,8 @@ def _why_none(task: FaultPlant, law: type[SlidingMode], scheme: str, step: Fract
             f"e1 = T_s²·B0·p*, here up to {rest:.2g} m{_REMEDY}"
         )
     return (
-        f"at e1 = 0 the slope of {law.title} is infinite, so that its pressure held over T_s chatters, and no linear "
-        f"loop with a range of slopes covers it{_REMEDY}"
+        f"at e1 = 0 the slope of {law.title} is infinite, so that its pressure chatters with zero-order hold, and no "
+        f"linear loop with a range of slopes covers it{_REMEDY}"
     )
 
 

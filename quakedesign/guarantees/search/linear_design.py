@@ -68,10 +68,9 @@ def best_guarantee(task: FaultPlant, sampled_loop: SampledLoop) -> TrackingProof
     proof = guarantee(task, sampled_loop) if slow is None else guarantee(task, sampled_loop, slow)
     if slow is None or proof.available:
         return proof
-    anyhow = guarantee(task, sampled_loop)
-    return (
-        anyhow if anyhow.available or anyhow.only_pressure_fails else proof
-    )  # a pressure violation is easier to remedy than a small gain above 1, so it is the reason reported
+    arbitrary = guarantee(task, sampled_loop)
+    # a pressure violation is easier to remedy than a small gain above 1, so it is the reason reported
+    return arbitrary if arbitrary.available or arbitrary.only_pressure_fails else proof
 
 
 @overload
@@ -261,8 +260,8 @@ def _with_noise(without: TrackingProof, noise: Mapping[str, Fraction]) -> Tracki
     proof = best_guarantee(without.task, sampled_loop)
     if proof.available:
         return proof
-    anyhow = guarantee(without.task, sampled_loop)  # with an arbitrary input gain, which noise does not affect
-    why = anyhow.reason if not anyhow.available and anyhow.small_gain is None else "nothing is proved"
+    arbitrary = guarantee(without.task, sampled_loop)  # arbitrary input gain: its small gain does not depend on noise
+    why = arbitrary.reason if not arbitrary.available and arbitrary.small_gain is None else "no bounds are proved"
     units = {"slip_noise": "m", "rate_noise": "m/s"}
     noises = " and ".join(f"{name.replace('_', ' ')} of {UpperBound(v):.3g} {units[name]}" for name, v in noise.items())
     return replace(proof, reason=f"with {noises}: {why}; without noise a law is proved")
@@ -310,7 +309,7 @@ class _Laws:
         """Smallest distance from a guarantee near a start, with the parameters of the law."""
 
         def cost(x: np.ndarray) -> float:
-            return self.quiet(x, _FAILED * min(self.close(x)[0], 9.0)) / _FAILED
+            return self.penalised(x, _FAILED * min(self.close(x)[0], 9.0)) / _FAILED
 
         return search_near(
             ("closest", *self.problem), cost, start, enough=_SURE, evaluations=evaluations, far=1 + _FAR, wide=True
@@ -322,7 +321,7 @@ class _Laws:
         def cost(x: np.ndarray) -> float:
             distance, bounds = self.close(x)
             peak = _FAILED * min(distance, 9.0) if bounds is None else _decibels(bounds, self.family.period)
-            return self.quiet(x, peak)
+            return self.penalised(x, peak)
 
         return search_near(("near peak", *self.problem), cost, start, evaluations=_FEW, wide=True)[1]
 
@@ -350,7 +349,7 @@ class _Laws:
         settings = self._effort | settings
 
         def cost(x: np.ndarray) -> float:
-            return self.quiet(x, _peak_cost(self.seen(x), self.family.period))
+            return self.penalised(x, _peak_cost(self.seen(x), self.family.period))
 
         return search_near(("peak", *self.problem), cost, start, far=far, **settings)
 
@@ -362,7 +361,7 @@ class _Laws:
             if seen is None or not seen.bounds.available:
                 return 10 * _FAILED
             most = seen.bounds.push if seen.bounds.valve_push is None else seen.bounds.valve_push
-            return self.quiet(x, 10 * log10(float(most)))
+            return self.penalised(x, 10 * log10(float(most)))
 
         return search_near(("pressure", *self.problem), cost, start, **self._effort)
 
@@ -370,7 +369,7 @@ class _Laws:
         """Smallest drift cost near a start, for a bounded slip-rate error [m/s]."""
 
         def cost(x: np.ndarray) -> float:
-            return self.quiet(x, _drift_cost(self.seen(x), limit))
+            return self.penalised(x, _drift_cost(self.seen(x), limit))
 
         return search_near(("drift", limit, *self.problem), cost, start, **self._effort)
 
@@ -384,7 +383,7 @@ class _Laws:
         """Number of evaluations (0.05 s each) with aperiodic sampling; empty, for the default, otherwise."""
         return {"evaluations": _FEWER} if self.template.longest_step else {}
 
-    def quiet(self, x: np.ndarray, cost: float) -> float:
+    def penalised(self, x: np.ndarray, cost: float) -> float:
         """Cost of a law, with a penalty if the law settles too slowly while the fault is at rest."""
         if cost >= 10 * _FAILED:
             return cost
@@ -689,7 +688,7 @@ def _narrowed(task: FaultPlant, share: Fraction) -> tuple[Fraction, Fraction, Fr
 def _less_pressed(
     laws: LawSearch, task: FaultPlant, step: Fraction, setup: ExactSetup
 ) -> tuple[str, TrackingProof] | None:
-    """Smallest pump, or largest disturbance, for which a low-pressure law is proved."""
+    """Narrowest pump limits, or largest disturbance, for which a low-pressure law is proved."""
     pump, sampled_loop = setup.pump, laws.low_pressure_loop(task, step, setup=setup)
     if sampled_loop is None:
         return None

@@ -253,7 +253,7 @@ def family_of(task: FaultPlant, step: Fraction, measured: str, setup: ExactSetup
 class _Kalman:
     """Kalman filters for slip error, slip-rate error and disturbance acceleration, from the slip."""
 
-    follows: np.ndarray
+    transition: np.ndarray
     units: np.ndarray
     step: float
 
@@ -270,9 +270,9 @@ class _Kalman:
 
     def corrections(self, acceleration: float, level: float) -> tuple[Fraction, Fraction, Fraction]:
         """Kalman gain for the slip, by the Riccati equation of the filter."""
-        pushed = self.follows[:, 2] * [1, 1, 0]
+        pushed = self.transition[:, 2] * [1, 1, 0]
         process = 10**acceleration * np.outer(pushed, pushed) + np.diag([0, 0, 10**level]) + _FAINT * np.eye(3)
-        first, second, third = map(short, self.units @ _filter(self.follows, process))
+        first, second, third = map(short, self.units @ _filter(self.transition, process))
         return first, second, third
 
 
@@ -327,9 +327,9 @@ class DelayFeedback:
 # ----------------------------------------------------------------------
 # An e-LQR for slow sliding: LQ feedback of the sampled plant with its path, from a Kalman observer of the slip.
 #
-# The model is scaled: slip error in D, pressures and stresses in N, time in 1/ρ = D/V; the law contains the slow modes
-# of the diffusion path and one level that represents all disturbances. The gain of the level and its effect on the slip
-# are such that, for all parameters, zero errors under a constant pressure are a steady state of the law.
+# The model is scaled: slip error in D_c, pressures and stresses in σ′, time in 1/ρ = D_c/V; the law contains the slow
+# modes of the diffusion path and one level that represents all disturbances. The gain of the level and its effect on
+# the slip are such that, for all parameters, zero errors under a constant pressure are a steady state of the law.
 
 SLIDING_MODES = 4
 _DIGITS = 9
@@ -344,7 +344,7 @@ class Weights:
     Attributes
     ----------
     slip, state, pressure : float
-        LQ weights of x², z² and u²; that of y² is 1.
+        LQ weights of x² (slip error), z² (log state) and u² (pressure); that of y², y = ln(v/V), is 1.
     slip_noise, state_noise, level_noise : float
         Variances of the process noise of x, z and the level per sample; that of the measured x is 1.
     """
@@ -366,10 +366,8 @@ def sliding_law(
 ) -> LinearLaw:
     """LQG compensator of the slip error with zero-order hold over `step` [s].
 
-    It contains a diffusion path of L²/D = `diffusion` [s], unless that is 0.
-
-    The pressure is relative to the equilibrium pressure of the reference. States: predicted x, z, the modes of the path
-    and the level, all scaled.
+    It contains a model of a diffusion path of L²/D = `diffusion` [s], unless that is 0. The pressure is relative to the
+    equilibrium pressure of the reference. States: predicted x, z, the modes of the path and the level, all scaled.
 
     Raises
     ------
@@ -475,7 +473,7 @@ def growth_rate(model: SlidingModel) -> float:
 def sliding_poles(model: SlidingModel) -> tuple[complex, complex]:
     """Both eigenvalues [1/s] about steady sliding, without control.
 
-    With x in D they are those of ρ((−κ, −β), (κ, β − 1)), κ = KD/S, β = weakening/S, S = strength.
+    With x in D_c they are those of ρ((−κ, −β), (κ, β − 1)), κ = KD_c/S, β = weakening/S, S = strength.
     """
     speed, length = float(model.state_rate), model.rate / model.state_rate
     kappa, beta = (float(v / model.strength) for v in (model.stiffness * length, model.weakening))

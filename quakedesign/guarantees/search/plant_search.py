@@ -45,7 +45,7 @@ def plant_guarantee(plant: UncertainPlant, law: MatrixLaw, pieces: int | None = 
     Raises
     ------
     ParameterError
-        For a law that does not fit the plant.
+        For a law that does not fit the plant, or a plant without disturbances, loads, noise and initial states.
     """
     bounds = _first_bounds(plant)
     free = list(bounds)
@@ -177,7 +177,7 @@ def _unstable(part: LinearPart, loop: PlantLoop) -> str:
 
 
 def escaping(plant: UncertainPlant, law: MatrixLaw) -> tuple[float, np.ndarray]:
-    """Growth per sample and shape of the fastest mode, with every sector at its upper slope."""
+    """Growth per sample and shape of the fastest-growing mode, with every sector at its upper slope."""
     part = linear_part(plant, _first_bounds(plant))
     steep = tuple(replace(s, slopes=(s.slopes[1], s.slopes[1])) for s in part.sectors)
     radius, mode = spectral_radius(replace(part, sectors=steep).loop(law))

@@ -26,7 +26,7 @@ from quakedesign.guarantees.search.plant_search import linear_part, plant_guaran
 from quakedesign.plant.block_plant import measured_by
 
 _STARTS = ((100.0, 100.0, 1e-2, 1e-9), (10.0, 100.0, 1e-4, 1e-9), (1000.0, 100.0, 1e-4, 1e-6), (100.0, 1.0, 1e-4, 1e-6))
-"""Weight of the pressure, of the slip error, and variances of the pressure error and of the measured slip, scaled."""
+"""Weights of pressure and slip error, variances of pressure error and slip measurement; all for scaled variables."""
 _SPREAD = 2.0  # size of the first simplex, in logarithms
 _EVALUATIONS = 60
 _SLOWEST, _FORGET = 0.985, 1000  # largest eigenvalue of a period, and periods: slower loops take long to prove
@@ -34,7 +34,7 @@ _SMALL = 0.004  # least logarithm of the state at the start of the search
 _TURNS = 14
 _PIECES = 8  # pieces of a period, which is short compared with the times of the plant
 _MARGIN = 1.03
-_LOST = 100.0
+_LOST = 100.0  # small gain reported without a law
 _DIGITS = 10
 _HALVINGS = 20  # bisections of a range of stresses
 
@@ -81,8 +81,8 @@ def covered_stress(chain: BlockChain, claim: PlantProof) -> tuple[Fraction, Frac
     """Lag [s], largest shear stress [Pa] and bound of |ln(v/V)| of a guarantee for blocks.
 
     The last result is the guarantee with the names of these blocks. The claims Z (log state) and W (shear stress by
-    springs and wells) follow from the sectors of its plant, and Q (pressure minus the plan) from the bounds of its
-    pressures; for a smaller Q its sectors and disturbances still cover the blocks.
+    springs and wells) follow from the sectors of its plant, and Q (pressure minus planned pressure) from the bounds of
+    its pressures; for a smaller Q its sectors and disturbances still cover the blocks.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def _grown(claims: BlockClaims, by: float) -> BlockClaims:
 class _WeightSearch:
     """Laws given by four weights, with their estimated bounds."""
 
-    def __init__(self, blocks: SlidingBlocks, step: Fraction, alone: bool) -> None:
+    def __init__(self, blocks: SlidingBlocks, step: Fraction, decentralised: bool) -> None:
         self.blocks, self.step = blocks, step
         task, shares = blocks.tasks[0], np.array(blocks.chain.shares, dtype=float)
         N, m = shares.shape
@@ -167,7 +167,7 @@ class _WeightSearch:
         spread = shares @ np.linalg.inv(weights @ shares) if m < N else np.eye(N)
         self.mean = np.block([[np.kron(np.eye(2), weights), np.zeros((2 * m, m))], [np.zeros((m, 2 * N)), np.eye(m)]])
         self.back = np.block([[np.kron(np.eye(2), spread), np.zeros((2 * N, m))], [np.zeros((m, 2 * m)), np.eye(m)]])
-        self.count, self.own = m, np.eye(m) if alone else np.ones((m, m))
+        self.count, self.own = m, np.eye(m) if decentralised else np.ones((m, m))
         stress = float(blocks.stress)
         b = float(task.ranges["evolution_effect"][0]) * float(task.ranges["normal_stress"][0])
         self.small = BlockClaims(

@@ -48,7 +48,7 @@ _STARTS = (
 """Logarithms of the weights and of a, b and D_c of the model over the fault's, for ρL²/D = 1, ρT_s = 0.06."""
 _SIMPLEX = (0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.05, 0.05, 0.05)
 _EVALUATIONS = 120
-_HOPELESS = 60  # number of laws without bounds after which a search ends
+_MOST_UNBOUNDED = 60  # number of laws without bounds after which a search ends
 _POOR, _PATIENCE = 2.0, 40  # a search ends if the best cost of the first 40 laws exceeds 2
 _FORGETTING = 0.972  # largest eigenvalue of a period, to limit the periods of the proof
 # initial claims divided by Y; pressures in units of 2aσ'
@@ -146,10 +146,7 @@ def designed_sliding(
     near: np.ndarray | None = None,
     setup: ExactSetup = PLAIN,
 ) -> SampledLoop | NoProof:
-    """Law with the least estimated bounds at the least stable corner of the box.
-
-    `near` gives the parameters of a law as a further start.
-    """
+    """Law with the least estimated bounds at the least stable corner; `near`: parameters of a further start."""
     chosen, _ = searched_sliding(task, step, log_rate, setup, near=near)
     if chosen is not None:
         return chosen
@@ -221,7 +218,7 @@ def searched_sliding(
 
     def ends(intermediate_result: OptimizeResult) -> None:
         cost = intermediate_result.fun
-        patience = _HOPELESS if cost >= _FAILED / 2 else _PATIENCE
+        patience = _MOST_UNBOUNDED if cost >= _FAILED / 2 else _PATIENCE
         if (cost >= _POOR and len(costs) > patience) or cost <= enough:
             raise StopIteration
 
@@ -288,7 +285,7 @@ def _as_claims(values: Mapping[str, Any]) -> SlidingClaims:
 
 
 def _claims(task: SlidingPlant, sampled_loop: SampledLoop, log_rate: Fraction) -> SlidingClaims | None:
-    """Self-consistent claims by the estimate, with the given bound of y; None without any."""
+    """Self-consistent claims by the estimate, with the given bound of |ln(v/V)|; None without any."""
     claims = _guess(task, log_rate)
     for _ in range(_TURNS):
         estimate = _estimate(task, sampled_loop, claims)
@@ -329,14 +326,9 @@ def _estimate_of(
 def _cut(
     task: SlidingPlant, sampled_loop: SampledLoop, claims: SlidingClaims, left: list[int], *, exactly: bool = False
 ) -> Cuts:
-    """Cuts of a box until the claims follow on every cell; `left` limits their number.
+    """Cuts of a box such that the claims follow on every cell; `left` limits their number.
 
-    Decided by the estimate, or exactly with `exactly`.
-
-    Raises
-    ------
-    ParameterError
-        When the limit is exceeded.
+    The claims are checked by the estimate, or exactly with `exactly`. Raises `ParameterError` beyond the limit.
     """
     wide = [axis for axis in _AXES if task.ranges[axis][0] < task.ranges[axis][1]]
     if _excess(task, sampled_loop, claims) < (_NEAR if wide else 1):
@@ -431,7 +423,7 @@ def farthest(
     step : Fraction
         T_s [s].
     setup : ExactSetup
-        As of `designed_sliding`; with a lag or a diffusion path.
+        As in `designed_sliding`; with a lag or a diffusion path.
     stressed : bool
         Whether the stress of the task is given, so that larger bounds of |ln(v/V)| may be needed.
     most : Fraction
@@ -489,13 +481,14 @@ def possible_remedy(
     ----------
     fault : Fault
     task : SlidingPlant
-        Of the fault.
+        Plant of the fault.
     well : FarthestWell
     setup : ExactSetup
-        As of `designed_sliding`.
+        As in `designed_sliding`.
     prove : callable
+        See `Prove`.
     spread : Fraction
-        Of the task.
+        Relative uncertainty of a, b and D_c in the plant [-].
     """
     if well.sampled_loop is None or well.numbers is None:
         return "no guarantee was found even with a much shorter path: a smaller spread, stress or noise may help"

@@ -51,8 +51,8 @@ DEADBEAT = tuple(
     (*shares, 1.0, gain) for *shares, gain in ((0.3, 0.5, 1.4), (0.4, 0.6, 1.4), (0.5, 0.7, 1.4), (0.3, 0.5, 1.3))
 )
 """The same for a deadbeat implicit step, which corrects all of the slip error; for both objectives."""
-_UNCLOCKED = (0.3, 0.3, 0.2, 1.2), (0.3, 0.4, 0.2, 1.2), (0.5, 0.5, 0.3, 1.3), (0.2, 0.2, 0.1, 1.6)
-APERIODIC = {"tracking": _UNCLOCKED, "peak": ((0.3, 0.3, 0.1, 1.425), *_UNCLOCKED)}
+_APERIODIC = (0.3, 0.3, 0.2, 1.2), (0.3, 0.4, 0.2, 1.2), (0.5, 0.5, 0.3, 1.3), (0.2, 0.2, 0.1, 1.6)
+APERIODIC = {"tracking": _APERIODIC, "peak": ((0.3, 0.3, 0.1, 1.425), *_APERIODIC)}
 """The same for aperiodic sampling; the gain is larger still by the ratio of the longest interval to T_s."""
 _VERTICES, _SETTLED = 250, 1e-4  # largest number of reached states; relative change of their extents at the end
 _ROUNDS, _SUBSTEPS = 60, 12  # periods of the reached states; Euler steps of a period, for proposals only
@@ -61,11 +61,8 @@ _TRIED_EACH = 3  # turns after which all multipliers are tried again
 _PERIODS, _TURNS, _REFINED = 4, 80, (8, 15, 22, 29)  # periods per policy; turns; turns that add facets
 _TINY = 1e-12  # rounding, relative to a height
 _LITTLE = 1.01  # largest growth of a height in a step to the fixed point of a policy
-_NEARLY = (
-    # the coefficient of y in a normal is raised to the neutral one (facet unchanged in slow sliding) above this share
-    # of it
-    0.93
-)
+# the coefficient of y in a normal is set to the neutral value (facet unchanged in slow sliding) above this share of it
+_NEARLY = 0.93
 _ADDED, _MOST = 35, 270  # facets added at once, and in all: a check takes 1.3 s for each hundred
 # cosine above which two normals count as equal; relative margin of a facet that is unchanged at rest
 _ALIKE, _WIDER = 1 - 1e-8, 1e-5
@@ -105,7 +102,7 @@ def tuned(
     *,
     implicit: bool = False,
 ) -> SampledStickSlip:
-    """Feedback that is deadbeat in the slip rate, at the midpoint of the damping, with the shares of a tuning.
+    """Feedback that is deadbeat in the slip rate, at the midpoint of the damping, with the gains of a tuning.
 
     Parameters
     ----------
@@ -203,7 +200,7 @@ class _Start:
 
 @dataclass(frozen=True)
 class _ReachableStates:
-    """The two maps of the theorem, and the plant itself, on many states at once."""
+    """Rest map and sliding map of the theorem, and simulation of the plant, for many states at once."""
 
     task: FaultPlant
     sampled_loop: SampledStickSlip

@@ -39,9 +39,9 @@ _COURSES, _LEAST_COURSES = 24, 8  # trajectories for each of the two outputs; le
 _CLIMBING, _CLIMBS = 48, 8  # trajectories improved from the best of those, and number of improvements
 _CHANGED = 0.15, 0.4, 1.0  # probabilities of replacing the inputs of a piece by those of the adjoint, used in turn
 _BLOCK = 8  # pieces that change together, at most
-_RESTING, _ROUNDS = 96, 9  # pairs of trajectories of 128 periods that push, rest and push again; rounds
+_RESTING, _ROUNDS = 96, 9  # pairs of trajectories of 128 periods: accelerate, rest, accelerate; rounds
 _LATEST_START, _LONGEST_DURATION = 20, 7  # latest start and longest duration of the first acceleration, in periods
-_NEAR = np.array([[2], [2], [_PIECES]])  # changes per round, in pieces: start and length of the first push, end of rest
+_NEAR = np.array([[2], [2], [_PIECES]])  # changes per round, in pieces: start and length of acceleration, end of rest
 _MOST_RESTED = 128  # periods
 _SOON = 1, 2, 4, 8, 16  # periods after which errors are also evaluated for a loop with initial errors
 _SLOW = 0.05  # rate of a slow reference as a fraction of its largest rate
@@ -94,7 +94,7 @@ def worst_tracking(claim: TrackingProof | ContinuousProof, *, sticks: bool = Fal
     In the class `rate` the disturbance is the optimal one for a costate (`_steepest`). With `sticks` friction prevents
     backward slip, and the reference has its largest rate or 1/20 of it. Further trajectories switch the inputs at
     random times, or slip ahead of the reference by up to the proved slip error, rest until it catches up, then
-    accelerate (`rest_and_push`). Noise and initial states are at their extremes. An implicit step has its exact
+    accelerate (`push_after_rest`). Noise and initial states are at their extremes. An implicit step has its exact
     solution, also outside its sector. With jitter each event is earliest or latest; with aperiodic sampling each
     interval is shortest or longest. Pressures change without a ramp, and an averaged measurement is replaced by the
     value at the midpoint of its interval.
@@ -198,7 +198,7 @@ def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, later: Fraction 
     """Events of one period from the earliest sample on, shifted by timing errors.
 
     Samples shift by up to `off` [s], pressures lead by `early` [s]; aperiodic sampling lengthens a period by up to
-    `more` [s].
+    `later` [s].
     """
     sample, *others = loop.segments
     waits = sample.duration - early - off if others else sample.duration - 2 * off
@@ -215,7 +215,7 @@ def _events(loop: PeriodicLoop, off: Fraction, early: Fraction, later: Fraction 
 class _Limit:
     """Limit at rest of the commanded pressure, as b·(p − p*) [m/s²]; b·p* is `rest`.
 
-    A trajectory may start anywhere in the task: p* begins at its initial value or at either end of its range.
+    A trajectory may start at any point of the reference: p* begins at its initial value or at an end of its range.
 
     `place` is the index of the commanded pressure in the state, `correction` the response of the state to a unit
     command. If the slip error [m] grows by at most `rests` between samples, the pressure is at most `width` below its
@@ -427,7 +427,7 @@ class _CourseSearch:
                 parents = (2 * np.take_along_axis(ranked, chosen, axis=0) + [0, 1]).ravel()
                 tried = best[:, parents] + random.integers(-_NEAR, _NEAR + 1, best.shape)
             else:
-                best[2] = _let_go(np.array([mask[:, 1] for mask in fixed]))
+                best[2] = _end_of_rest(np.array([mask[:, 1] for mask in fixed]))
                 tried = best + random.integers(-_NEAR, _NEAR + 1, best.shape) * [[0], [0], [1]]
 
     def _slopes(self, costates: np.ndarray, chosen: list[np.ndarray], limit: float) -> np.ndarray:
@@ -529,7 +529,7 @@ class _CourseSearch:
         )
 
     def _projected(self, before: np.ndarray, state: np.ndarray, length: float) -> np.ndarray:
-        """Project every state onto admissible slip rates and disturbances; mask of the entries that this changes."""
+        """Project states in place onto admissible slip rates and disturbances; return the mask of changed entries."""
         mask = np.zeros(state.shape, dtype=bool)
         if self.back is not None:
             mask[:, 1] = stuck = state[:, 1] < -self.back
@@ -563,7 +563,7 @@ class _CourseSearch:
         return np.array(costates[::-1])
 
 
-def _let_go(stuck: np.ndarray) -> np.ndarray:
+def _end_of_rest(stuck: np.ndarray) -> np.ndarray:
     """Piece in which the longest rest of every trajectory ends, or the last piece."""
     rested, longest = np.zeros(stuck.shape[1]), np.zeros(stuck.shape[1])
     last = np.full(stuck.shape[1], len(stuck) - 1)

@@ -341,7 +341,7 @@ def test_a_file_that_breaks_a_rule_is_refused_by_both(way, value, checker):
 
 def test_none_says_why():
     plant, K = bearing()
-    assert "a mode escapes" in qd.guarantee(plant, gains=0 * K, step="0.001").reason
+    assert "a mode is unstable" in qd.guarantee(plant, gains=0 * K, step="0.001").reason
     wide = qd.UncertainPlant(
         A=[[0, 1], [-1, -1]],
         B=[[0], [1]],
@@ -371,15 +371,15 @@ STARTED = replace(STARTED, law=replace(STARTED.law, first=((Fraction(1), Fractio
     [
         (lambda: qd.guarantee(bearing()[0]), "needs a law, or gains"),
         (lambda: qd.guarantee(bearing()[0], gains=[[1, 1]]), "need a step"),
-        (lambda: qd.guarantee(bearing()[0], gains=[[1, 1]], step="1", jitter="1 ms"), "has step, delay and lag"),
+        (lambda: qd.guarantee(bearing()[0], gains=[[1, 1]], step="1", jitter="1 ms"), "takes step, delay and lag"),
         (lambda: qd.guarantee(bearing()[0], gains=[[1]], step="1"), "must be 1 x 2"),
         (lambda: qd.guarantee(bearing()[0], law=control.ss(1, [[1, 1]], 1, [[0, 0]])), "dt of a law must be positive"),
         (lambda: qd.guarantee(bearing()[0], law=USER_LAW, step="0.2"), "here 0.2 s. Received dt = 0.1"),
         (lambda: qd.guarantee(bearing()[0], law=FOLLOWING), "Received one with r or r' as an input"),
-        (lambda: qd.guarantee(bearing()[0], law=STARTED), "Received one with other first states"),
+        (lambda: qd.guarantee(bearing()[0], law=STARTED), "Received one with nonzero initial states"),
         (lambda: qd.guarantee(bearing()[0], "cta", gains=[[1, 1]], step="1"), "do not apply to an uncertain plant"),
         (lambda: qd.UncertainPlant(A=[[1, 2]], B=[[1]]), "matrix A of a plant must be 1 x 1"),
-        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"v": (1, 2)}), "gains of a plant must be of u1"),
+        (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"v": (1, 2)}), "gains of a plant must be given for u1"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], gains={"u1": (2, 1)}), r"\(least, largest\)"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], noise={"y1": -1}), "noise and start must be 0 or more"),
         (lambda: qd.UncertainPlant(A=[[1]], B=[[1]], disturbances={"d": ([1], -1)}), "must be 0 or more"),
@@ -601,12 +601,12 @@ def test_a_mode_that_escapes_wells_at_a_distance_is_named_by_the_slips_of_its_bl
     none = qd.guarantee(far).proof
     # alike blocks, pole p of x'' + wx' = sx: e^(pT)
     assert none.reason.startswith(
-        "a mode escapes: with every uncertain term at its steepest the states (1, 1) grow by a factor of "
+        "a mode is unstable: with every uncertain term at its upper slope the states (1, 1) grow by a factor of "
     )
     task = uncertain_plant(far.faults[0])
     s, w = float(task.slip_chord[1]), float(task.rate_chord[0])
     grown = np.exp((np.sqrt(w**2 + 4 * s) - w) / 2 * 0.184)
-    assert none.reason.endswith(f"grow by a factor of {grown:.4g} a sample")
+    assert none.reason.endswith(f"grow by a factor of {grown:.4g} per sample")
 
 
 @pytest.mark.slow
@@ -630,7 +630,7 @@ def test_a_law_that_is_not_designed_is_not_decentralised(given):
 def test_blocks_that_one_well_does_not_hold_name_the_mode_that_escapes():
     plant = qd.UncertainPlant.from_blocks(REAL, 2, wells="one", coupling=0.5)
     none = qd.guarantee(plant, step="0.184").proof
-    assert "a mode escapes, which is not measured" in none.reason
+    assert "a mode that is not measured is unstable" in none.reason
     assert "(1, -1)" in none.reason or "(-1, 1)" in none.reason
 
 
@@ -689,7 +689,7 @@ def test_peaks_are_near_the_exact_ones_of_the_worst_constant_plant(name):
 @pytest.mark.slow
 def test_springs_of_three_let_a_mode_of_five_blocks_escape_one_well():
     none = qd.guarantee(qd.UncertainPlant.from_blocks(REAL, 5, wells="one", coupling=3), step="0.184").proof
-    assert "a mode escapes, which is not measured" in none.reason
+    assert "a mode that is not measured is unstable" in none.reason
     slow = -np.cos(np.pi * (np.arange(5) + 0.5) / 5)  # the slowest mode of a chain that differs
     shape = [float(v) for v in re.search(r"states \((.*?)\)", none.reason)[1].split(",")]
     assert np.abs(shape / np.max(np.abs(shape))) == pytest.approx(np.abs(slow / slow[-1]), abs=0.01)

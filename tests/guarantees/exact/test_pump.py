@@ -81,4 +81,4 @@ def test_a_pump_is_blamed_for_what_it_does_not_do_within_a_whole_period(rate, sl
     assert isinstance(found, NoProof) is slow
     if slow:
         step, said = known.sampled_loop.step, found.reason
-        assert said.endswith(f"which a pump of 200 kPa/s does not make in {LowerBound(step).quantity('s')}")
+        assert said.endswith(f"which a pump of 200 kPa/s cannot complete in {LowerBound(step).quantity('s')}")

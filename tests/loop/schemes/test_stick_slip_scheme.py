@@ -60,12 +60,12 @@ def test_exported_c_computes_the_pressures_of_the_recursion(claim, size):
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"weight": 0.0}, "weight must be above 0 and at most 1, got 0.0"),
-        ({"weight": 1.1}, "weight must be above 0 and at most 1, got 1.1"),
-        ({"slip_weight": -0.1}, "slip_weight must be from 0 to 1, got -0.1"),
-        ({"slip_weight": 1.1}, "slip_weight must be from 0 to 1, got 1.1"),
-        ({"rest_slip": -1e-6}, "rest_slip must be finite and 0 or more, got -1e-06 m"),
-        ({"rest_slip": float("inf")}, "rest_slip must be finite and 0 or more, got inf m"),
+        ({"weight": 0.0}, "weight must be above 0 and at most 1. Received 0.0"),
+        ({"weight": 1.1}, "weight must be above 0 and at most 1. Received 1.1"),
+        ({"slip_weight": -0.1}, "slip_weight must be from 0 to 1. Received -0.1"),
+        ({"slip_weight": 1.1}, "slip_weight must be from 0 to 1. Received 1.1"),
+        ({"rest_slip": -1e-6}, "rest_slip must be finite and 0 or more. Received -1e-06 m"),
+        ({"rest_slip": float("inf")}, "rest_slip must be finite and 0 or more. Received inf m"),
     ],
 )
 def test_settings_out_of_their_range_are_rejected(settings, said):
