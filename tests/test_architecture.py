@@ -465,7 +465,7 @@ BUDGETS = {
     "symbolic": 3188,
     "sos": 6388,
     "laws": 3132,
-    "loop": 4191,
+    "loop": 4186,
     "plant": 1477,
     "guarantees": 13573,
     "lyapunov": 7064,

@@ -1,4 +1,4 @@
-"""Control laws, one per file, discovered in this folder; and the gains of the paper."""
+"""Control laws, one per file, discovered in this package; and the gains of the paper."""
 
 from quakedesign.arguments import attach
 

@@ -117,7 +117,7 @@ class Law(ABC):
     Raises
     ------
     ParameterError
-        For a missing, unknown or non-finite gain.
+        For gains that are not a mapping, or a missing, unknown or non-finite gain.
     """
 
     name: ClassVar[str]
@@ -161,7 +161,7 @@ class Law(ABC):
     @classmethod
     @abstractmethod
     def loop_field(cls) -> LoopField:
-        """Return the closed loop in symbols, derived from the law, as certificates need it."""
+        """Return the closed loop in symbols, derived from the law, as the subject of certificates."""
 
     @classmethod
     def from_values(cls, values: "tuple[str | float | Fraction, ...]", **more: Any) -> Self:
@@ -170,7 +170,7 @@ class Law(ABC):
         Raises
         ------
         ParameterError
-            When their number is wrong.
+            For a wrong number of gains.
         """
         if len(values) != len(cls.gain_units):
             raise ParameterError(

@@ -1,4 +1,4 @@
-"""Control laws by name, discovered in this folder, and the published gains."""
+"""Control laws by name, discovered in this package, and the published gains."""
 
 import tomllib
 from dataclasses import replace
@@ -60,7 +60,7 @@ def published(fault_name: str) -> dict[str, Controller]:
     Parameters
     ----------
     fault_name : str
-        ``"real-fault"`` or ``"lab-fault"``; there are none for any other fault.
+        ``"real-fault"`` or ``"lab-fault"``; the result is empty for any other fault.
 
     Returns
     -------

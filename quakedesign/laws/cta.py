@@ -43,7 +43,7 @@ class ContinuousTwisting(SlidingMode):
 
     @property
     def lipschitz_limit(self) -> Fraction:
-        """λ(k3 − |k4|) [m/s³]: a constant |h'| of this value has a Filippov equilibrium with e1 ≠ 0."""
+        """λ(k3 − |k4|) [m/s³]: with a constant |h'| of this value the loop has a Filippov equilibrium with e1 ≠ 0."""
         return self.scale * (self.gains["k3"] - abs(self.gains["k4"]))
 
     @classmethod

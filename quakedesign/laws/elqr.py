@@ -19,10 +19,10 @@ FEEDBACKS = ("error", "state")
 class PressureLimits:
     """Pressure limits (ERRATA 23) and the recovery time of the integrals at a limit."""
 
-    # lowest, highest: [Pa]; highest below the effective normal stress, so that the fault does not open
+    # [Pa], lowest < 0 < highest; choose highest below the effective normal stress, so that the fault does not open
     lowest: Fraction
     highest: Fraction
-    recovery_time: Fraction = Fraction(1)  # Time constant [s] of both integrals while p is at a limit
+    recovery_time: Fraction = Fraction(1)  # Time constant [s] of both integrals while p is at a limit, positive
 
     def __post_init__(self) -> None:
         if not self.lowest < 0 < self.highest or self.recovery_time <= 0:
@@ -46,7 +46,7 @@ class ExtendedLQR(Controller):
     # ``"state"``: k1 and k2 act on x1 and x2, as printed in eq. u. ``"error"``: they act on x1 − r and x2 − r', which
     # limits p and the error of tracking a ramp (ERRATA 29). The loop about a constant reference is the same.
     feedback: str = "error"
-    # p is kept within these limits; the excess of p beyond a limit drives the integrals back (back-calculation, Åström
+    # p is saturated at these limits, which need k4 ≠ 0; the excess drives the integrals back (back-calculation, Åström
     # and Rundqwist 1989, Proc. Amer. Control Conf., 1693). The loop field is the one without limits.
     limits: PressureLimits | None = None
     offset: Fraction = Fraction(0)  # p for Kx_a = 0 [Pa]: an initial pressure, since ξ = 0 initially
@@ -75,10 +75,10 @@ class ExtendedLQR(Controller):
         return tuple(rate + back * excess for rate, back in zip(rates, self._back_calculation_gains(), strict=True))
 
     def _unlimited_pressure(self, signals: Signals) -> sp.Expr:
-        ends = {"error": (signals.slip_error, signals.slip_rate_error), "state": (signals.slip, signals.slip_rate)}[
+        measured = {"error": (signals.slip_error, signals.slip_rate_error), "state": (signals.slip, signals.slip_rate)}[
             self.feedback
         ]
-        commanded = -sum(k * x for k, x in zip(self._exact_gains(), (*ends, *signals.integrals), strict=True))
+        commanded = -sum(k * x for k, x in zip(self._exact_gains(), (*measured, *signals.integrals), strict=True))
         return commanded + to_sympy(self.offset) if self.offset else commanded
 
     def _back_calculation_gains(self) -> tuple[sp.Expr, sp.Expr]:

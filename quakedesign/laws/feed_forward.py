@@ -60,7 +60,7 @@ def _centred(fault: Fault, divisor: Fraction) -> FeedForward:
     """Coefficients that minimise the largest residuals of ∂h/∂x1, ∂h/∂x2 and of r'' over the uncertainty box.
 
     They differ from the nominal ones since h = (…)/β with an uncertain β, and since slip weakening reduces the
-    stiffness; k̂0 is negative if the weakening term exceeds twice that of the nominal spring.
+    stiffness; k̂0 is negative if the weakening term exceeds twice that of the spring.
     """
     friction, middle, box = friction_bounds(fault.friction), plant.plant_values(fault), fault.box
     least, most = friction.least, friction.most

@@ -57,11 +57,11 @@ class ImplicitStep:
     Attributes
     ----------
     pull : tuple of Power
-        Terms of the sum q [m/s].
+        Terms of the sum q [m/s], 1 to 16 including nested terms.
     slopes : (Fraction, Fraction)
         γ0 ≤ γ1 in [0, 1]: |T_s·w + γ·e1| ≤ T_s·ε for some γ between them.
     remainder : Fraction
-        ε [m/s].
+        ε [m/s], 0 or more.
     """
 
     pull: tuple[Power, ...]

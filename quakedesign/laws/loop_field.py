@@ -231,7 +231,7 @@ class LoopField:
 
 
 def lowest_degree(weights: Iterable[int], domain: str) -> int:
-    """Degree of the product of the two heaviest states, the least for a V that couples them; 2 on the reals."""
+    """Degree of the product of the two heaviest states, the least of a V that couples them; 2 on `reals`."""
     *_, first, second = (1, *sorted(weights))
     return first + second if domain == "cells" else 2
 

@@ -130,7 +130,7 @@ def warning_at_rest(law: LinearLaw, step: Fraction, *, limited: bool = False) ->
 
 @checked_dataclass(frozen=True, kw_only=True)
 class SampledController(Controller):
-    """p = Cz + Dy with z ← Fz + Gy; the scheme ``explicit`` makes this update as its step ξ ← ξ + T_s·ξ′, where ξ = z.
+    """p = Cz + Dy with z ← Fz + Gy; the scheme ``explicit`` performs this update as ξ ← ξ + T_s·ξ′, ξ = z.
 
     Attributes
     ----------
@@ -140,8 +140,8 @@ class SampledController(Controller):
     delay, lag, diffusion, longest : Fraction
         As in `Sampling` [s].
     rest_limit : RestLimit, optional
-        Limit of its pressure; the law then receives the applied pressure, and the states of the limit are listed after
-        its own.
+        Limit of the pressure at rest; the law then receives the applied pressure, and the states of the limit follow
+        those of the law.
     gains : mapping of str to Fraction
         Derived from the law: p = −k1·e1 − k2·e2 − Σ gain·state, every state under its name.
     """

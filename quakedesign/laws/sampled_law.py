@@ -58,7 +58,7 @@ class LinearLaw:
     Raises
     ------
     ParameterError
-        When the dimensions do not match, or there are more than 12 states.
+        When the dimensions do not match, two states have the same name, or there are more than 12 states.
     """
 
     states: tuple[str, ...]
@@ -189,14 +189,14 @@ def _exact(rows: Sequence[Sequence[Fraction]]) -> fmpq_mat:
 
 
 def steady_states(own: Matrix, output: Row, rates: Row, pressure: Fraction) -> Row:
-    """Steady states z of a law with zero errors: Mz = v and Cz = p; free components are 0.
+    """Steady state z of a law with zero errors: Mz = v and Cz = p; free components are 0.
 
-    `own` is M = F − I, `output` is C, `rates` is v, and `pressure` is p [Pa].
+    `own` is M, F − I of a sampled law and F in continuous time; `output` is C, `rates` v, and `pressure` p [Pa].
 
     Raises
     ------
     ParameterError
-        When there are no steady states.
+        When there is no such z.
     """
     rows = [*([*row, rate] for row, rate in zip(own, rates, strict=True)), [*output, pressure]]
     reduced, rank = _exact(rows).rref()
@@ -240,7 +240,7 @@ def compensator(
     Raises
     ------
     ParameterError
-        When the dimensions do not match, or more than 12 states are left.
+        When the dimensions do not match, or more than 12 states remain.
     """
     n, seen = len(states), len(MEASURED)
     shapes = {"A": (update, n, n), "B": ((command,), 1, n), "C": (measured, seen, n), "L": (estimator, n, seen)}
@@ -268,7 +268,7 @@ class ErrorModel:
     """Sampled model of both errors and of the delayed pressures, under a constant disturbance d [m/s²].
 
     x⁺ = Ax + Bp + (As + B − s)d/b, x = (e1, e2, q), s = (0, 0, σ, …, σ). The constant pressure p = −d/b balances d: x =
-    sp is then a steady state. This is so for any A and B, so a law designed with rounded coefficients also has zero
+    s·p is then a steady state. This is so for any A and B, so a law designed with rounded coefficients also has zero
     steady-state errors.
 
     Attributes
@@ -409,13 +409,13 @@ def slip_observer(gains: Row, corrections: tuple[Fraction, Fraction, Fraction], 
 class RestLimit:
     """Limit at rest: lower limit of the pressure relative to all earlier pressures while the fault is at rest.
 
-    The pressure is at least any earlier one minus `width` minus `per_slip` times the motion of the reference since. Let
-    p* be the equilibrium pressure. A loop whose pressure stays within P of p*, with |dp*/dr| at most `per_slip`, never
-    reaches a limit with a width of 2P, so that the limit does not affect a guarantee. While friction holds the fault at
-    rest, measurements do not respond to the pressure, and while the slip is ahead of the reference an integral would
-    lower the pressure without bound. The limit then saturates the pressure, with anti-windup of the law. The saturation
-    ends when the fault moves, for any cause. The range of pressure that a proof covers is a limit too, at rest and in
-    motion, unless the fault moves faster than the proof covers.
+    The pressure is at least every earlier one minus `width` and `per_slip` times the motion of the reference since
+    then. Let p* be the equilibrium pressure. A loop whose pressure stays within P of p*, with |dp*/dr| at most
+    `per_slip`, never reaches a limit with a width of 2P, so that the limit does not affect a guarantee. While friction
+    holds the fault at rest, measurements do not respond to the pressure, and while the slip is ahead of the reference
+    an integral would lower the pressure without bound. The limit then saturates the pressure, with anti-windup of the
+    law. The saturation ends when the fault moves, for any cause. The range of pressure that a proof covers is a limit
+    too, at rest and in motion, unless the fault moves faster than the proof covers.
 
     Attributes
     ----------

@@ -99,7 +99,7 @@ class StickSlipController(Controller):
         return Sampling(step=self.step, longest=self.longest)
 
     def pressure(self, signals: Signals) -> sp.Expr:
-        """p of the law [Pa]."""
+        """Return p [Pa]."""
         return self._step(signals)[0]
 
     def integral_rates(self, signals: Signals) -> tuple[sp.Expr, ...]:

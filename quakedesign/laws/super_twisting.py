@@ -12,7 +12,7 @@ from quakedesign.symbolic import SignedPower
 
 @dataclass(frozen=True, kw_only=True)
 class SuperTwisting(IntegratorChain):
-    """ν = −k1⌈e1⌋^½ + ξ, ξ' = −k2⌈e1⌋⁰ for e1' = β(ν + h), such as a slip-rate error, on which a pressure acts.
+    """ν = −k1⌈e1⌋^½ + ξ, ξ' = −k2⌈e1⌋⁰ for e1' = β(ν + h), such as a slip-rate error driven by a pressure.
 
     For a constant β = 1 and |h'| ≤ L < k2 the stabilising gains are known exactly: Seeber and Horn (2018), Necessary
     and sufficient stability criterion for the super-twisting algorithm, 15th Workshop on Variable Structure Systems.

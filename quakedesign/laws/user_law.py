@@ -93,7 +93,7 @@ class SampledLaw(SampledController):
         Raises
         ------
         ParameterError
-            For a system in continuous time, other sizes, unknown signals, or numbers that are not finite.
+            For continuous time, wrong sizes, more than 12 states, absent or unknown signals, or non-finite numbers.
         """
         if hasattr(system, "num") and not hasattr(system, "A"):
             import control
@@ -135,7 +135,7 @@ class SampledLaw(SampledController):
             One to four gains [Pa/m, Pa·s/m, Pa/(m s), Pa/(m s²)]: P, PD, PID, double integral; (k1, 0, k3) is a PI. The
             K of ``control.dlqr`` for these states (u = −Kx) can be given unchanged.
         step : str, float or Fraction
-            T_s, [s] or with a unit.
+            T_s, [s] or with a unit, positive.
         inputs : (str, str)
             Signals of k1 and k2: slip_error or slip, slip_rate_error or slip_rate. Integrals are those of the error.
         """
@@ -178,7 +178,7 @@ class SampledLaw(SampledController):
         kp, ki, kd : str, float or Fraction
             [Pa/m], [Pa/(m s)], [Pa·s/m].
         N : str, float or Fraction
-            Bandwidth [1/s] of the filtered derivative D = s·N/(s + N)·e, by backward differences.
+            Bandwidth [1/s], positive, of the filtered derivative D = s·N/(s + N)·e, by backward differences.
         step : str, float or Fraction
             T_s, [s] or with a unit.
         """
@@ -270,7 +270,7 @@ class SampledLaw(SampledController):
         Raises
         ------
         ScenarioError
-            When the file cannot be read, or has other keys.
+            When the file cannot be read, or lacks a key or has others.
         ParameterError
             For a law that cannot be built.
         """
@@ -331,10 +331,10 @@ def _require_shapes(shapes: Mapping[str, tuple[Matrix, int, int]]) -> None:
 
 
 # ----------------------------------------------------------------------
-# An integrator perturbed by rounding. A guarantee needs z with Az = z and Cz = 1, exactly: at rest the law then
-# commands any constant pressure without an error. If no such z exists, but A has a pole within 1e-6 of 1, let v and q
-# be its right and left eigenvectors with Cv = 1 and qv = 1. Then A′ = A − (Av − v)q has A′v = v exactly, and differs
-# from A by rounding alone.
+# An integrator perturbed by rounding. A guarantee needs z with Az = z and Cz = 1, exactly: the law can then command any
+# constant pressure with zero errors. If no such z exists, but A has a pole within 1e-6 of 1, let v and q be its right
+# and left eigenvectors with Cv = 1 and qv = 1. Then A′ = A − (Av − v)q has A′v = v exactly, and differs from A by
+# rounding alone.
 
 _NEAR = 1e-6
 _DEPENDENT = 1e-6
@@ -375,7 +375,7 @@ def integrating(A: Matrix, C: Row) -> tuple[Matrix, tuple[str, ...]]:
     moved = max(abs(d * s) for d in off for s in share)
     pole = f"{poles[place].real:.12g}"
     return changed, (
-        f"the pole at {pole} is taken for an integrator moved by rounding, and is set to exactly 1: entries of A "
+        f"the pole at {pole} is taken for an integrator perturbed by rounding, and is set to exactly 1: entries of A "
         f"change by at most {float(moved):.1g}",
     )
 

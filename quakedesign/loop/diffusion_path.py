@@ -17,10 +17,10 @@ from quakedesign.loop.periodic import Fading, PeriodicLoop
 #
 # **Statement.** Let ∂p/∂t = D∂²p/∂x² in a layer of length L, without pressure at first, with the pressure u at the well
 # and without outflow at the fault, and τ = L²/D. With λ_n = ((2n + 1)π/2)²/τ and c_n = (4/π)(−1)ⁿ/(2n + 1) the pressure
-# in the fault t after a unit step of u is 1 − Σ c_n·e^{−λ_n·t} (Carslaw and Jaeger, Conduction of Heat in Solids, 1959,
-# sec. 3.4), Σ c_n = 1. So it is Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with z_n′ = λ_n(u − z_n) and the truncation
-# error R(t) = Σ_k Δu_k·E(t − t_k) over the steps of u, E(t) = −Σ_{n≥N} c_n·e^{−λ_n·t}. The terms of E alternate in sign
-# and decrease, so |E(t)| ≤ |c_N|e^{−λ_N·t}.
+# in the fault at the time t after a unit step of u is 1 − Σ c_n·e^{−λ_n·t} (Carslaw and Jaeger, Conduction of Heat in
+# Solids, 1959, sec. 3.4), Σ c_n = 1. For any u this pressure is therefore Σ_{n<N} c_n·z_n + (1 − Σ_{n<N} c_n)u + R with
+# z_n′ = λ_n(u − z_n) and the truncation error R(t) = Σ_k Δu_k·E(t − t_k) over the steps of u, E(t) = −Σ_{n≥N}
+# c_n·e^{−λ_n·t}. The terms of E alternate in sign and decrease, so |E(t)| ≤ |c_N|e^{−λ_N·t}.
 #
 # **In rationals.** π is replaced by π̂ = π(1 − δ), 0 ≤ δ ≤ 10⁻²⁰, so λ̂_n = λ_n(1 − δ)² and ĉ_n = c_n/(1 − δ). This
 # adds to |E(t)| at most Σ_{n<N} |c_n|(2δ + 3δλ̂_n·t)e^{−λ̂_n·t} ≤ 6Nδe^{−λ̂_0·t/2}.
@@ -31,7 +31,7 @@ from quakedesign.loop.periodic import Fading, PeriodicLoop
 
 MODES = 8
 _PI = Fraction("3.14159265358979323846")  # π̂
-_SHORT = Fraction(1, 10**20)  # δ
+_PI_ERROR = Fraction(1, 10**20)  # δ
 
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,13 +56,13 @@ class DiffusionPath:
 
     def truncation_bound(self, step: Fraction) -> tuple[Fraction, Fraction, Fraction]:
         """h [-], λ̂_N [1/s] and f [-] of a well whose pressure steps are at least `step` [s] apart."""
-        rate, rounding = self.rate(MODES), 6 * MODES * _SHORT
+        rate, rounding = self.rate(MODES), 6 * MODES * _PI_ERROR
         return abs(self.share(MODES)) * (1 + 1 / (rate * step)), rate, rounding * (1 + self.time / step)
 
     @property
     def truncation_integral(self) -> Fraction:
         """Bound of ∫|E| [s]."""
-        return abs(self.share(MODES)) / self.rate(MODES) + 6 * MODES * _SHORT * self.time
+        return abs(self.share(MODES)) / self.rate(MODES) + 6 * MODES * _PI_ERROR * self.time
 
     @property
     def area(self) -> Fraction:
@@ -72,7 +72,7 @@ class DiffusionPath:
     @property
     def response_integral(self) -> Fraction:
         """Bound of ∫|F| [s²], F(t) = −∫_t^∞ E."""
-        return abs(self.share(MODES)) / self.rate(MODES) ** 2 + 6 * MODES * _SHORT * self.time**2
+        return abs(self.share(MODES)) / self.rate(MODES) ** 2 + 6 * MODES * _PI_ERROR * self.time**2
 
 
 # ----------------------------------------------------------------------
@@ -99,9 +99,9 @@ class DiffusionPath:
 def with_response_area(loop: PeriodicLoop, gain: Fraction, path: DiffusionPath) -> PeriodicLoop:
     """A loop of `sampled_error_loop` through a diffusion path, with x2 in place of e2, and Y in place of β0·R.
 
-    The input ``awaited`` [m/s²] is bY divided by a time, the bound of |bY| over that of |bR|. So it has the same bound
-    as bR: the output ``left_out``, with zero-order hold at the well times its decaying weight. The sampled input
-    ``awaited_told`` is the part of bY in the measurements of the law, divided by the same time.
+    The input ``awaited`` [m/s²] is bY divided by a time, the ratio of the bounds of |bY| and |bR|. Its bound is
+    therefore that of bR: the output ``left_out``, multiplied by the decaying weight of the input if the well has a
+    zero-order hold. The sampled input ``awaited_told`` is the part of bY in the measurements, divided by the same time.
 
     Parameters
     ----------

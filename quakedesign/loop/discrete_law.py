@@ -52,7 +52,7 @@ class DiscreteLaw:
 
 @dataclass(frozen=True)
 class Lifted:
-    """Expressions with symbols in place of numbers, so that laws with other gains share machine code."""
+    """Expressions with symbols in place of numbers, so that laws with other gains share compiled code."""
 
     expressions: tuple[sp.Expr, ...]
     numbers: tuple[sp.Symbol, ...]  # Positive; signs stay in the expressions

@@ -44,12 +44,12 @@ def sampled_error_loop(
     """Error loop of a fault about p*, the equilibrium pressure at the reference.
 
     At every multiple of T_s the law measures e1 and e2, computes p and updates its states. p reaches the valve after
-    the delay and is held for T_s. The well pressure follows the valve with the lag, and the fault pressure follows the
-    well by diffusion.
+    the delay, with a zero-order hold of T_s. The well pressure follows the valve with the lag, and the fault pressure
+    follows the well by diffusion.
 
     States, in this order: e1; e2; the law's states; delayed pressures; valve pressure; with a lag, well minus valve
-    pressure; with a diffusion path, mode minus well pressures, and without a lag the last step of the valve pressure.
-    The law's states are relative to those that command p* with the fault at rest; pressures are b·(p − p*).
+    pressure; with a diffusion path, mode minus well pressures; with this path and no lag, the last step of the valve
+    pressure. The law's states are relative to those that command p* with zero errors; pressures are b·(p − p*).
 
     Inputs: ``acceleration`` a in e2' = s·e1 − w·e2 + βb(p − p*) + a [m/s²]; ``drift`` b·dp*/dt [m/s³]. Outputs:
     ``slip_error`` [m]; ``slip_rate_error`` [m/s]; ``push`` b·(p − p*) in the fault [m/s²]; with a lag or a diffusion
@@ -58,21 +58,20 @@ def sampled_error_loop(
 
     With an implicit step the nominal loop has w = −γe1/T_s, γ the midpoint of the slopes; the deviation w + γe1/T_s
     [m/s] is the sampled input ``root``. The measurement errors in `noisy` are the sampled inputs ``slip_noise`` [m] and
-    ``rate_noise`` [m/s]; they enter the law, and w, as e1 and e2 do. For a law that uses r and r′ as well, r′ [m/s] is
-    an input twice: ``reference`` moves the law's states away from those that command p* at r; the sampled
+    ``rate_noise`` [m/s]; they enter the law, and w, as e1 and e2 do. For a law that also uses r and r′ there are two
+    inputs in r′ [m/s]: ``reference`` moves the law's states away from those that command p* at r; the sampled
     ``reference_rate`` is the law's term in r′.
 
-    With timing errors the last step of the valve pressure is a further state, and the output ``stepped`` [m/s²]. The
-    input ``late`` is b times the deviation of the valve pressure from its schedule. Its size is at most that of the
-    previous or the next pressure step, and it is nonzero only near the arrivals. During the timing error and the ramp,
-    p* drifts: ``push`` (or ``asked``, where the fault pressure is not the valve pressure) changes by ``drift`` times
-    this duration.
+    With timing errors the last step of the valve pressure is also a state, and the output ``stepped`` [m/s²]. The input
+    ``late`` is b times the deviation of the valve pressure from its schedule. Its size is at most that of the previous
+    or the next pressure step, and it is nonzero only near the arrivals. During the timing error and the ramp, p*
+    drifts: ``push`` (or ``asked``, where the fault pressure is not the valve pressure) changes by ``drift`` times this
+    duration.
 
     Parameters
     ----------
-    law : LinearLaw
-    model : NominalModel
-        Midpoints of the ranges.
+    law, model : LinearLaw, NominalModel
+        Law, and midpoints of the ranges of the plant.
     authority : Fraction
         b [m²/kg].
     step, delay, lag : Fraction
@@ -87,14 +86,15 @@ def sampled_error_loop(
     Raises
     ------
     ParameterError
-        For a law with a steady-state error under a constant p*, or times that are negative or too long.
+        For a law with a steady-state error under a constant p*; a step that is not positive; a negative time; a delay
+        above 8 periods; 0 < L²/D < T_s/32; L²/D with timing errors; timing errors that let events overlap.
     """
     gain, outputs = model.gain / authority, {"slip_error": "e1", "slip_rate_error": "e2", "push": "push"}
     outputs |= ({"left_out": "left_out"} if diffusion else {}) | ({"asked": "valve"} if lag or diffusion else {})
     system, loop = _connected(
         law,
         authority,
-        _Times(step=step, delay=delay, lag=lag, diffusion=diffusion, watched=instants is not None),
+        _Times(step=step, delay=delay, lag=lag, diffusion=diffusion, inexact=instants is not None),
         rates={"e1": {"e2": _ONE}, "e2": {"e1": model.slip, "e2": -model.rate, "push": gain}},
         signals={},
         inputs={"acceleration": {"e2": _ONE}, "drift": {}},
@@ -130,13 +130,13 @@ def starts(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Times:
-    """Times of the path of the pressure [s], and whether the last step of the valve pressure is needed."""
+    """Times of the path of the pressure [s], and whether events have timing errors."""
 
     step: Fraction
     delay: Fraction
     lag: Fraction
     diffusion: Fraction
-    watched: bool = False
+    inexact: bool = False
 
     def __post_init__(self) -> None:
         step, delay, lag, diffusion = self.step, self.delay, self.lag, self.diffusion
@@ -156,9 +156,9 @@ class _Times:
                 f"the diffusion time L^2/D must be 0, or at least T_s/{SHORTEST} = {least} s. "
                 f"Received {received} s. Omit diffusion, or shorten the step."
             )
-        if diffusion and self.watched:
+        if diffusion and self.inexact:
             raise ParameterError(
-                "jitter, averaging and the rate limit of a pump have no guarantee with a diffusion path. Received "
+                "no guarantee with a diffusion path covers jitter, averaging or the rate limit of a pump. Received "
                 f"L^2/D = {shortly(diffusion)} s with one of them. Omit diffusion, or jitter, averaging and rate limit."
             )
 
@@ -191,7 +191,7 @@ def _connected(
     line = tuple(f"waiting{i}" for i in range(int(times.delay // step) + (part > 0)))
     well: Signal = {"behind": 1 / lag} if lag else {}
     modes = {f"layer{i}": i for i in range(MODES if times.diffusion else 0)}
-    stepped = times.watched or (modes and not lag)
+    stepped = times.inexact or (modes and not lag)
     pressures = (*line, "valve", *well, *modes, *["stepped"] * bool(stepped))
     system = Interconnection(
         ("e1", "e2", *own, *pressures),
@@ -374,7 +374,7 @@ class SlidingModel:
 
     strength·y + weakening·z = −stiffness·x + coefficient·q + e with the stress input e of `sliding_loop` [Pa], x′ =
     V·c·y, z′ = −ρ(c_y·y + c_z·z), ρ = V/D. With all slopes 1 this is the linearisation about sliding at V, the same for
-    both laws of the state.
+    both state laws. N is the effective normal stress [Pa], and D the characteristic slip distance [m].
 
     Attributes
     ----------
@@ -387,13 +387,13 @@ class SlidingModel:
     state_slope : Fraction
         c_z [-], which replaces (1 − e^{−z})/z in the ageing law, and e^y in the slip law.
     strength : Fraction
-        Stress per change of y: N·a plus damping [Pa].
+        Stress per change of y: N·a plus the damping term [Pa].
     weakening : Fraction
         N·b [Pa].
     direct, evolution : Fraction
         a and b [-].
     stiffness : Fraction
-        [Pa/m].
+        Stiffness of the spring [Pa/m].
     coefficient : Fraction
         Friction coefficient [-] of sliding at V.
     state_law : str
@@ -428,7 +428,7 @@ def sliding_loop(
     diffusion: Fraction = Fraction(0),
     noisy: Collection[str] = (),
 ) -> PeriodicLoop:
-    """The error loop about sliding at V, with the order of events and the path of the pressure of `sampled_error_loop`.
+    """The error loop about sliding at V, with events, pressure path and arguments as in `sampled_error_loop`.
 
     States: the slip error x [m] and z [-] in place of e1 and e2; pressures in Pa. Inputs: ``stress`` e [Pa], ``rate`` f
     [-] in x′ = V(cy + f) and, for ageing, in z′ = −ρ(cy + c_z·z + f), ``state`` h [-] in z′ = … − ρh, the ``drift``
@@ -472,7 +472,7 @@ def sliding_loop(
 
 
 def at_once(model: SlidingModel) -> dict[tuple[str, str], Fraction]:
-    """Direct feedthrough from each input to each output, by (output, input)."""
+    """Direct feedthrough [1/Pa] of ``stress`` and ``left_out``, by (output, input)."""
     shares = {"log_rate": _ONE, "ageing": model.evolution_slope, "strength": model.direct}
     sizes = {"stress": 1 / model.strength, "left_out": model.coefficient / model.strength}
     return {(output, name): share * size for output, share in shares.items() for name, size in sizes.items()}

@@ -20,7 +20,7 @@ Quantity = str | float | Fraction
 """Number in the SI unit, decimal or p/q as text, or a text with a unit such as ``"80 ms"``."""
 
 MEASURED = ("slip-and-rate", "slip", "differentiator")
-"""What a law measures; `differentiator` estimates the slip rate from the slip."""
+"""Signals that a law measures; `differentiator` estimates the slip rate from the slip."""
 
 
 # ----------------------------------------------------------------------
@@ -29,7 +29,7 @@ MEASURED = ("slip-and-rate", "slip", "differentiator")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pump:
-    """Limits of the pressure at the valve; None for no limit.
+    """Limits of the pressure at the valve and of its rate of change; None for no limit.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Pump:
     Raises
     ------
     ParameterError
-        For limits that exclude 0, or a rate that is not positive.
+        For limits that exclude 0 or are equal, one limit without the other, or a rate that is not positive.
     """
 
     least: Fraction | None = None
@@ -73,7 +73,7 @@ class Pump:
         return None if self.least is None or self.largest is None else (self.least, self.largest)
 
     def exceeded(self, low: LowerBound, high: UpperBound) -> str:
-        """Reason why pressures between two bounds exceed the limits; empty if they do not."""
+        """Reason why pressures between two bounds [Pa] exceed the limits; empty if they do not."""
         if self.limits is None or (self.limits[0] <= low and high <= self.limits[1]):
             return ""
         return (
@@ -82,13 +82,13 @@ class Pump:
         )
 
     def too_slow(self, step: UpperBound | None, time: Fraction) -> str:
-        """Reason why a pressure change may take longer than a time [s]; empty if it does not."""
+        """Reason why a pressure change [Pa] may take longer than a time [s]; empty if it does not."""
         if self.rate is None or (step is not None and step <= self.rate * time):
             return ""
         most = "of any size" if step is None else f"of {step.quantity('Pa')}"
         return (
             f"changes {most} from one sample to the next may be commanded, which a pump of "
-            f"{LowerBound(self.rate).quantity('Pa/s')} does not make in {LowerBound(time).quantity('s')}"
+            f"{LowerBound(self.rate).quantity('Pa/s')} cannot complete in {LowerBound(time).quantity('s')}"
         )
 
     def to_dict(self) -> dict[str, str]:
@@ -103,7 +103,7 @@ class Pump:
         return f"with a pump of {', '.join(of)}, whose limits are never reached"
 
     def _range(self) -> str:
-        """Limits, rounded inward."""
+        """Limits as text, rounded inward."""
         assert self.limits is not None
         low, high = self.limits
         return f"{UpperBound(low).quantity('Pa')} to {LowerBound(high).quantity('Pa')}"
@@ -138,7 +138,7 @@ class LoopSetup:
     initial_slip, initial_slip_rate : Fraction
         Bounds of the initial errors, of either sign [m], [m/s].
     jitter, delay_jitter, averaging_time, longest_step : Fraction
-        Timing of measurements and samples [s].
+        Largest timing errors, averaging time of the measurements and longest sampling interval [s].
     saturation, withdrawal : Fraction or None
         Limits of the pressure at the valve [Pa].
     rate_limit : Fraction or None
@@ -147,7 +147,8 @@ class LoopSetup:
     Raises
     ------
     ParameterError
-        For a negative quantity, a step that is not positive, an unknown `measured`, or withdrawal without saturation.
+        For a negative quantity, a step outside 1e-9 to 1e9 s, a rate limit of 0, an unknown `measured`, withdrawal
+        without saturation, or a saturation of 0 without withdrawal.
     UnitError
         For a unit that is unknown or of another dimension.
     """
@@ -159,11 +160,9 @@ class LoopSetup:
     delay: Fraction = quantity("s", "Delay from the measurement to the pressure at the valve.")
     lag: Fraction = quantity(
         "s",
-        "Time constant of the lag from valve to fault, or to the well of a diffusion path; a designed e-LQR models it.",
+        "Time constant of the lag from valve to fault, or to the well of a diffusion path; e-LQR designs include it.",
     )
-    diffusion: Fraction = quantity(
-        "s", "L^2/D of the diffusion path between well and fault; a designed e-LQR models it."
-    )
+    diffusion: Fraction = quantity("s", "L^2/D of the diffusion path between well and fault; e-LQR designs include it.")
     slip_noise: Fraction = quantity(
         "m",
         "Bound of the measurement error of the slip at any time, such as '1 um'. For a gauge with resolution q, give "
@@ -304,4 +303,4 @@ def _shown(value: Any, unit: str | None) -> str:
 
 
 IDEAL = LoopSetup()
-"""Pressure without delay, exact measurements, start at rest, sampling time of the fault."""
+"""Pressure without delay, exact measurements, zero initial errors, sampling time of the fault."""

@@ -42,7 +42,7 @@ class Segment:
 
 @checked_dataclass(frozen=True, slots=True, kw_only=True)
 class Fading:
-    """An input b·w that decays after a jump: |w| ≤ W·(height·e^{−rate·θ} + floor) a time θ after it, W its amplitude.
+    """An input b·w of amplitude W that decays: |w| ≤ W·(height·e^{−rate·θ} + floor) at a time θ after a jump.
 
     Attributes
     ----------
@@ -176,9 +176,8 @@ class Instants:
         after = self.arrived + self.ramp
         if self.arrived > (part or step) or after > step - part or self.arrived + after > step:
             raise ParameterError(
-                "a pressure change must begin and end between two samples, and before the next one may begin. Received "
-                "a change due "
-                f"{float(part):.4g} s after a sample, with the step {float(step):.4g} s, jitter of "
-                f"{float(self.arrived):.4g} s and a ramp of {float(self.ramp):.4g} s. Reduce jitter or ramp, or change "
-                "the delay."
+                "a pressure change must begin and end between two samples, and before the next change may begin. "
+                f"Received a change due {float(part):.4g} s after a sample, with the step {float(step):.4g} s, "
+                f"jitter of {float(self.arrived):.4g} s and a ramp of {float(self.ramp):.4g} s. "
+                "Reduce jitter or ramp, or change the delay."
             )

@@ -100,7 +100,7 @@ def test_an_lqg_of_four_states_is_proved_without_and_with_noise(found):
 
 def test_the_stick_slip_plant_is_searched_when_its_worst_case_is_read(stuck, found):
     told = replace(found).lines()
-    assert "an integrator moved by rounding" in told[-1]
+    assert "an integrator perturbed by rounding" in told[-1]
     assert told[2] == "worst case found on the stick-slip plant: slip error 1 mm, slip-rate error 20 µm/s"
     assert told[3].startswith(
         "on the stick-slip plant nothing is proved for a given law, and its worst pressure is not"

@@ -1,4 +1,4 @@
-"""Friction laws, discovered in the modules of this folder."""
+"""Friction laws, discovered in the modules of this package."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""Actuator stages between the commanded pressure and the pressure in the fault, discovered in this folder."""
+"""Actuator stages between the commanded pressure and the pressure in the fault, discovered in this package."""
 
 from functools import cache
 

@@ -30,8 +30,8 @@ class Actuator:
     Raises
     ------
     ParameterError
-        For an entry that is no stage, a dynamic stage before a sampled one, or more than one stage that stores fluid or
-        that acts between samples.
+        For an entry that is not a stage, a dynamic stage before a sampled one, or more than one stage that stores fluid
+        or that acts between samples.
     """
 
     stages: tuple[Stage, ...] = ()
@@ -117,7 +117,7 @@ class Actuator:
                 )
 
     def hold(self, numbers: Entries, memory: Entries, pressure: Any, step: float) -> tuple[Any, Any, Entries]:
-        """Held pressure [Pa], excess of the commanded pressure [Pa], and the memory afterwards."""
+        """Pressure [Pa] until the next sample, excess of the commanded one [Pa], and the memory."""
         memories: Entries = []
         excess: Any = 0.0
         for stage, own, past in zip(self.sampled, *_split(self.sampled, numbers, memory), strict=True):
@@ -128,7 +128,7 @@ class Actuator:
         return pressure, excess, memories
 
     def flow(self, numbers: Entries, memory: Entries, applied: Any) -> tuple[Entries, Any, dict[str, Any]]:
-        """Rates of dynamic stages, pressure [Pa] in the fault, and signals of `FLOWS`, at a held input pressure."""
+        """Rates of dynamic stages, pressure [Pa] in the fault, and signals of `FLOWS`, under an input pressure."""
         rates: Entries = []
         signals: dict[str, Any] = {}
         for stage, own, past in zip(self.flowing, *_split(self.flowing, numbers, memory), strict=True):

@@ -14,7 +14,7 @@ _SAME = 1e-9  # tolerance, relative to a sampling period
 
 @checked_dataclass(frozen=True, kw_only=True)
 class Delay(SampledStage):
-    """Delay of the pressure by a number of samples; zero pressure before.
+    """Delay of the pressure by a number of samples; 0 until the first pressure arrives.
 
     Attributes
     ----------

@@ -76,11 +76,11 @@ class Diffusion(FlowStage):
     in Solids, 1959, sec. 3.4); the pressure in the fault after a unit step at the well is
     2Σ(−1)ⁿerfc((2n+1)/(2√(t/τ))).
 
-    The model has N cells of equal width with their pressures in the middle (finite volumes). Its transfer functions are
-    1/cosh(Nφ) and S·tanh(Nφ)/(N sinh φ) with sinh(φ/2) = √(sτ)/(2N): rational functions of degree N, both exact for
-    slow changes. The injected volume is the volume stored in the cells. Over all frequencies the error of the pressure
-    is at most 0.32/N² of the amplitude at the well, that of its step response 0.25/N², and that of the volume 0.22/N of
-    S times this amplitude. For 16 cells these bounds are 0.13 %, 0.1 % and 1.4 %.
+    The model has N cells of equal width with their pressures at the centres (finite volumes). Its transfer functions
+    are 1/cosh(Nφ) and S·tanh(Nφ)/(N sinh φ) with sinh(φ/2) = √(sτ)/(2N): rational functions of degree N, both exact in
+    the limit of low frequencies. The injected volume is the volume stored in the cells. Over all frequencies the error
+    of the pressure is at most 0.32/N² of the amplitude at the well, that of its step response 0.25/N², and that of the
+    volume 0.22/N of S times this amplitude. For 16 cells these bounds are 0.13 %, 0.1 % and 1.4 %.
 
     Attributes
     ----------
@@ -89,8 +89,8 @@ class Diffusion(FlowStage):
     diffusivity : float
         D [m²/s], positive.
     storage : float or None
-        S [m³/Pa], positive: fluid volume stored in the whole layer per pressure, its volume times its specific storage.
-        Without it the pressures are the same, but volume and flow rate are not computed.
+        S [m³/Pa], positive: fluid volume stored in the whole layer per unit pressure: its volume times its specific
+        storage. Without it the pressures are the same, but volume and flow rate are not computed.
     cells : int
         N, 1 … 200.
     """

@@ -97,7 +97,7 @@ class Saturation(SampledStage):
     Attributes
     ----------
     lowest, highest : float
-        [Pa]; zero, the pressure before injection, must lie between them.
+        [Pa], different; 0, the pressure before injection, lies between them or is one of them.
     """
 
     name: ClassVar[str] = "saturation"
@@ -124,7 +124,7 @@ class Saturation(SampledStage):
         finite = math.isfinite(self.lowest) and math.isfinite(self.highest)
         if not (finite and self.lowest <= 0 <= self.highest and self.lowest < self.highest):
             raise ParameterError(
-                "lowest and highest pressure must be finite, with 0 between them. "
+                "lowest and highest pressure must be finite and different, with 0 between them. "
                 f"Received {self.lowest!r} Pa and {self.highest!r} Pa."
             )
 

@@ -1,4 +1,4 @@
-"""Discretisation schemes of a control law, discovered in the modules of this folder."""
+"""Discretisation schemes of a control law, discovered in the modules of this package."""
 
 from dataclasses import fields, is_dataclass
 from functools import cache
@@ -26,7 +26,7 @@ def simulation_scheme(name: str, **settings: Any) -> Scheme:
     Raises
     ------
     ParameterError
-        For an unknown scheme, or one without one of the settings.
+        For an unknown scheme, or a setting that the scheme does not have.
     """
     if ":" not in name:
         require_known(name, sorted(schemes()), "scheme")

@@ -76,7 +76,7 @@ class Stepped(ABC):
 
     @abstractmethod
     def advance_often(self, method: Any, motion: Motion, given: ca.SX, state: ca.SX, step: float, times: int) -> ca.SX:
-        """State after several steps; the motion takes the number of elapsed steps, not the share, and `given` last."""
+        """State after several steps; the motion takes the number of elapsed steps, and last `given`."""
 
 
 class Scheme(ABC):
@@ -238,7 +238,7 @@ class AperiodicClock:
     Attributes
     ----------
     shortest, longest : int
-        Steps from one sample to the next, 1 … 1000.
+        Steps from one sample to the next, 1 ≤ shortest ≤ longest ≤ 1000.
     seed : int
         Seed of the intervals, not negative.
     """
@@ -289,7 +289,7 @@ MOST_SUBSTEPS = 100
 
 @dataclass(frozen=True)
 class ControlSample:
-    """All values of one sample (SX): the held pressures before and after it, and the memory afterwards."""
+    """All values of one sample (SX): the pressures applied before and after it, and the memory afterwards."""
 
     before: ca.SX
     applied: ca.SX
@@ -308,8 +308,8 @@ class Sampled(Scheme, Decided):
     """A controller that measures every T_s and holds its pressure in between (zero-order hold).
 
     The entries of the memory are, in this order: the numbers of the law, B0, the numbers of actuator and measurement,
-    the scheme's own memory, the last held pressure, the memories of the sampled stages, the sensor and the aperiodic
-    sampling, and the states of the flowing stages.
+    the scheme's own memory, the last applied pressure, the memories of the sampled stages, the sensor and the aperiodic
+    sampling, and the states of the dynamic stages.
 
     Attributes
     ----------
@@ -320,7 +320,7 @@ class Sampled(Scheme, Decided):
     authority : float or None
         Nominal input gain B0 of e2' = B0·p [m²/kg] where the scheme needs one; None: from the fault, see `nominal`.
     clock : AperiodicClock or None
-        Aperiodic sampling; None: a sample at every step.
+        Aperiodic sampling, with a delay of a whole number of steps; None: a sample at every step.
     """
 
     substeps: int = 1
@@ -350,7 +350,7 @@ class Sampled(Scheme, Decided):
         return loop.fault.authority_range[0]
 
     def memory(self, loop: Stepped, step: float) -> dict[str, float]:
-        """See `Scheme.memory`; rejects a sensor that was made for another step."""
+        """See `Scheme.memory`; rejects a sensor made for another step, and substeps too long for the actuator."""
         self.actuator.require_resolved(step / self.substeps)
         self.measurement.require_step(step)
         parts = self._parts(loop)
@@ -363,7 +363,7 @@ class Sampled(Scheme, Decided):
         return pressure
 
     def integral_effect(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> ca.SX:
-        """Pressure change [Pa] (SX) due to the update of ξ at a sample, before anti-windup holds ξ at a limit."""
+        """Pressure change [Pa] (SX) due to the update of ξ at a sample, before anti-windup freezes ξ at a limit."""
         return self._sample(loop, counter, state, step).integral_effect
 
     def outputs(self, loop: Stepped, counter: ca.SX, state: ca.SX, step: float) -> dict[str, ca.SX]:
@@ -394,8 +394,8 @@ class Sampled(Scheme, Decided):
         sample = self._sample(loop, counter, state, step)
         moving = ca.vertcat(state[:2], *sample.flow)
         for applied, begin, share in self._sections(sample):
-            # With equal numbers of arguments the repeated functions of two sections would be merged: the second has one
-            # more.
+            # CasADi would merge the repeated functions of two sections if they had as many arguments, so that the
+            # second has one more.
             given = ca.vertcat(counter, applied, *sample.numbers, *([begin] if begin else []))
             times = math.ceil(share * self.substeps)
             motion = self._motion(step, begin, share, times)
@@ -407,12 +407,12 @@ class Sampled(Scheme, Decided):
         return ca.vertcat(moving[:2], *sample.integrals, constants, rest, moving[2:])
 
     def _sections(self, sample: ControlSample) -> tuple[tuple[ca.SX, float, float], ...]:
-        """Pressures held between two samples, each with its beginning and duration as shares of the period."""
+        """Pressures applied between two samples, each with its beginning and duration as shares of the period."""
         late = self.actuator.part
         return ((sample.before, 0, late), (sample.applied, late, 1 - late)) if late else ((sample.applied, 0, 1),)
 
     def _motion(self, step: float, begin: float, share: float, times: int) -> Motion:
-        """Rates of plant and actuator at a held pressure, as an argument of `Stepped.advance_often`."""
+        """Rates of plant and actuator under a constant input pressure, for `Stepped.advance_often`."""
 
         def motion(plant: Motion, passed: ca.SX, now: ca.SX, given: ca.SX) -> ca.SX:
             counter, applied, *numbers = ca.vertsplit(given)

@@ -27,14 +27,13 @@ _WIDEST = 1e30  # Pa; stands for no limit
 class Compensated(Sampled):
     """Implicit step for e2' = B0(p + d) with d estimated from the last sample, in place of the integral states.
 
-    The estimate is d ← (1 − a)d + a[(e2 − e2⁻)/(T_sB0) − p⁻], where p⁻ is the held pressure minus the feed-forward.
+    The estimate is d ← (1 − a)d + a[(e2 − e2⁻)/(T_sB0) − p⁻], where p⁻ is the applied pressure minus the feed-forward.
     The step is that of `Implicit` with ξ = 0, and the pressure is that of this step minus d. In
     `quakedesign.laws.sampled_controller`, `followed` gives the estimate and `compensating_pressure` the pressure, here
     and in guarantees. Certificates in continuous time do not cover this scheme. Near the origin, where the step ends at
     e1⁺ = 0, the loop is linear and stable for 4a/((a + 1)(a + 2)) < β/β0 < 4/(a + 2), where β/β0 is the input gain of
-    the fault divided by B0. Since friction lets β vary by a factor of 1.425 on faults of the paper, a loop with a = 1
-    chatters if B0 is the smallest input gain. Noise of the slip rate reaches the estimate with the gain
-    a/(T_sB0).
+    the fault divided by B0. Since β varies with friction by a factor of 1.425 on faults of the paper, a loop with a = 1
+    chatters if B0 is the smallest input gain. Noise of the slip rate reaches the estimate with the gain a/(T_sB0).
 
     Attributes
     ----------

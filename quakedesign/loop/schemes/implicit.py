@@ -32,7 +32,7 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 # monotone, F is strongly monotone, and there is exactly one solution.
 #
 # - At a jump of a sign, where its argument vanishes, the two one-sided values of F show on which side the solution
-#   lies, or that it lies at the jump; then a linear equation gives the selection from [−1, 1]. So all signs are known.
+#   lies, or that it lies at the jump; then a linear equation gives the selection from [−1, 1]. All signs then follow.
 # - With the signs fixed, w = g(w) with g continuous and non-increasing. The solution lies between 0 and g(0): if
 #   g(0) ≥ 0, then w − g(w) is −g(0) ≤ 0 at w = 0, and g(0) − g(g(0)) ≥ 0 at w = g(0), because g(g(0)) ≤ g(0); likewise
 #   with the signs reversed. Reducing this bracket to a quarter 27 times leaves |g(0)|·2⁻⁵⁴; three independent
@@ -40,7 +40,7 @@ from quakedesign.symbolic.casadi_printer import to_casadi
 #   at a jump, would spend most of its time on it.
 
 ROUNDS = 27
-ROUNDS_PER_LOOP = 3  # rounds in the body of a loop in C: all of them would take half a second to compile
+ROUNDS_PER_LOOP = 3  # rounds per loop body in C: unrolling all of them would take half a second to compile
 end_slip, end_rate = sp.symbols("end_slip end_rate", real=True)
 
 InclusionValues = dict[sp.Symbol, ca.SX]
@@ -99,7 +99,7 @@ class Inclusion:
         if direction(self.pull) not in (0, -1):
             raise ParameterError(
                 "an implicit step needs a pressure that never increases with slip and slip rate at the end of the "
-                "step. Received a law whose pressure may. Check the signs of its gains, or use the scheme explicit."
+                "step. Received one that may increase. Change the signs of the gains, or use the scheme explicit."
             )
         for argument in self.arguments:
             self._linear(argument)

@@ -26,10 +26,10 @@ _LEVEL = level_after(_STATES, _SEEN, discrete_law.step, _GAINS)
 class StickSlip(Sampled):
     """Implicit step for e2' = B0(p + d) with the estimate of `StickSlipLaw` in place of the integral states.
 
-    The target rate is r' + w, w the value of e2 at the end of the step of `Implicit` with ξ = 0, and p = (w −
-    e2)/(T_s·B0) − D plus the feed-forward. The disturbance estimate D [Pa] is corrected by the innovation of the slip
-    rate with the gain a/(T_s·B0), and by that of the slip with b/(T_s²·B0); the predicted slip rate is never negative.
-    Where the step ends at e1⁺ = 0 it is `StickSlipLaw` with return_rate = 1/T_s, for which there are guarantees on the
+    The target rate is r' + w, where w is e2 at the end of the step of `Implicit` with ξ = 0, and p = (w − e2)/(T_s·B0)
+    − D plus the feed-forward. The disturbance estimate D [Pa] is corrected by the innovation of the slip rate with the
+    gain a/(T_s·B0), and by that of the slip with b/(T_s²·B0); the predicted slip rate is never negative. Where the step
+    ends at e1⁺ = 0, the law is `StickSlipLaw` with return_rate = 1/T_s, for which there are guarantees on the
     stick–slip plant.
 
     Attributes
@@ -54,11 +54,11 @@ class StickSlip(Sampled):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not 0 < self.weight <= 1:
-            raise ParameterError(f"weight must be above 0 and at most 1, got {self.weight!r}")
+            raise ParameterError(f"weight must be above 0 and at most 1. Received {self.weight!r}.")
         if not 0 <= self.slip_weight <= 1:
-            raise ParameterError(f"slip_weight must be from 0 to 1, got {self.slip_weight!r}")
+            raise ParameterError(f"slip_weight must be from 0 to 1. Received {self.slip_weight!r}.")
         if not 0 <= self.rest_slip < float("inf"):
-            raise ParameterError(f"rest_slip must be finite and 0 or more, got {self.rest_slip!r} m")
+            raise ParameterError(f"rest_slip must be finite and 0 or more. Received {self.rest_slip!r} m.")
 
     @staticmethod
     def derive(law: DiscreteLaw) -> tuple[sp.Expr, ...]:

@@ -25,12 +25,12 @@ from quakedesign.symbolic.casadi_printer import to_numpy
 # ----------------------------------------------------------------------
 # Errors of the estimates of a differentiator, measured with adverse signals.
 #
-# What is proved of the implicit differentiator, for a fault initially at rest, is in
+# Proofs for the implicit differentiator and a fault initially at rest are in
 # `quakedesign.loop.sensing.differentiator`.
 
 SAMPLES = 1000
 SETTLED = 400
-STRETCH = 10.0  # δ/T where the noise dominates
+STRETCH = 10.0  # δ/T in the runs with dominating noise
 HALF_PERIODS = (1, 2, 3, 5, 8, 13, 30, 100, SAMPLES)
 
 
@@ -42,8 +42,8 @@ def error_scale(differentiator: Differentiator, noise: float) -> float:
 def worst_errors(differentiator: Differentiator, noise: float = 0.0) -> tuple[float, ...]:
     """Errors of the estimates of slip [m], slip rate [m/s] … of the settled differentiator, c_i·λ_d·δ^(n_d+1−i).
 
-    The constants c_i are the largest measured with a number of adverse signals with |x1^(n_d+1)| = λ_d, and so are
-    lower bounds of the worst case.
+    The constants c_i are the largest normalised errors over a set of adverse signals with |x1^(n_d+1)| = λ_d, and so
+    are lower bounds of the worst case.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def worst_errors(differentiator: Differentiator, noise: float = 0.0) -> tuple[fl
 
 @lru_cache(maxsize=64)
 def constants(unit: Differentiator, noisy: bool) -> tuple[float, ...]:
-    """c_0 … c_nd of a differentiator with λ_d = T = 1, without and, if noisy, also with dominating noise."""
+    """c_0 … c_nd for λ_d = T = 1: largest errors without noise and, if noisy, with dominating noise."""
     ratios = [
         _errors(unit, scale) / (scale ** np.arange(unit.order + 1, 0, -1.0))
         for scale in ((1.0, STRETCH) if noisy else (1.0,))
@@ -72,7 +72,7 @@ def constants(unit: Differentiator, noisy: bool) -> tuple[float, ...]:
 
 
 def _errors(unit: Differentiator, scale: float) -> "np.ndarray":
-    """Largest settled errors; a scale above 1 sets the noise."""
+    """Largest errors after settling; a scale δ/T above 1 sets the noise."""
     random = np.random.default_rng(0)
     noise = scale ** (unit.order + 1) if scale > 1 else 0.0
     acceleration, sign = (part.ravel() for part in np.meshgrid(*[np.arange(_kinds(unit))] * 2))
@@ -83,8 +83,8 @@ def _errors(unit: Differentiator, scale: float) -> "np.ndarray":
     for sample in range(SAMPLES):
         signs = _signs(sample, errors, random)
         highest = signs[acceleration[:columns], np.arange(columns)]
-        off = noise * signs[sign[:columns], np.arange(columns)]
-        after, estimates = step(memory, true[:1] + off)
+        reading_error = noise * signs[sign[:columns], np.arange(columns)]
+        after, estimates = step(memory, true[:1] + reading_error)
         memory, errors = after.full(), estimates.full() - true
         if sample >= SETTLED:
             worst = np.maximum(worst, abs(errors))
@@ -132,11 +132,11 @@ def _function(unit: Differentiator) -> ca.Function:
 #
 #     A + B·max |p(e1 + ε1, e2 + ε2) − p(e1, e2)| < λ_d
 #
-# is the self-consistent condition on λ_d. For signed powers up to 1 the difference is largest across the origin, at e =
-# −ε/2. For a linear law the left-hand side grows with λ_d as ε does, so that the sampling period decides; for a sliding
-# mode it grows more slowly, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound on x1''' is needed, and
-# with zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation needs no such bound for a
-# fault initially at rest, and its estimates are then proved for a linear law
+# is the self-consistent condition on λ_d. For signed powers with exponents up to 1 the difference is largest across the
+# origin, at e = −ε/2. For a linear law the left-hand side grows with λ_d as ε does, so that the sampling period
+# decides; for a sliding mode it grows more slowly, so that a λ_d exists for every sampling period. For n_d ≥ 2 a bound
+# on x1''' is needed, and with zero-order hold none exists: x1'' jumps at every sample. The implicit discretisation
+# needs no such bound for a fault initially at rest, and its estimates are then proved for a linear law
 # (`quakedesign.loop.sensing.differentiator`).
 #
 # The condition is a premise of the differentiator. It does not prove that the loop with estimates is stable, and loops
@@ -158,7 +158,7 @@ class JointCondition:
     certified : float
         λ_d [m/s^(n_d+1)].
     ratio : float
-        required/certified; the premise is violated from 1 on.
+        required/certified [-]; the premise is violated if it is 1 or more.
     holds : bool
     slip_error, rate_error : float
         Errors of the estimates [m], [m/s].

@@ -2,8 +2,8 @@
 
 Discretisations: forward Euler, homogeneous (Livne and Levant 2014, Automatica 50, 2040) and implicit (Mojallizadeh,
 Brogliato and Acary 2021, Int. J. Robust Nonlinear Control 31, 7679). Coefficients: Levant and Livne (2020), European
-Journal of Control 55, 33. Last chapter: from rest and with a sufficiently large bound λ_d, the implicit differentiator
-is a filter of backward differences.
+Journal of Control 55, 33. Last chapter: for a fault initially at rest and a sufficiently large bound λ_d, the implicit
+differentiator is a filter of backward differences.
 """
 
 import math
@@ -195,7 +195,7 @@ class Differentiator:
     discretisation : str
         ``"euler"``, ``"homogeneous"`` (both estimate from earlier readings), or ``"implicit"`` (with the latest too).
     inner_steps : int
-        n, at least 1: number of steps of T/n per reading, with the reading held constant.
+        n, at least 1: number of steps of T/n per reading, under the same reading.
     """
 
     bound: float
@@ -258,9 +258,8 @@ class Differentiator:
 
         Returns
         -------
-        list of SX
-            n_d + 1 entries [m], [m/s] ….
-        list of SX
+        list of SX, list of SX
+            n_d + 1 estimates [m], [m/s] …; the states.
         """
         step, gains, after = numbers[0], numbers[1 : self.size + 1], memory
         for _ in range(self.inner_steps):
@@ -304,7 +303,7 @@ class OutputFeedback(Sensor):
     Raises
     ------
     ParameterError
-        For an entry that is no stage, or hardware after software.
+        For an entry that is not a stage, or hardware after software.
     """
 
     differentiator: Differentiator
@@ -359,7 +358,7 @@ def _next(entries: Iterator[ca.SX], count: int) -> Entries:
 
 
 # ----------------------------------------------------------------------
-# The implicit differentiator from rest, with a sufficiently large bound λ_d, is a filter of backward differences.
+# With a sufficiently large λ_d the implicit differentiator of a fault initially at rest is a filter of differences.
 #
 # With y = (w_1 … w_nf, z_0 … z_nd) as in the first chapter, let w = 0 before a reading x, let z_0 = x⁻ be the previous
 # reading, and z_i = ∇ⁱx⁻/Tⁱ. Then b = y_1 + T(y_2 + … + T(z_0 − x + T·z_1 + …)) is −T^nf·∇^(nd+1)x, and if |∇^(nd+1)x|
@@ -368,11 +367,10 @@ def _next(entries: Iterator[ca.SX], count: int) -> Entries:
 # n_f: its slip is the reading, its slip rate Σ ∇ʲx/(jT), 1 ≤ j ≤ n_d (`lag_free`), and a law with its estimates is a
 # law of the slip alone, whose guarantee includes all errors of the estimates.
 #
-# With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: no bound of x1‴ is needed, which does not
-# exist with zero-order hold. ∇²x1 is T times the integral of x1″ weighted by a triangular function over two periods. So
-# c is the integral of the absolute value of the (n_d−1)-th difference of this function, in units of T. That difference
-# is piecewise linear, and its corners are binomial coefficients of alternating sign: c = 1 for n_d = 1, 3/2 for n_d =
-# 2.
+# With |x1″| ≤ A and readings within ε, |∇^(nd+1)x| ≤ c·A·T² + 2^(nd+1)·ε: no bound of x1‴ is needed; none exists with
+# zero-order hold. ∇²x1 is T times the integral of x1″ weighted by a triangular function over two periods. So c is the
+# integral of the absolute value of the (n_d−1)-th difference of this function, in units of T. That difference is
+# piecewise linear, and its corners are binomial coefficients of alternating sign: c = 1 for n_d = 1, 3/2 for n_d = 2.
 
 ORDER = 2  # n_d of the paper
 
