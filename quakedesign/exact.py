@@ -1,6 +1,6 @@
 """Exact rational numbers from decimal text and floats, and certified bounds.
 
-Every other module receives numbers as `fractions.Fraction` from here. The second chapter defines one-sided bounds and
+Numbers of users, as text or floats, become `fractions.Fraction` here. The second chapter defines one-sided bounds and
 enclosures, which are printed rounded outward (an upper bound up, a lower bound down).
 """
 

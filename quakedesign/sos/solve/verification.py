@@ -43,8 +43,8 @@ def verify(
     """Exact proof from a Gram matrix in floating point, or the verdict without the matrix.
 
     The matrix is rounded and corrected to satisfy polynomial = bᵀQb exactly; the kernel of a singular matrix is made
-    rational first. If no proof results, the polynomial is decided without the matrix, as by `prove`
-    with ``products=False`` and the degree of polynomial and bases as ``degree_bound``.
+    rational first. If no proof results, the polynomial is decided without the matrix, as by `prove` with
+    ``products=False`` and, as ``degree_bound``, the largest degree of the polynomial, σ_0 and the products g_i·σ_i.
 
     Parameters
     ----------
