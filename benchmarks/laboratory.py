@@ -285,7 +285,7 @@ def explain(
     seed: int = 0,
     duration: float | None = None,
     laws: Sequence[str] = ("cta", "dia", "elqr"),
-    progress: Callable[[LaboratoryFinding], None] = lambda _: None,
+    report: Callable[[LaboratoryFinding], None] = lambda _: None,
 ) -> list[LaboratoryFinding]:
     """The published laboratory gains under conditions, over specimens.
 
@@ -298,7 +298,7 @@ def explain(
     duration : float, optional
         [s]; the whole task unless given.
     laws : sequence of str
-    progress : callable
+    report : callable
         Called with every finding as it comes.
     """
     gains, findings = published("lab-fault"), []
@@ -307,7 +307,7 @@ def explain(
             findings.append(
                 LaboratoryFinding.of(name, law, _run(one.problem(gains[law], seed, duration=duration), specimens))
             )
-            progress(findings[-1])
+            report(findings[-1])
     return findings
 
 
@@ -415,11 +415,11 @@ def keep(folder: Path, findings: list[LaboratoryFinding]) -> None:
     """Print findings, and write them one a line."""
     with (folder / "findings.jsonl").open("a", encoding="utf-8") as file:
         for found in findings:
-            print(told(found), flush=True)
+            print(row(found), flush=True)
             file.write(json.dumps(asdict(found)) + "\n")
 
 
-def told(found: LaboratoryFinding) -> str:
+def row(found: LaboratoryFinding) -> str:
     """Row of a table: median (least to largest)."""
     kinds = ", ".join(f"{count} {kind}" for kind, count in found.outcomes.items() if count)
     sizes = found.slip_error, found.peak_slip_rate, found.rms_pressure
@@ -429,7 +429,7 @@ def told(found: LaboratoryFinding) -> str:
 
 def all_conditions(folder: Path) -> None:
     """Campaign of every condition and law, sixteen specimens each, and their figure."""
-    findings = explain(conditions(), duration=DURATION, progress=lambda found: keep(folder, [found]))
+    findings = explain(conditions(), duration=DURATION, report=lambda found: keep(folder, [found]))
     note = (
         f"first {DURATION:g} s of the task; median and range of 16 specimens; an error beyond the axis is at its edge"
     )
@@ -438,7 +438,7 @@ def all_conditions(folder: Path) -> None:
 
 def whole(folder: Path) -> None:
     """Some of them over the whole task."""
-    explain({name: conditions()[name] for name in WHOLE}, progress=lambda found: keep(folder, [whole_task(found)]))
+    explain({name: conditions()[name] for name in WHOLE}, report=lambda found: keep(folder, [whole_task(found)]))
 
 
 def whole_task(found: LaboratoryFinding) -> LaboratoryFinding:

@@ -105,7 +105,7 @@ def synthesise(
         "certificate": str(out) if synthesis is not None and out is not None else None,
         "seconds": perf_counter() - began,
     }  # fmt: skip
-    output.show(values, lambda: _print(law, synthesis, more))
+    output.show(values, lambda: _print_synthesis(law, synthesis, more))
     return 0 if synthesis is not None else 1
 
 
@@ -147,7 +147,7 @@ def _values(synthesis: "Synthesis | None") -> Json:
     }
 
 
-def _print(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> None:
+def _print_synthesis(law: str, synthesis: "Synthesis | None", more: Mapping[str, Any]) -> None:
     from rich.table import Table
     from rich.text import Text
 

@@ -727,7 +727,7 @@ def show_state_run(fault: "Fault", command: Any, options: dict[str, Any]) -> int
         run, result = run_sliding(fault, **_instruments(fault, changed, options), **options["state"].of_control())
         lines = sliding_run_lines
     else:
-        run, result = run_state(fault, **_named(fault, changed, _FREE), **options["state"].of_free())
+        run, result = run_state(fault, **_argument_names(fault, changed, _FREE), **options["state"].of_free())
         lines = state_run_lines
     if options["out"] is not None:
         run.save(Path(options["out"]))
@@ -851,14 +851,16 @@ def _instruments(fault: "Fault", changed: dict[str, Any], options: dict[str, Any
     from quakedesign.loop.sensing import Transducer
 
     others = {name: value for name, value in changed.items() if name not in (*_PUMP, *_READING)}
-    entries = _named(fault, others, _CONTROLLED, (*_PUMP, *_READING))
+    entries = _argument_names(fault, others, _CONTROLLED, (*_PUMP, *_READING))
     chain = options["actuator"].build(entries.get("step", fault.sampling_time), options["seed"])
     reading: dict[str, Any] = {_READING[name]: value for name, value in changed.items() if name in _READING}
     transducer = Transducer(**reading) if set(reading) - {"seed"} else None
     return entries | {"stages": chain.sampled, "transducer": transducer}
 
 
-def _named(fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()) -> dict[str, Any]:
+def _argument_names(
+    fault: "Fault", changed: dict[str, Any], taken: dict[str, str], more: Sequence[str] = ()
+) -> dict[str, Any]:
     """Given options under the argument names of a run. Raises ParameterError for options that do not apply."""
     if foreign := [name for name in changed if name not in (*taken, *_COMMON)]:
         kind = f"friction with a state in a run {'with' if taken is _CONTROLLED else 'without'} control"

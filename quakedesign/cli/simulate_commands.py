@@ -449,7 +449,7 @@ def campaign(
         drawn = done.plot()
         done.save(folder, {f"distribution.{kind}": figure_bytes(drawn, kind, "distribution") for kind in format})
         values = done.to_dict() | _rerun(done, rerun, folder)
-    output.show(values, lambda: _print(problem, done, values, f"{folder}/ ({_written(values, format)})"))
+    output.show(values, lambda: _print_campaign(problem, done, values, f"{folder}/ ({_written(values, format)})"))
     return 1 if done.failures else 0
 
 
@@ -463,7 +463,7 @@ def _rerun(done: "Campaign", index: str | None, folder: Path) -> Json:
     return {"rerun": {"index": index, "file": str(path), **entries}}
 
 
-def _print(problem: "CampaignProblem", done: "Campaign", result: Json, written: str) -> None:
+def _print_campaign(problem: "CampaignProblem", done: "Campaign", result: Json, written: str) -> None:
     from rich.table import Table
 
     from quakedesign.simulation.recorder import Metrics

@@ -68,7 +68,7 @@ def _decimal(value: Fraction, *, up: bool, digits: int = _DIGITS) -> Fraction:
 
 
 def identified_fault(identification: Identification, fault: Fault) -> Fault:
-    """Fault with the friction identified from a record in place of its own.
+    """Fault whose friction is replaced by the friction identified from a record.
 
     For a slip-weakening law, friction and box together contain every law of the record's box, so that `guarantee` and
     `design` cover all of them. For a law with state, friction is the best fit. If the fault has a reference rate, which

@@ -36,7 +36,7 @@ _LARGEST_FAMILY = 24  # largest number of monomials of V
 MAXIMIZE = ("lipschitz", "beta", "beta-factor", "decay")
 _AGAINST = {
     "exact": "an exact counterexample was found, an equilibrium away from the origin",
-    "simulated": "a simulation was found in which the state grows (simulated, not proved)",
+    "simulated": "a simulation was found in which the state grows, which is no proof",
     "none": "no counterexample was found, neither an exact one nor by simulation",
 }
 

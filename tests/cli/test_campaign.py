@@ -118,7 +118,9 @@ def shown(**changes):
 
 def printed(capsys, answer, *, controller=None, kinds=None, events=None):
     problem = SimpleNamespace(fault=SimpleNamespace(name="lab-fault"), controller=controller)
-    simulate_commands._print(problem, SimpleNamespace(kinds=kinds or {}, events=events or {}), answer, "out/ (a, b)")
+    simulate_commands._print_campaign(
+        problem, SimpleNamespace(kinds=kinds or {}, events=events or {}), answer, "out/ (a, b)"
+    )
     return [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
 
 

@@ -409,18 +409,18 @@ def test_a_designed_elqr_alone_controls_friction_with_a_state(controller, gains,
 
 
 def test_what_has_no_meaning_with_a_state_is_named():
-    told = options._named(CRUSTAL, {"drift": 1.0, "method": "idas", "json": True, "out": "a"}, options._FREE)
+    told = options._argument_names(CRUSTAL, {"drift": 1.0, "method": "idas", "json": True, "out": "a"}, options._FREE)
     assert told == {"loading_rate": 1.0, "method": "idas"}
     with pytest.raises(
         ParameterError,
         match=r"^scheme, averaging cannot be used for friction with a state in a run without control\.",
     ):
-        options._named(CRUSTAL, {"scheme": "explicit", "averaging": 2, "plant": "smooth"}, options._FREE)
+        options._argument_names(CRUSTAL, {"scheme": "explicit", "averaging": 2, "plant": "smooth"}, options._FREE)
     with pytest.raises(
         ParameterError,
         match=r"^drift cannot be used for friction with a state in a run with control\. .*, saturation and",
     ):
-        options._named(CRUSTAL, {"drift": 1.0}, options._CONTROLLED, ("saturation",))
+        options._argument_names(CRUSTAL, {"drift": 1.0}, options._CONTROLLED, ("saturation",))
 
 
 def test_spread_and_stress_are_for_friction_with_a_state(monkeypatch):

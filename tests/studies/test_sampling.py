@@ -5,13 +5,16 @@ import io
 import json
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
+from rich.console import Console
 
 from quakedesign.errors import ParameterError
 from quakedesign.fault import load_fault
 from quakedesign.laws import control_law
 from quakedesign.laws.feed_forward import feed_forward
+from quakedesign.report import sampling_table
 from quakedesign.report.sampling_table import COLUMNS, order_rows, print_sampling, row_cells, study_rows, write_sampling
 from quakedesign.simulation import Study
 from quakedesign.studies.sampling import noise_levels, sampling_report
@@ -101,6 +104,20 @@ def test_orders_are_exponents_and_a_run_that_diverged_has_none():
     assert order_rows(lost)[1][0][1] == "–"
     assert lost.to_dict()["errors"]["explicit"]["slip_error"] == [1e-3, 1.0, None]
     assert study_rows(cubic)[1][0] == ("explicit", "|e1| [m]", "1.0e-03", "1.0e+00", "1.0e+03")
+
+
+def test_events_and_levels_are_printed_with_their_units():
+    run = SimpleNamespace(outcome=SimpleNamespace(harmless=False), events={"reverse_slip": 0.0025, "diverged": 12.0})
+    rows = [SimpleNamespace(label="e-LQR", scheme="explicit", run=run)]
+    noise = replace(study((1e-3, 1.0, 1e3)), label="standard deviation of the slip noise", unit="m")
+    console = Console(width=200, record=True, file=io.StringIO())
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("row_outcome", "row_cells"):
+            patch.setattr(sampling_table, name, lambda _: ("e-LQR",))
+        print_sampling(SimpleNamespace(fault=LAB, rows=rows, studies={"slip_noise": noise}), console)
+    said = console.export_text()
+    assert "e-LQR, explicit, first occurrences: reverse slip at 0.0025 s, diverged at 12 s\n" in said
+    assert "largest errors for standard deviation of the slip noise = 0.1 … 10 m\n" in said
 
 
 def test_levels_of_noise_follow_from_the_task():

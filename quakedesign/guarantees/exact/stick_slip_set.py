@@ -553,7 +553,7 @@ class Period:
             total = total + size[:, None] * weights
         return list(total.T)
 
-    def more(self, whole: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def range_effects(self, whole: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Contribution of the ranges of slope and damping to the factors of y and H − bβU."""
         number, plant = self.back.number, self.plant
         growth = 1 / (1 - plant.slope[1] * self.sampled_loop.longest**2 / 2)
@@ -712,7 +712,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
     gaps = [
         (own + part[0]) * off
         for own, part in zip(
-            (period.of_rate[0], period.of_force[0]), period.more(period.integrals(lone, none)), strict=True
+            (period.of_rate[0], period.of_force[0]), period.range_effects(period.integrals(lone, none)), strict=True
         )
     ]
     carried = list(_carried(back, task, sampled_loop, period.interval, facets, list(enumerate(COMBINATIONS))))
@@ -730,7 +730,7 @@ def sliding_rows(period: Period, facets: np.ndarray, multipliers: np.ndarray) ->
             curved = back.array(bent.astype(float).tolist()) * abs(a3) * number(abs(end))
             for beta, of_slip in zip(task.beta, of_slips, strict=True):
                 whole = period.integrals(of_slip, of_rate)
-                of_y, of_force = period.more(whole)
+                of_y, of_force = period.range_effects(whole)
                 own = of_slip * period.of_force[0] + of_rate * period.of_force[1] + of_force
                 pushed = -number(beta * task.authority) * own
                 of_y = of_y + curved * gaps[0] + of_slip * period.of_rate[0] + of_rate * period.of_rate[1]

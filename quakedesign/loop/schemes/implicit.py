@@ -99,7 +99,7 @@ class Inclusion:
         if direction(self.pull) not in (0, -1):
             raise ParameterError(
                 "an implicit step needs a pressure that never increases with slip and slip rate at the end of the "
-                "step. Received one that may increase. Change the signs of the gains, or use the scheme explicit."
+                "step. Received one that may increase: change the signs of its gains, or use the scheme explicit."
             )
         for argument in self.arguments:
             self._linear(argument)

@@ -183,7 +183,7 @@ def test_a_file_of_json(tmp_path, changes):
     ("content", "said"),
     [
         ("{", "must be JSON"),
-        ("[]", "exactly the keys"),
+        ("[]", "exactly the keys basis, gram, polynomial, variables"),
         (json.dumps(in_json(polynomial=[["a", [1, 1]]])), "coefficient must be a finite number"),
         (json.dumps(in_json(more=1)), "exactly the keys"),
         (json.dumps(in_json(variables="xy")), "list of names"),
