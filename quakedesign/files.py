@@ -168,7 +168,8 @@ def sweep(parent: Path) -> None:
         except OSError:
             continue
         try:
-            if os.fstat(lock).st_uid == os.getuid():
+            # a folder made anew at this path since the lock was opened belongs to a running process
+            if os.fstat(lock).st_uid == os.getuid() and _is_same_folder(folder, lock):
                 _discard(folder)
         finally:
             os.close(lock)

@@ -137,6 +137,20 @@ def test_no_sweep_ever_takes_a_folder_that_is_in_use(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
+def test_a_folder_made_anew_after_a_sweep_has_locked_the_old_one_is_not_swept(tmp_path, monkeypatch):
+    def locked(folder, lock=files._locked):
+        descriptor = lock(folder)
+        folder.rmdir()
+        folder.mkdir()
+        (folder / "here").touch()
+        return descriptor
+
+    (tmp_path / f"{PREFIX}anew").mkdir()
+    monkeypatch.setattr(files, "_locked", locked)
+    sweep(tmp_path)
+    assert (tmp_path / f"{PREFIX}anew" / "here").exists()
+
+
 def test_where_folders_have_no_locks_nothing_is_swept(tmp_path, monkeypatch):
     def refuse(*_):
         raise OSError("no locks available")
